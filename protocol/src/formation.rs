@@ -1,0 +1,96 @@
+//! Target shapes: the slots of a formation of any number of drones, relative to its front slot (the anchor).
+
+use crate::Vec2;
+use serde::{Deserialize, Serialize};
+
+/// A formation that can be made for any number of drones, spaced by `spacing_m`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// The paper's: chevrons of five (tip, two on each arm), each nested 2·spacing/√2 behind the one before.
+    NestedV,
+    /// One chevron, 90° at its tip.
+    V,
+    /// Abreast, across the flight direction.
+    Line,
+    /// One behind the other.
+    Column,
+    /// Rows as wide as the formation is deep.
+    Grid,
+    /// On a circle, `spacing_m` between neighbours; a lone drone at its front.
+    Circle,
+    /// Offsets from the anchor, m.
+    Offsets(Vec<[f64; 2]>),
+}
+
+impl Shape {
+    /// The slots of `count` drones, front slot first. With [`Shape::Offsets`], the first `count` of them.
+    #[must_use]
+    pub fn slots(&self, count: usize, spacing_m: f64) -> Vec<Vec2> {
+        let step = spacing_m * std::f64::consts::FRAC_1_SQRT_2;
+        match self {
+            Self::NestedV => {
+                (0..count).map(|i| chevron_slot(i % 5, step) - Vec2::new(2.0 * step, 0.0) * (i / 5) as f64).collect()
+            }
+            Self::V => (0..count).map(|i| chevron_slot(i, step)).collect(),
+            Self::Line => (0..count).map(|i| Vec2::new(0.0, side(i) * spacing_m)).collect(),
+            Self::Column => (0..count).map(|i| Vec2::new(-(i as f64) * spacing_m, 0.0)).collect(),
+            Self::Grid => {
+                let width = (count as f64).sqrt().ceil().max(1.0) as usize;
+                (0..count).map(|i| Vec2::new(-((i / width) as f64), side(i % width)) * spacing_m).collect()
+            }
+            Self::Circle => circle(count, spacing_m),
+            Self::Offsets(offsets) => offsets.iter().take(count).map(|&o| Vec2::from(o)).collect(),
+        }
+    }
+}
+
+/// Tip, then left and right in turn along the arms.
+fn chevron_slot(i: usize, step: f64) -> Vec2 {
+    let along = i.div_ceil(2) as f64;
+    Vec2::new(-along, side(i)) * step
+}
+
+/// 0, 1, −1, 2, −2, …
+fn side(i: usize) -> f64 {
+    let distance = i.div_ceil(2) as f64;
+    if i % 2 == 1 { distance } else { -distance }
+}
+
+fn circle(count: usize, spacing_m: f64) -> Vec<Vec2> {
+    if count < 2 {
+        return vec![Vec2::zeros(); count];
+    }
+    let step = std::f64::consts::TAU / count as f64;
+    let radius = spacing_m / (2.0 * (step / 2.0).sin());
+    (0..count).map(|i| Vec2::new((step * i as f64).cos() - 1.0, (step * i as f64).sin()) * radius).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nested_v_of_eight_is_the_papers() {
+        let c = 35.0 / 2.0f64.sqrt();
+        let wanted =
+            [(0.0, 0.0), (-1.0, 1.0), (-1.0, -1.0), (-2.0, 2.0), (-2.0, -2.0), (-2.0, 0.0), (-3.0, 1.0), (-3.0, -1.0)];
+        for (slot, (x, y)) in Shape::NestedV.slots(8, 35.0).iter().zip(wanted) {
+            assert!((slot - Vec2::new(x * c, y * c)).norm() < 1e-9, "{slot} is not ({x}, {y})·c");
+        }
+    }
+
+    #[test]
+    fn slots_are_spaced_and_the_front_one_is_first() {
+        for shape in [Shape::NestedV, Shape::V, Shape::Line, Shape::Column, Shape::Grid, Shape::Circle] {
+            for count in [1, 2, 5, 8, 13, 40] {
+                let slots = shape.slots(count, 10.0);
+                assert_eq!(slots.len(), count);
+                assert!(slots.iter().all(|s| s.x <= slots[0].x + 1e-9), "{shape:?} of {count}");
+                for (i, a) in slots.iter().enumerate() {
+                    assert!(slots[..i].iter().all(|b| (a - b).norm() > 9.99), "{shape:?} of {count}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! What drones say to each other, and in which form it crosses a process border.
+//!
+//! Pure: no clock, thread, socket or operating-system randomness. SI units, angles in radians, world frame ENU with
+//! x along the flight direction and y to its left.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`ids`], [`time`] | names of drones, groups, terms; simulated time |
+//! | [`message`], [`payload`], [`frame`] | what is said; its layout; the checked frame that carries it |
+//! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
+//! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
+//! | [`record`] | what the world tells the recorder |
+//! | [`formation`], [`shape`] | target shapes; obstacle shapes |
+
+pub mod digest;
+pub mod downlink;
+pub mod formation;
+pub mod frame;
+pub mod ids;
+pub mod message;
+pub mod payload;
+pub mod radio;
+pub mod record;
+pub mod shape;
+pub mod slot;
+pub mod time;
+
+pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
+pub use message::Message;
+pub use time::{SimTime, Tick};
+
+/// A planar vector or point, metres (or m/s, m/s²), world frame.
+pub type Vec2 = nalgebra::Vector2<f64>;

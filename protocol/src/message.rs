@@ -1,0 +1,167 @@
+//! What drones say. Soft state: repeated until superseded, idempotent, safe to lose, repeat and reorder.
+
+use crate::frame::{FRAME_PAYLOAD, Frame};
+use crate::payload::{self, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use bytemuck::Pod;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The kinds of message; each is a topic of its own to an observer and to the radio's rules.
+#[repr(u16)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Topic {
+    /// [`Pose`].
+    Pose = 1,
+    /// [`Obstacle`].
+    Obstacle = 2,
+    /// [`Leadership`].
+    Leadership = 3,
+    /// [`Plan`].
+    Plan = 4,
+    /// [`Assignment`].
+    Assignment = 5,
+    /// [`Passed`].
+    Passed = 7,
+}
+
+impl Topic {
+    /// All topics, in wire order.
+    pub const ALL: [Self; 6] =
+        [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Passed];
+
+    /// The topic with this number on the wire.
+    #[must_use]
+    pub fn from_wire(kind: u16) -> Option<Self> {
+        Self::ALL.into_iter().find(|topic| *topic as u16 == kind)
+    }
+}
+
+/// One message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Message {
+    /// Where a drone is and what it obeys.
+    Pose(Pose),
+    /// An obstacle somebody sensed.
+    Obstacle(Obstacle),
+    /// A claim to lead or a heartbeat.
+    Leadership(Leadership),
+    /// What a leader decided.
+    Plan(Plan),
+    /// One drone's part in it.
+    Assignment(Assignment),
+    /// Who is through which set.
+    Passed(Passed),
+}
+
+/// Why a frame is not a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum DecodeError {
+    /// Unknown kind.
+    #[error("frame of unknown kind {0}")]
+    Kind(u16),
+    /// Another version of the layouts.
+    #[error("frame of version {0}, expected {expected}", expected = payload::VERSION)]
+    Version(u16),
+    /// The length does not fit the kind.
+    #[error("frame of {0} bytes, expected {1}")]
+    Length(u32, usize),
+    /// A number that is not finite, a count out of range, or an unknown flag.
+    #[error("frame with an invalid {0}")]
+    Field(&'static str),
+}
+
+impl Message {
+    /// Its topic.
+    #[must_use]
+    pub fn topic(&self) -> Topic {
+        match self {
+            Self::Pose(_) => Topic::Pose,
+            Self::Obstacle(_) => Topic::Obstacle,
+            Self::Leadership(_) => Topic::Leadership,
+            Self::Plan(_) => Topic::Plan,
+            Self::Assignment(_) => Topic::Assignment,
+            Self::Passed(_) => Topic::Passed,
+        }
+    }
+
+    /// The frame that carries it.
+    #[must_use]
+    pub fn encode(&self) -> Frame {
+        let bytes: &[u8] = match self {
+            Self::Pose(payload) => bytemuck::bytes_of(payload),
+            Self::Obstacle(payload) => bytemuck::bytes_of(payload),
+            Self::Leadership(payload) => bytemuck::bytes_of(payload),
+            Self::Plan(payload) => bytemuck::bytes_of(payload),
+            Self::Assignment(payload) => bytemuck::bytes_of(payload),
+            Self::Passed(payload) => bytemuck::bytes_of(payload),
+        };
+        let mut frame = Frame {
+            kind: self.topic() as u16,
+            version: payload::VERSION,
+            len: bytes.len() as u32,
+            payload: [0; FRAME_PAYLOAD],
+        };
+        frame.payload[..bytes.len()].copy_from_slice(bytes);
+        frame
+    }
+
+    /// The message in a frame that another process wrote.
+    ///
+    /// # Errors
+    /// [`DecodeError`]; nothing a frame holds can panic.
+    pub fn decode(frame: &Frame) -> Result<Self, DecodeError> {
+        if frame.version != payload::VERSION {
+            return Err(DecodeError::Version(frame.version));
+        }
+        let message = match Topic::from_wire(frame.kind).ok_or(DecodeError::Kind(frame.kind))? {
+            Topic::Pose => Self::Pose(read(frame)?),
+            Topic::Obstacle => Self::Obstacle(read(frame)?),
+            Topic::Leadership => Self::Leadership(read(frame)?),
+            Topic::Plan => Self::Plan(read(frame)?),
+            Topic::Assignment => Self::Assignment(read(frame)?),
+            Topic::Passed => Self::Passed(read(frame)?),
+        };
+        message.check()?;
+        Ok(message)
+    }
+
+    fn check(&self) -> Result<(), DecodeError> {
+        let finite = |values: &[f64], name| {
+            if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(DecodeError::Field(name)) }
+        };
+        let below = |value: u32, limit: u32, name| if value < limit { Ok(()) } else { Err(DecodeError::Field(name)) };
+        let set_limit = payload::MAX_SET as u32 + 1;
+        match self {
+            Self::Pose(p) => {
+                finite(&p.position_m, "position")?;
+                finite(&p.velocity_mps, "velocity")?;
+                finite(&[p.remaining_m], "remaining path")
+            }
+            Self::Obstacle(o) => o.shape.check().map_err(|_| DecodeError::Field("shape")),
+            Self::Leadership(l) => below(l.kind.wrapping_sub(1), 2, "kind of leadership"),
+            Self::Plan(p) => {
+                finite(&p.anchor_m, "anchor")?;
+                finite(&p.anchor_mps, "anchor velocity")?;
+                if p.anchor_stop_x_m.is_nan() {
+                    return Err(DecodeError::Field("anchor stop"));
+                }
+                below(p.phase, 3, "phase")?;
+                below(p.set_count, set_limit, "obstacle count")
+            }
+            Self::Assignment(a) => {
+                finite(&a.slot_m, "slot")?;
+                finite(&[a.arrival_s], "arrival")
+            }
+            Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
+        }
+    }
+}
+
+fn read<T: Pod>(frame: &Frame) -> Result<T, DecodeError> {
+    const { assert!(size_of::<T>() <= FRAME_PAYLOAD, "a payload must fit a frame") };
+    if frame.len as usize != size_of::<T>() {
+        return Err(DecodeError::Length(frame.len, size_of::<T>()));
+    }
+    Ok(bytemuck::pod_read_unaligned(&frame.payload[..size_of::<T>()]))
+}

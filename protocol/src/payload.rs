@@ -1,0 +1,163 @@
+//! Layouts of the messages' payloads: plain data, fixed size, versioned by [`VERSION`]. A field is read from shared
+//! memory only through [`crate::Message::decode`], which checks it.
+
+use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
+use crate::shape::ConvexShape;
+use crate::time::SimTime;
+use bytemuck::{Pod, Zeroable};
+
+/// Version of all layouts in this module. A frame of another version is refused.
+pub const VERSION: u16 = 1;
+
+/// Most obstacles of one set.
+pub const MAX_SET: usize = 32;
+
+/// [`Pose::flags`]: the drone is in a queue, `route`, `rank` and `remaining_m` apply.
+pub const POSE_QUEUED: u32 = 1;
+/// [`Pose::flags`]: the drone believes it leads its group.
+pub const POSE_LEADS: u32 = 2;
+
+/// Where a drone is and what it obeys: the 10 Hz beacon.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Pose {
+    /// When this was true.
+    pub stamp: SimTime,
+    /// World frame, m.
+    pub position_m: [f64; 2],
+    /// World frame, m/s.
+    pub velocity_mps: [f64; 2],
+    /// Length of the path still to fly to the gate of the obstacle set, m; 0 unless queued.
+    pub remaining_m: f64,
+    /// The plan it obeys.
+    pub obeyed: PlanStamp,
+    /// Its group.
+    pub group: GroupId,
+    /// Of its process.
+    pub incarnation: u32,
+    /// [`POSE_QUEUED`], [`POSE_LEADS`].
+    pub flags: u32,
+    /// Route it flies, 0 = rightmost.
+    pub route: u16,
+    /// Its place in the queue of that route, 0 = first.
+    pub rank: u16,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// An obstacle that somebody sensed, for those who cannot.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Obstacle {
+    /// The obstacle's outline, world frame.
+    pub shape: ConvexShape,
+    /// The world's number for it.
+    pub id: ObstacleId,
+    /// Who sensed it first, as far as the sender knows.
+    pub witness: DroneId,
+}
+
+/// [`Leadership::kind`]: the source wants to lead and asks who objects.
+pub const LEADERSHIP_CLAIM: u32 = 1;
+/// [`Leadership::kind`]: the source leads and is alive.
+pub const LEADERSHIP_HEARTBEAT: u32 = 2;
+
+/// A claim to lead, or a leader's heartbeat.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Leadership {
+    /// When it was said.
+    pub stamp: SimTime,
+    /// The term.
+    pub ballot: Ballot,
+    /// [`LEADERSHIP_CLAIM`] or [`LEADERSHIP_HEARTBEAT`].
+    pub kind: u32,
+    /// The group it is about.
+    pub group: GroupId,
+    /// Number of the last plan made in this term; 0 if none.
+    pub epoch: u32,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// [`Plan::phase`]: fly in formation, the anchor moves on.
+pub const PHASE_CRUISE: u32 = 0;
+/// [`Plan::phase`]: go around the obstacle set, each by its route and rank.
+pub const PHASE_AVOID: u32 = 1;
+/// [`Plan::phase`]: take the slots of the target shape again.
+pub const PHASE_REFORM: u32 = 2;
+
+/// What a leader decided for its group.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Plan {
+    /// The moment for which the anchor holds; receivers extrapolate by its velocity.
+    pub stamp: SimTime,
+    /// Term and number.
+    pub id: PlanStamp,
+    /// The group that is planned for.
+    pub group: GroupId,
+    /// [`PHASE_CRUISE`], [`PHASE_AVOID`] or [`PHASE_REFORM`].
+    pub phase: u32,
+    /// Number of drones planned for: the target shape is the formation of so many.
+    pub members: u32,
+    /// Where the formation's front slot is at `stamp`, world frame, m.
+    pub anchor_m: [f64; 2],
+    /// How the front slot moves, m/s.
+    pub anchor_mps: [f64; 2],
+    /// The anchor moves no further than this abscissa, m; infinity: never stops.
+    pub anchor_stop_x_m: f64,
+    /// Forecast: seconds from `stamp` until the last drone passes the gate; NaN unless avoiding.
+    pub predicted_s: f64,
+    /// Groupings that were simulated forward before the choice.
+    pub candidates: u32,
+    /// Routes past the set; 0 unless avoiding.
+    pub routes: u32,
+    /// Obstacles in use below, at most [`MAX_SET`], in ascending order.
+    pub set_count: u32,
+    /// The obstacle set.
+    pub set: [ObstacleId; MAX_SET],
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// One drone's part in a plan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Assignment {
+    /// The plan it belongs to.
+    pub id: PlanStamp,
+    /// The group the drone is in under this plan.
+    pub group: GroupId,
+    /// Whom it is for.
+    pub drone: DroneId,
+    /// Who leads that group.
+    pub leader: DroneId,
+    /// Its slot, relative to the anchor, m.
+    pub slot_m: [f64; 2],
+    /// Free-flight time to the gate when the plan was made, s; 0 unless avoiding. Orders the queue.
+    pub arrival_s: f64,
+    /// Route, 0 = rightmost; [`NO_ROUTE`] unless avoiding.
+    pub route: u16,
+    /// Place in the queue of that route, 0 = first.
+    pub rank: u16,
+    /// Always 0.
+    pub reserved: u32,
+}
+
+/// [`Assignment::route`] of a drone that has no obstacle to pass.
+pub const NO_ROUTE: u16 = u16::MAX;
+
+/// The source is past these obstacles: beyond the rear edge and the planning distance.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Passed {
+    /// When it was said.
+    pub stamp: SimTime,
+    /// Obstacles in use below.
+    pub set_count: u32,
+    /// The obstacles, ascending.
+    pub set: [ObstacleId; MAX_SET],
+    /// Always 0.
+    pub reserved: u32,
+}
