@@ -330,3 +330,12 @@ impl<'a> RecordView<'a> {
         self.events.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).map(parse).collect()
     }
 }
+
+/// Whoever wants to see each record of a run, in order: the recorder, a live view, a test.
+pub trait RecordSink: Send {
+    /// Takes the record of one tick. An error stops the recording, never the mission.
+    ///
+    /// # Errors
+    /// Whatever keeps the record from being kept, in words.
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), String>;
+}
