@@ -1,1 +1,38 @@
-//! To be written.
+//! What joins the processes of a swarm; the only crate that names iceoryx2.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`domain`] | where a run's shared things live, and how they are removed |
+//! | [`control`], [`barrier`], [`mission`], [`orders`] | the control segment: a memfd of futex words and actuator slots |
+//! | [`services`], [`ports`], [`payload`] | downlink, uplink shards and record, over iceoryx2 publish-subscribe |
+//! | [`host`] | pinning, limits |
+//!
+//! The launcher calls [`Domain::create`], [`Control::create`] and [`Services::create`]; its children get the domain's
+//! path and the memfd's number and call [`Domain::join`], [`Control::attach`] and [`Services::open`].
+#![deny(unsafe_code)]
+
+pub mod barrier;
+pub mod control;
+pub mod domain;
+pub mod error;
+mod futex;
+pub mod host;
+pub mod mission;
+pub mod orders;
+pub mod payload;
+pub mod ports;
+pub mod services;
+
+pub use barrier::{Answer, DroneEnd, Patience, TickSignal};
+pub use control::{Control, ControlSpec, WaitMode};
+pub use domain::{Cleaned, Domain, clean, living};
+pub use error::BusError;
+pub use host::{PinMode, allowed_cores, pin_to_core, raise_file_limit};
+pub use mission::WorldState;
+pub use orders::{Order, OrderKind};
+pub use payload::UplinkHeader;
+pub use ports::{
+    DownlinkPublisher, DownlinkSubscriber, RecordPolicy, RecordPublisher, RecordRole, RecordSubscriber,
+    UplinkPublisher, UplinkSubscriber,
+};
+pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};

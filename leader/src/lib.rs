@@ -1,1 +1,14 @@
-//! To be written.
+//! Who leads, and who goes where: membership, election, routes, exact grouping, formation. Pure.
+
+pub mod cost;
+pub mod election;
+mod exchange;
+pub mod geometry;
+pub mod ledger;
+pub mod membership;
+pub mod obstacles;
+pub mod planner;
+pub mod routes;
+pub mod slots;
+pub mod split;
+pub mod string;

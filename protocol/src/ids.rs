@@ -93,6 +93,16 @@ impl GroupId {
         }
         Self(path)
     }
+
+    /// The group this one was split from; the whole swarm for itself.
+    #[must_use]
+    pub fn parent(self) -> Self {
+        let mut path = self.0;
+        if let Some(last) = self.depth().checked_sub(1) {
+            path[last] = 0;
+        }
+        Self(path)
+    }
 }
 
 impl fmt::Display for GroupId {
@@ -123,6 +133,8 @@ mod tests {
     fn groups_are_named_by_lineage() {
         assert_eq!(GroupId::ALL.to_string(), "N");
         assert_eq!(GroupId::ALL.child(1).child(2).to_string(), "N12");
+        assert_eq!(GroupId::ALL.child(1).child(2).parent(), GroupId::ALL.child(1));
+        assert_eq!(GroupId::ALL.parent(), GroupId::ALL);
         assert_eq!(GroupId::ALL.child(12).to_string(), "N[12]");
     }
 }

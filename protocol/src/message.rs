@@ -136,7 +136,7 @@ impl Message {
             Self::Pose(p) => {
                 finite(&p.position_m, "position")?;
                 finite(&p.velocity_mps, "velocity")?;
-                finite(&[p.remaining_m], "remaining path")
+                p.queue.iter().try_for_each(|place| finite(&[place.remaining_m], "remaining path"))
             }
             Self::Obstacle(o) => o.shape.check().map_err(|_| DecodeError::Field("shape")),
             Self::Leadership(l) => below(l.kind.wrapping_sub(1), 2, "kind of leadership"),

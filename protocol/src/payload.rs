@@ -12,10 +12,31 @@ pub const VERSION: u16 = 1;
 /// Most obstacles of one set.
 pub const MAX_SET: usize = 32;
 
-/// [`Pose::flags`]: the drone is in a queue, `route`, `rank` and `remaining_m` apply.
-pub const POSE_QUEUED: u32 = 1;
 /// [`Pose::flags`]: the drone believes it leads its group.
-pub const POSE_LEADS: u32 = 2;
+pub const POSE_LEADS: u32 = 1;
+
+/// A place in the queue past one obstacle set.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct QueuePlace {
+    /// Length of the path still to fly to the set's gate, m; negative once past it.
+    pub remaining_m: f64,
+    /// Which set: [`set_tag`]; 0 in an unused entry.
+    pub set: u32,
+    /// Route past the set, 0 = rightmost.
+    pub route: u16,
+    /// Place in the queue of that route, 0 = first.
+    pub rank: u16,
+}
+
+/// Sets that a beacon can tell a place for: the one a drone is passing and the next.
+pub const MAX_PLACES: usize = 2;
+
+/// A short name of an obstacle set; never 0. Ids ascending.
+#[must_use]
+pub fn set_tag(set: &[ObstacleId]) -> u32 {
+    (xxhash_rust::xxh3::xxh3_64(bytemuck::cast_slice(set)) as u32).max(1)
+}
 
 /// Where a drone is and what it obeys: the 10 Hz beacon.
 #[repr(C)]
@@ -27,22 +48,16 @@ pub struct Pose {
     pub position_m: [f64; 2],
     /// World frame, m/s.
     pub velocity_mps: [f64; 2],
-    /// Length of the path still to fly to the gate of the obstacle set, m; 0 unless queued.
-    pub remaining_m: f64,
+    /// Its places in queues, the nearest set first.
+    pub queue: [QueuePlace; MAX_PLACES],
     /// The plan it obeys.
     pub obeyed: PlanStamp,
     /// Its group.
     pub group: GroupId,
     /// Of its process.
     pub incarnation: u32,
-    /// [`POSE_QUEUED`], [`POSE_LEADS`].
+    /// [`POSE_LEADS`].
     pub flags: u32,
-    /// Route it flies, 0 = rightmost.
-    pub route: u16,
-    /// Its place in the queue of that route, 0 = first.
-    pub rank: u16,
-    /// Always 0.
-    pub reserved: u32,
 }
 
 /// An obstacle that somebody sensed, for those who cannot.

@@ -1,1 +1,30 @@
-//! To be written.
+//! A run's record: what becomes of it. Feeds on [`skein_protocol::record`] alone.
+//!
+//! [`Recorder`] takes the record of each tick and makes a [`Summary`], trace.csv and events.jsonl in a [`RunFolder`];
+//! [`plot::write`] draws a flown run from its trace; [`text::summary`] says it to a person.
+
+mod accumulate;
+mod assign;
+mod close;
+mod error;
+mod facts;
+mod folder;
+mod formation;
+mod leading;
+mod metrics;
+pub mod plot;
+mod recorder;
+mod stages;
+mod steps;
+mod summary;
+#[cfg(test)]
+mod testing;
+pub mod text;
+mod trace;
+mod vicinity;
+
+pub use error::ReportError;
+pub use facts::{MissionEnd, RunFacts};
+pub use folder::{Manifest, ProcessEntry, Role, RunFolder};
+pub use recorder::{Ending, Recorder};
+pub use summary::*;

@@ -1,1 +1,36 @@
-//! To be written.
+//! How pilots and world are run: each a process of its own, or inline in one thread; in lockstep or by the wall clock.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`mission`] | from a scenario to world, pilots and radios |
+//! | [`cockpit`] | what both runtimes put around a pilot: radio, queue, tally |
+//! | [`inline`] | all in one thread |
+//! | [`supervisor`] | starts a process for the world and one for each drone, and looks after them |
+//! | [`world_process`], [`drone_process`] | what those processes do |
+//! | [`clock`] | lockstep and wall clock |
+
+mod children;
+pub mod clock;
+pub mod cockpit;
+pub mod drone_process;
+mod error;
+pub mod inline;
+pub mod mission;
+pub mod supervisor;
+pub mod world_process;
+
+pub use clock::Clock;
+pub use error::RuntimeError;
+
+/// How a run ended, beside what its record tells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunEnd {
+    /// From the call to the first tick opened, s of wall time.
+    pub startup_s: f64,
+    /// The signal that interrupted it.
+    pub signal: Option<i32>,
+    /// Why the recording stopped early.
+    pub sink_error: Option<String>,
+    /// What of the environment failed while it flew: the world's death, a service that broke.
+    pub failure: Option<String>,
+}

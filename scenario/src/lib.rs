@@ -1,1 +1,27 @@
-//! To be written.
+//! TOML → a checked [`Scenario`]. Pure: text in, scenario out; reading files is the caller's.
+//!
+//! The types in `keys`, `obstacle` and `strategy` are the one source of truth: schemars makes the JSON [`schema`] of
+//! their doc comments, ranges and defaults; the checks walk the text against that schema, and [`markdown`] prints it as
+//! the key reference `docs/scenario.md`.
+
+mod check;
+mod error;
+mod keys;
+mod near;
+mod node;
+mod obstacle;
+mod parse;
+mod reference;
+mod resolved;
+mod rules;
+mod strategy;
+
+pub use error::{Issue, ScenarioErrors};
+pub use keys::{
+    Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
+    Protocol, RadioKeys, Scenario, Sensors, Time,
+};
+pub use obstacle::Obstacle;
+pub use parse::Source;
+pub use reference::{Key, keys, markdown, schema};
+pub use strategy::{Strategy, StrategyError};

@@ -1,2 +1,63 @@
-//! The skein binary.
-fn main() {}
+//! The `skein` binary: it parses, calls and prints.
+
+mod check;
+mod cli;
+mod exit;
+mod facts;
+mod housekeeping;
+mod input;
+mod interrupt;
+mod progress;
+mod report;
+mod roles;
+mod run;
+mod schema;
+
+use clap::Parser;
+use cli::{Cli, Command};
+use exit::{Exit, Failure};
+
+fn main() -> std::process::ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // clap knows where help and where errors go; a closed pipe is no reason to fail.
+            let _ = error.print();
+            return if error.use_stderr() { Exit::Usage.into() } else { Exit::Reached.into() };
+        }
+    };
+    start_logging();
+    match dispatch(cli.command) {
+        Ok(exit) => exit.into(),
+        Err(failure) => {
+            failure.print();
+            failure.exit.into()
+        }
+    }
+}
+
+fn dispatch(command: Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Run(args) => run::run(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Report(args) => report::report(&args),
+        Command::Clean => housekeeping::clean(),
+        Command::Schema { of } => schema::schema(of),
+        Command::Completions { shell } => schema::completions(shell),
+        Command::Man => schema::man(),
+        Command::World(args) => roles::world(&args),
+        Command::Drone(args) => roles::drone(&args),
+    }
+}
+
+/// Logs go to stderr, warnings and worse unless `SKEIN_LOG` says otherwise; coloured on a terminal.
+fn start_logging() {
+    use std::io::IsTerminal;
+    use tracing_subscriber::EnvFilter;
+    let filter = EnvFilter::builder()
+        .with_env_var("SKEIN_LOG")
+        .with_default_directive(tracing::Level::WARN.into())
+        .from_env_lossy();
+    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colour).init();
+}

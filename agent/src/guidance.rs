@@ -1,0 +1,87 @@
+//! Where a drone wants to fly when nobody is in the way.
+
+use skein_protocol::payload::Plan;
+use skein_protocol::{SimTime, Vec2};
+
+/// Constants of formation flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuidanceParams {
+    /// Nominal speed v, m/s.
+    pub speed_mps: f64,
+    /// δ: the speed stays within v ± δ where it can, m/s.
+    pub speed_change_mps: f64,
+    /// Greatest speed while taking a slot, m/s.
+    pub reform_speed_max_mps: f64,
+    /// Greatest acceleration, m/s².
+    pub acceleration_max_mps2: f64,
+}
+
+/// Approach to a slot, 1/s: the closing speed is this times the distance, as long as the drone can still brake.
+const APPROACH_PER_S: f64 = 0.8;
+
+/// The anchor of a plan at `now`: it moves on from its stamp until it reaches the abscissa where it stops. Position, m,
+/// and velocity, m/s.
+#[must_use]
+pub fn anchor(plan: &Plan, now: SimTime) -> (Vec2, Vec2) {
+    let (start, velocity) = (Vec2::from(plan.anchor_m), Vec2::from(plan.anchor_mps));
+    let here = start + velocity * now.since(plan.stamp);
+    if velocity.x > 0.0 && here.x >= plan.anchor_stop_x_m {
+        return (Vec2::new(plan.anchor_stop_x_m.max(start.x), here.y), Vec2::zeros());
+    }
+    (here, velocity)
+}
+
+impl GuidanceParams {
+    /// The velocity that takes a drone to a slot which moves along, m/s.
+    #[must_use]
+    pub fn to_slot(&self, offset: Vec2, slot_velocity: Vec2) -> Vec2 {
+        let distance = offset.norm();
+        let closing = (APPROACH_PER_S * distance).min((self.acceleration_max_mps2 * distance).sqrt());
+        let mut wanted = slot_velocity;
+        if distance > 1e-9 {
+            wanted += offset * (closing / distance);
+        }
+        // Nobody turns back while the formation moves on.
+        if slot_velocity.x > 0.0 {
+            wanted.x = wanted.x.max(self.speed_mps - self.speed_change_mps);
+        }
+        let speed = wanted.norm();
+        if speed > self.reform_speed_max_mps { wanted * (self.reform_speed_max_mps / speed) } else { wanted }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn the_anchor_moves_and_stops() {
+        let plan = Plan {
+            anchor_m: [10.0, 1.0],
+            anchor_mps: [10.0, 0.0],
+            anchor_stop_x_m: 50.0,
+            stamp: SimTime::from_secs(1.0),
+            ..Plan::zeroed()
+        };
+        assert_eq!(anchor(&plan, SimTime::from_secs(2.0)), (Vec2::new(20.0, 1.0), Vec2::new(10.0, 0.0)));
+        assert_eq!(anchor(&plan, SimTime::from_secs(9.0)), (Vec2::new(50.0, 1.0), Vec2::zeros()));
+        let still = Plan { anchor_mps: [0.0; 2], anchor_m: [80.0, 0.0], ..plan };
+        assert_eq!(anchor(&still, SimTime::from_secs(9.0)), (Vec2::new(80.0, 0.0), Vec2::zeros()));
+    }
+
+    #[test]
+    fn a_slot_is_approached_no_faster_than_can_be_braked() {
+        let guidance = GuidanceParams {
+            speed_mps: 10.0,
+            speed_change_mps: 5.0,
+            reform_speed_max_mps: 15.0,
+            acceleration_max_mps2: 5.0,
+        };
+        assert!((guidance.to_slot(Vec2::new(0.0, 1.0), Vec2::zeros()) - Vec2::new(0.0, 0.8)).norm() < 1e-12);
+        assert!((guidance.to_slot(Vec2::new(20.0, 0.0), Vec2::zeros()).norm() - 10.0).abs() < 1e-12);
+        assert!((guidance.to_slot(Vec2::new(900.0, 0.0), Vec2::zeros()).norm() - 15.0).abs() < 1e-12);
+        let behind = guidance.to_slot(Vec2::new(-100.0, 0.0), Vec2::new(10.0, 0.0));
+        assert!((behind.x - 5.0).abs() < 1e-12, "{behind}");
+    }
+}

@@ -1,0 +1,148 @@
+//! A drone's way past the obstacle sets ahead: its routes, the taut string through them, its places in queues.
+
+use skein_leader::ledger::Ledger;
+use skein_leader::ledger::PlannedSet;
+use skein_leader::routes::{Body, Routes};
+use skein_leader::string::{Lane, Pull, RUN_OUT_M};
+use skein_protocol::payload::{MAX_PLACES, QueuePlace};
+use skein_protocol::{DroneId, PlanStamp, Vec2};
+
+/// A dead drone that drifts by more than this makes the string be drawn anew, m.
+const DRIFT_M: f64 = 1.0;
+/// The rank of a drone that nobody gave a place: behind all others.
+const NO_RANK: u16 = u16::MAX;
+
+/// One set on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Leg {
+    place: QueuePlace,
+    gate_x_m: f64,
+    exit_x_m: f64,
+    /// Still to be left.
+    open: bool,
+}
+
+/// A way of one's own past a set for which no part has come yet.
+#[derive(Clone, Debug)]
+pub struct OwnWay {
+    /// Short name of the set.
+    pub tag: u32,
+    /// The ways past it.
+    pub routes: Routes,
+    /// Which of them.
+    pub route: usize,
+}
+
+/// The way, redrawn when something about it changes.
+#[derive(Clone, Debug)]
+pub struct Way {
+    me: DroneId,
+    course_y_m: f64,
+    legs: Vec<Leg>,
+    lane: Option<Lane>,
+    drawn: Option<(PlanStamp, bool, usize)>,
+    bodies: Vec<Vec2>,
+    /// Taken when an obstacle is dangerously near and no leader said anything.
+    pub own: Option<OwnWay>,
+}
+
+impl Way {
+    /// A free way.
+    #[must_use]
+    pub fn new(me: DroneId, course_y_m: f64) -> Self {
+        Self { me, course_y_m, legs: Vec::new(), lane: None, drawn: None, bodies: Vec::new(), own: None }
+    }
+
+    /// Follows the ledger: takes up new parts, closes legs that are left, evades `bodies` (drones that hang dead in the
+    /// air, m) by `body_radius_m`.
+    pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Vec2], body_radius_m: f64) {
+        if self.own.as_ref().is_some_and(|own| {
+            position.x >= own.routes.exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains_key(&self.me))
+        }) {
+            self.own = None;
+        }
+        let moved = self.bodies.len() != bodies.len()
+            || self.bodies.iter().zip(bodies).any(|(old, new)| (old - new).norm() > DRIFT_M);
+        let left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
+        let key = (ledger.stamp(), self.own.is_some(), left);
+        if self.drawn == Some(key) && !moved {
+            return;
+        }
+        self.bodies.clear();
+        self.bodies.extend_from_slice(bodies);
+        self.draw(ledger, position, body_radius_m);
+        let left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
+        self.drawn = Some((ledger.stamp(), self.own.is_some(), left));
+    }
+
+    fn draw(&mut self, ledger: &Ledger, position: Vec2, body_radius_m: f64) {
+        let mine = |set: &PlannedSet| {
+            let part = set.parts.get(&self.me)?;
+            let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
+            (usize::from(part.route) < set.routes.count()).then_some(place)
+        };
+        let mut legs: Vec<(QueuePlace, &Routes)> =
+            ledger.sets().iter().filter_map(|set| mine(set).map(|place| (place, &set.routes))).collect();
+        if let Some(own) = &self.own {
+            let route = own.route as u16;
+            legs.push((QueuePlace { remaining_m: 0.0, set: own.tag, route, rank: NO_RANK }, &own.routes));
+        }
+        legs.sort_by(|a, b| a.1.gate_x_m().total_cmp(&b.1.gate_x_m()));
+        self.legs = legs
+            .iter()
+            .map(|&(place, routes)| Leg {
+                place,
+                gate_x_m: routes.gate_x_m(),
+                exit_x_m: routes.exit_x_m(),
+                open: position.x < routes.exit_x_m(),
+            })
+            .collect();
+        let open: Vec<(&Routes, usize)> = legs
+            .iter()
+            .filter(|(_, routes)| position.x < routes.exit_x_m())
+            .map(|&(place, routes)| (routes, usize::from(place.route)))
+            .collect();
+        let bodies: Vec<Body> =
+            self.bodies.iter().map(|&centre_m| Body { centre_m, radius_m: body_radius_m }).collect();
+        self.lane = open
+            .iter()
+            .map(|(routes, _)| routes.exit_x_m())
+            .reduce(f64::max)
+            .map(|exit_x_m| Lane::new(&open, &bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
+    }
+
+    /// The next step along the way; `None` if nothing lies ahead.
+    #[must_use]
+    pub fn pull(&self, position: Vec2) -> Option<Pull> {
+        self.lane.as_ref().map(|lane| lane.pull(position, self.first_gate()))
+    }
+
+    fn first_gate(&self) -> f64 {
+        self.legs.iter().find(|leg| leg.open).map_or(f64::INFINITY, |leg| leg.gate_x_m)
+    }
+
+    /// Places in the queues of the sets ahead, and of those behind until the swarm re-forms; negative remaining paths
+    /// past a gate. Unused entries have set 0.
+    #[must_use]
+    pub fn places(&self, position: Vec2) -> [QueuePlace; MAX_PLACES] {
+        let mut places = [QueuePlace::default(); MAX_PLACES];
+        let first = self.legs.len().saturating_sub(MAX_PLACES);
+        for (place, leg) in places.iter_mut().zip(&self.legs[first..]) {
+            *place = QueuePlace { remaining_m: self.remaining_m(leg, position), ..leg.place };
+        }
+        places
+    }
+
+    fn remaining_m(&self, leg: &Leg, position: Vec2) -> f64 {
+        match &self.lane {
+            Some(lane) if position.x < leg.gate_x_m => lane.pull(position, leg.gate_x_m).to_gate_m,
+            _ => leg.gate_x_m - position.x,
+        }
+    }
+
+    /// Whether the set of this place is still to be left.
+    #[must_use]
+    pub fn is_open_set(&self, set: u32) -> bool {
+        self.legs.iter().any(|leg| leg.open && leg.place.set == set)
+    }
+}

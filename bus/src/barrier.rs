@@ -1,0 +1,262 @@
+//! The barrier of a tick: the world opens it, drones answer, the world waits for their done words in turn.
+//!
+//! The done word alone is the truth: it holds the last answered tick plus 1 and, in its top bit, whether the process is
+//! dead. The `waiting` hint only saves wake-ups.
+#![allow(unsafe_code)]
+
+use crate::control::{Control, DEAD, SLICE, STOP, WaitMode};
+use crate::error::BusError;
+use crate::futex;
+use skein_protocol::Tick;
+use skein_protocol::slot::{LinkStats, Slot};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Yields between two looks at the clock, and at whether the world still lives.
+const YIELDS: u32 = 256;
+
+/// What became of one drone in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Answer {
+    /// Not yet waited for.
+    #[default]
+    Pending,
+    /// It answered: its slot is this tick's.
+    Done,
+    /// Its process is gone, and it did not answer before.
+    Dead,
+    /// It had not answered at the deadline.
+    Late,
+    /// It has not answered for so long that it never will.
+    Hung,
+    /// Set by the caller, for a drone it knows to be frozen: not waited for.
+    Absent,
+}
+
+/// How long the world waits for a drone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Patience {
+    /// Until then; who has not answered is [`Answer::Late`]. For the wall clock.
+    Until(Instant),
+    /// That long from the call; who has not answered is [`Answer::Hung`]. For lockstep.
+    For(Duration),
+}
+
+/// What a drone waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TickSignal {
+    /// This tick is open: the newest one.
+    Tick(Tick),
+    /// The mission is over.
+    Stop,
+    /// The caller's check said that nobody will open a tick any more.
+    Orphaned,
+}
+
+impl Control {
+    /// Opens tick `k` for all drones: the world's part, running on core 0. The downlink must have been sent before.
+    ///
+    /// # Errors
+    /// [`BusError::Control`] for a tick past 2³¹ − 2.
+    pub fn open_tick(&self, k: Tick) -> Result<(), BusError> {
+        self.publish(word_of(k)?);
+        Ok(())
+    }
+
+    /// Ends the mission for all drones: the world's part, or the launcher's after the world's death.
+    pub fn close(&self) {
+        self.publish(STOP);
+    }
+
+    fn publish(&self, value: u32) {
+        // All words first, so that an awake drone need not be woken; then the other cores, so that they work while this
+        // one is still in its own system call; core 0, the world's own, last.
+        let cores = self.spec().cores;
+        (0..cores).for_each(|core| self.tick_word(core).store(value, Ordering::SeqCst));
+        if self.spec().wait == WaitMode::Block {
+            (0..cores).rev().for_each(|core| futex::wake_all(self.tick_word(core)));
+        }
+    }
+
+    /// Waits until every drone has answered tick `k`, is dead, or has used up the patience, and writes what became of
+    /// each to `answers` (one a drone; those that are [`Answer::Absent`] are left alone). Allocates nothing.
+    ///
+    /// # Errors
+    /// [`BusError::Control`] for a tick past 2³¹ − 2, or a slice of another length than the number of drones.
+    pub fn wait_done(&self, k: Tick, patience: Patience, answers: &mut [Answer]) -> Result<(), BusError> {
+        let target = word_of(k)?;
+        let drones = self.spec().drones;
+        if answers.len() != drones {
+            return Err(BusError::Control(format!("expected {drones} answers, not {}", answers.len())));
+        }
+        let (end, overdue) = match patience {
+            Patience::Until(end) => (end, Answer::Late),
+            Patience::For(span) => (Instant::now() + span, Answer::Hung),
+        };
+        for (drone, answer) in answers.iter_mut().enumerate() {
+            if *answer != Answer::Absent {
+                *answer = self.wait_for(drone, target, end).unwrap_or(overdue);
+            }
+        }
+        Ok(())
+    }
+
+    fn wait_for(&self, drone: usize, target: u32, end: Instant) -> Option<Answer> {
+        let word = &self.drone(drone).done;
+        for _ in 0..self.spin() {
+            if let Some(answer) = judge(word.load(Ordering::Acquire), target) {
+                return Some(answer);
+            }
+            std::hint::spin_loop();
+        }
+        loop {
+            if let Some(answer) = judge(word.load(Ordering::Acquire), target) {
+                return Some(answer);
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            match self.spec().wait {
+                WaitMode::Block => self.sleep_on(drone, target, left),
+                WaitMode::Yield => self.yield_on(drone, target),
+            }
+        }
+    }
+
+    /// The hint, then another look, then sleep; a drone sets its word, then looks at the hint. Both sequentially
+    /// consistent: at least one sees the other's store, so no wake-up is lost. And a word that changes after our look
+    /// keeps the futex from sleeping.
+    fn sleep_on(&self, drone: usize, target: u32, limit: Duration) {
+        let word = &self.drone(drone).done;
+        self.waiting().store(drone as u32 + 1, Ordering::SeqCst);
+        let seen = word.load(Ordering::SeqCst);
+        if judge(seen, target).is_none() {
+            futex::wait(word, seen, limit);
+        }
+        self.waiting().store(0, Ordering::Relaxed);
+    }
+
+    fn yield_on(&self, drone: usize, target: u32) {
+        let word = &self.drone(drone).done;
+        for _ in 0..YIELDS {
+            if judge(word.load(Ordering::Acquire), target).is_some() {
+                return;
+            }
+            rustix::thread::sched_yield();
+        }
+    }
+}
+
+/// A drone that answered and then died has answered.
+fn judge(done: u32, target: u32) -> Option<Answer> {
+    if done & !DEAD == target {
+        Some(Answer::Done)
+    } else if done & DEAD != 0 {
+        Some(Answer::Dead)
+    } else {
+        None
+    }
+}
+
+fn word_of(k: Tick) -> Result<u32, BusError> {
+    let word = u32::try_from(k + 1).ok().filter(|&word| word < DEAD);
+    word.ok_or_else(|| BusError::Control(format!("tick {k} is past the last one, {}", DEAD - 2)))
+}
+
+/// A drone's end of the barrier.
+#[derive(Debug)]
+pub struct DroneEnd {
+    control: Arc<Control>,
+    drone: usize,
+    last: u32,
+}
+
+impl DroneEnd {
+    /// The end of this drone; there must be no other one for it.
+    ///
+    /// # Errors
+    /// [`BusError::Control`] if the segment has no such drone.
+    pub fn new(control: Arc<Control>, drone: usize) -> Result<Self, BusError> {
+        let drones = control.spec().drones;
+        if drone >= drones {
+            return Err(BusError::Control(format!("drone {drone} is not below {drones}")));
+        }
+        Ok(Self { control, drone, last: 0 })
+    }
+
+    /// Tells that this process, of an incarnation from 1, has its ports open and will answer ticks.
+    pub fn announce(&self, incarnation: u32) {
+        self.control.drone(self.drone).ready.store(incarnation, Ordering::Release);
+    }
+
+    /// Waits for a tick that this drone has not seen yet, and gives the newest. `alive` is asked every 100 ms or so
+    /// whether the world is still there.
+    pub fn wait_tick(&mut self, mut alive: impl FnMut() -> bool) -> TickSignal {
+        let control = &self.control;
+        let word = control.tick_word(control.core_of(self.drone));
+        let mut spins = control.spin();
+        loop {
+            let seen = word.load(Ordering::Acquire);
+            if seen == STOP {
+                return TickSignal::Stop;
+            }
+            if seen > self.last && self.may_answer(seen) {
+                self.last = seen;
+                return TickSignal::Tick(Tick::from(seen - 1));
+            }
+            if spins > 0 {
+                spins -= 1;
+                std::hint::spin_loop();
+            } else if !self.pause(seen) && !alive() {
+                return TickSignal::Orphaned;
+            }
+        }
+    }
+
+    /// Waits for another value than `seen`; false if there was none for a while.
+    fn pause(&self, seen: u32) -> bool {
+        let word = self.control.tick_word(self.control.core_of(self.drone));
+        match self.control.spec().wait {
+            WaitMode::Block => futex::wait(word, seen, SLICE),
+            WaitMode::Yield => {
+                let mut looks = 0..YIELDS * 16;
+                while word.load(Ordering::Acquire) == seen && looks.next().is_some() {
+                    rustix::thread::sched_yield();
+                }
+            }
+        }
+        word.load(Ordering::Acquire) != seen
+    }
+
+    /// Answers tick `k`: writes the slot, then the done word, and wakes the world if it sleeps on this drone. False,
+    /// and nothing written, for a tick before the one that this drone, once frozen, may answer.
+    pub fn finish(&mut self, k: Tick, slot: &Slot) -> bool {
+        let done = self.last;
+        if Tick::from(done) != k + 1 || !self.may_answer(done) {
+            return false;
+        }
+        // SAFETY: the slot is this drone's alone, and the world copies it only between our store of the done word and
+        // its opening of the next tick.
+        unsafe { self.control.slot_at(self.drone).write_volatile(*slot) };
+        let words = self.control.drone(self.drone);
+        // See `sleep_on` for why both are sequentially consistent.
+        words.done.store(done, Ordering::SeqCst);
+        if self.control.waiting().load(Ordering::SeqCst) == self.drone as u32 + 1 {
+            futex::wake_all(&words.done);
+        }
+        true
+    }
+
+    /// What this drone's radio counts. To be left alone between [`DroneEnd::finish`] and the next tick.
+    pub fn stats_mut(&mut self) -> &mut LinkStats {
+        // SAFETY: in the mapping, aligned, any bits are valid; only this end, borrowed mutably, writes it, and others
+        // copy it while this drone waits or is dead.
+        unsafe { self.control.stats_at(self.drone).as_mut() }
+    }
+
+    fn may_answer(&self, seen: u32) -> bool {
+        seen > self.control.drone(self.drone).resume_from.load(Ordering::SeqCst)
+    }
+}

@@ -1,0 +1,303 @@
+//! Where a run's shared things live: one folder a run, a lock its launcher holds, a prefix of its own in shared memory.
+
+use crate::error::BusError;
+use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
+use rustix::fs::{FlockOperation, flock};
+use std::ffi::OsStr;
+use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::io::ErrorKind;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// Where POSIX shared memory has its names.
+const SHARED_MEMORY: &str = "/dev/shm";
+/// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher lives.
+const LOCK: &str = "lock";
+/// Longest path of a run's folder, bytes: iceoryx2 appends up to 140 to it and allows 255.
+const MAX_FOLDER: usize = 112;
+/// Longest label that is kept, bytes.
+const MAX_LABEL: usize = 24;
+
+/// A run's place: a folder, and a prefix in shared memory.
+#[derive(Debug)]
+pub struct Domain {
+    path: PathBuf,
+    prefix: String,
+    config: Config,
+    /// Held by the launcher alone, for its life; the system lets go of it however the launcher ends.
+    lock: Option<File>,
+}
+
+/// What a cleaning removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cleaned {
+    /// Folders of dead runs.
+    pub runs: usize,
+    /// Their files in shared memory.
+    pub files: usize,
+}
+
+/// The folder of all runs of this user, made if need be: `$XDG_RUNTIME_DIR/skein`, else `skein-<uid>` in the temporary
+/// folder. Mode 0700, owned by this user.
+///
+/// # Errors
+/// [`BusError::Folder`] if somebody else owns it or others may enter it.
+pub fn root() -> Result<PathBuf, BusError> {
+    let uid = rustix::process::geteuid().as_raw();
+    let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|dir| dir.is_absolute());
+    let own = |dir: &PathBuf| fs::metadata(dir).is_ok_and(|meta| meta.is_dir() && meta.uid() == uid);
+    let root = match runtime.filter(own) {
+        Some(dir) => dir.join("skein"),
+        None => std::env::temp_dir().join(format!("skein-{uid}")),
+    };
+    private_folder(&root)?;
+    Ok(root)
+}
+
+/// Removes what dead runs of this user left behind, and nothing else. Safe beside living runs and other cleanings.
+///
+/// # Errors
+/// [`BusError::Io`], [`BusError::Folder`].
+pub fn clean() -> Result<Cleaned, BusError> {
+    clean_in(&root()?)
+}
+
+/// [`clean`], with another root.
+///
+/// # Errors
+/// [`BusError::Io`], [`BusError::Folder`].
+pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
+    let _guard = lock_root(root)?;
+    let mut cleaned = Cleaned::default();
+    for (path, prefix) in runs(root)? {
+        // The lock is held until the folder is gone. A run without a lock file died before it had one: those who make
+        // runs hold the root's lock meanwhile, as we do now.
+        let Some(_lock) = take_lock(&path.join(LOCK))? else { continue };
+        cleaned.files += remove_run(&path, &prefix)?;
+        cleaned.runs += 1;
+    }
+    Ok(cleaned)
+}
+
+/// Folders of this user's living runs, to [`Domain::join`].
+///
+/// # Errors
+/// [`BusError::Io`], [`BusError::Folder`].
+pub fn living() -> Result<Vec<PathBuf>, BusError> {
+    living_in(&root()?)
+}
+
+/// [`living`], with another root.
+///
+/// # Errors
+/// [`BusError::Io`], [`BusError::Folder`].
+pub fn living_in(root: &Path) -> Result<Vec<PathBuf>, BusError> {
+    let _guard = lock_root(root)?;
+    let mut found = Vec::new();
+    for (path, _) in runs(root)? {
+        if take_lock(&path.join(LOCK))?.is_none() {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+impl Domain {
+    /// Makes a folder for a new run and locks it: the launcher's part. `label` is for people, in the folder's name.
+    ///
+    /// # Errors
+    /// [`BusError::Io`], [`BusError::Folder`].
+    pub fn create(label: &str) -> Result<Self, BusError> {
+        Self::create_in(&root()?, label)
+    }
+
+    /// [`Domain::create`], with another root.
+    ///
+    /// # Errors
+    /// [`BusError::Io`], [`BusError::Folder`].
+    pub fn create_in(root: &Path, label: &str) -> Result<Self, BusError> {
+        let _guard = lock_root(root)?;
+        let label: String = label.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(MAX_LABEL).collect();
+        let path = root.join(format!("{label}.{}", unique_tag()));
+        let (prefix, config) = settings(&path)?;
+        DirBuilder::new().mode(0o700).create(&path).map_err(BusError::io("create", &path))?;
+        let lock = open_lock(&path.join(LOCK))?;
+        flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(BusError::io("lock", &path))?;
+        Ok(Self { path, prefix, config, lock: Some(lock) })
+    }
+
+    /// Joins the run in this folder: everybody else's part. Leaves it alone when dropped.
+    ///
+    /// # Errors
+    /// [`BusError::Folder`] if it is not a run's folder of this user.
+    pub fn join(path: &Path) -> Result<Self, BusError> {
+        check_private(path)?;
+        let (prefix, config) = settings(path)?;
+        Ok(Self { path: path.to_owned(), prefix, config, lock: None })
+    }
+
+    /// The run's folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the run's names in shared memory begin with.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
+    pub(crate) fn config(&self) -> &Config {
+        &self.config
+    }
+}
+
+impl Drop for Domain {
+    /// The launcher removes the run: its children are dead by then. The lock goes last.
+    fn drop(&mut self) {
+        if self.lock.is_none() {
+            return;
+        }
+        // Beside a cleaning, each would trip over what the other removes.
+        let _guard = self.path.parent().map(lock_root);
+        if let Err(error) = remove_run(&self.path, &self.prefix) {
+            tracing::warn!(%error, "the run's shared files are left for the next cleaning");
+        }
+    }
+}
+
+/// `<pid>_<time>_<count>`: unique, and never the beginning of another one once a `_` follows.
+fn unique_tag() -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);
+    format!("{}_{:x}_{count}", std::process::id(), since.as_nanos() as u64)
+}
+
+/// The tag in a run folder's name; `None` for a folder that is not a run's.
+fn tag_of(path: &Path) -> Option<&str> {
+    let (_, tag) = path.file_name()?.to_str()?.rsplit_once('.')?;
+    let mut parts = tag.split('_');
+    let mut part = |radix| parts.next().is_some_and(|text| u64::from_str_radix(text, radix).is_ok());
+    (part(10) && part(16) && part(10) && parts.next().is_none()).then_some(tag)
+}
+
+/// A run's prefix in shared memory and its iceoryx2 configuration, from its folder.
+fn settings(path: &Path) -> Result<(String, Config), BusError> {
+    let folder = |why: &str| BusError::Folder { path: path.to_owned(), why: why.to_owned() };
+    let bytes = path.as_os_str().as_bytes();
+    if bytes.len() > MAX_FOLDER {
+        let why = format!("its path is longer than {MAX_FOLDER} bytes, set XDG_RUNTIME_DIR or TMPDIR to a shorter one");
+        return Err(folder(&why));
+    }
+    let tag = tag_of(path).ok_or_else(|| folder("its name is not a run's, `<label>.<pid>_<time>_<count>`"))?;
+    let prefix = format!("skein_{tag}_");
+    let mut config = Config::default();
+    let global = &mut config.global;
+    global.prefix =
+        FileName::new(prefix.as_bytes()).map_err(|_| folder("its name has characters that are not plain"))?;
+    global.set_root_path(&IoxPath::new(bytes).map_err(|_| folder("its path has characters that are not plain"))?);
+    // Scans make start-up quadratic in the number of drones; `clean_dead_nodes` does it once, before a restart.
+    global.service.cleanup_dead_nodes_on_open = false;
+    global.node.cleanup_dead_nodes_on_creation = false;
+    global.node.cleanup_dead_nodes_on_destruction = false;
+    // A thousand processes that start on two cores keep each other waiting for longer than the default of a second.
+    global.creation_timeout = Duration::from_secs(10);
+    Ok((prefix, config))
+}
+
+fn private_folder(path: &Path) -> Result<(), BusError> {
+    match DirBuilder::new().mode(0o700).create(path) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(BusError::io("create", path)(error)),
+        _ => check_private(path),
+    }
+}
+
+/// A real folder (no link), of this user, closed to others.
+fn check_private(path: &Path) -> Result<(), BusError> {
+    let meta = fs::symlink_metadata(path).map_err(BusError::io("look at", path))?;
+    let uid = rustix::process::geteuid().as_raw();
+    let why = if !meta.is_dir() {
+        "it is not a folder".to_owned()
+    } else if meta.uid() != uid {
+        format!("user {} owns it, not user {uid}", meta.uid())
+    } else if meta.mode() & 0o077 != 0 {
+        format!("its mode is {:o}, expected 700: others may enter it", meta.mode() & 0o777)
+    } else {
+        return Ok(());
+    };
+    Err(BusError::Folder { path: path.to_owned(), why })
+}
+
+fn open_lock(path: &Path) -> Result<File, BusError> {
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(false).mode(0o600).open(path).map_err(BusError::io("open", path))
+}
+
+/// Waits for, and holds, the right to make or remove runs.
+fn lock_root(root: &Path) -> Result<File, BusError> {
+    check_private(root)?;
+    let path = root.join(LOCK);
+    let lock = open_lock(&path)?;
+    flock(&lock, FlockOperation::LockExclusive).map_err(BusError::io("lock", &path))?;
+    Ok(lock)
+}
+
+/// The lock of a dead run; `None` if its launcher lives. The caller holds the root's lock.
+fn take_lock(path: &Path) -> Result<Option<File>, BusError> {
+    let lock = open_lock(path)?;
+    match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(Some(lock)),
+        Err(rustix::io::Errno::WOULDBLOCK) => Ok(None),
+        Err(error) => Err(BusError::io("lock", path)(error)),
+    }
+}
+
+/// Folders of runs and their prefixes.
+fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(root).map_err(BusError::io("list", root))? {
+        let entry = entry.map_err(BusError::io("list", root))?;
+        let path = entry.path();
+        if entry.file_type().is_ok_and(|kind| kind.is_dir())
+            && let Some(tag) = tag_of(&path)
+        {
+            let prefix = format!("skein_{tag}_");
+            found.push((path, prefix));
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Removes a run's files in shared memory, then its folder: if it is cut short, the folder still tells the prefix.
+fn remove_run(path: &Path, prefix: &str) -> Result<usize, BusError> {
+    let shared = Path::new(SHARED_MEMORY);
+    let uid = rustix::process::geteuid().as_raw();
+    let mut files = 0;
+    for entry in fs::read_dir(shared).map_err(BusError::io("list", shared))? {
+        let entry = entry.map_err(BusError::io("list", shared))?;
+        if begins_with(&entry.file_name(), prefix) && entry.metadata().is_ok_and(|meta| meta.uid() == uid) {
+            gone(fs::remove_file(entry.path())).map_err(BusError::io("remove", &entry.path()))?;
+            files += 1;
+        }
+    }
+    gone(fs::remove_dir_all(path)).map_err(BusError::io("remove", path))?;
+    Ok(files)
+}
+
+fn begins_with(name: &OsStr, prefix: &str) -> bool {
+    name.as_bytes().starts_with(prefix.as_bytes())
+}
+
+/// Somebody was faster: what we want is so.
+fn gone(result: std::io::Result<()>) -> std::io::Result<()> {
+    match result {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}

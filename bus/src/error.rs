@@ -1,0 +1,98 @@
+//! What can go wrong between processes.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why the bus failed: what, where, and what to try.
+#[derive(Debug, Error)]
+pub enum BusError {
+    /// The operating system refused something.
+    #[error("cannot {what} {}: {source}", path.display())]
+    Io {
+        /// What was tried, as a verb.
+        what: &'static str,
+        /// On what.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A folder of the domain is not what it must be.
+    #[error("{} cannot hold a run: {why}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What was expected of it.
+        why: String,
+    },
+    /// The control segment is not what it must be.
+    #[error("control segment: {0}")]
+    Control(String),
+    /// The operating system refused something that has no path.
+    #[error("cannot {what}: {source}")]
+    System {
+        /// What was tried, as a verb.
+        what: &'static str,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// A node, service or port could not be made or opened.
+    #[error("cannot {what} `{service}`: {cause}; {hint}")]
+    Service {
+        /// What was tried, as a verb and a kind of port.
+        what: &'static str,
+        /// Name of the service or node.
+        service: String,
+        /// iceoryx2's name for it.
+        cause: String,
+        /// What to try.
+        hint: &'static str,
+    },
+    /// A sample could not be loaned, sent or received.
+    #[error("cannot {what} on `{service}`: {cause}; {hint}")]
+    Transfer {
+        /// What was tried, as a verb.
+        what: &'static str,
+        /// Name of the service.
+        service: String,
+        /// iceoryx2's name for it.
+        cause: String,
+        /// What to try.
+        hint: &'static str,
+    },
+    /// A port lost, or never got, its connection to another one: samples would be lost without a word. For good.
+    #[error(
+        "a connection of `{service}` could not be made or is corrupted, samples are lost; raise the limit of open files (`ulimit -n`) or free space in /dev/shm"
+    )]
+    Degraded {
+        /// Name of the service.
+        service: String,
+    },
+    /// The receiver has not drained its buffer.
+    #[error("the buffer of `{service}` is full: its reader does not drain it")]
+    Full {
+        /// Name of the service.
+        service: String,
+    },
+    /// The peer at the other end of the control segment is gone.
+    #[error("nobody answered within {limit_s} s: {what}")]
+    NoAnswer {
+        /// What was asked.
+        what: String,
+        /// How long was waited, s.
+        limit_s: f64,
+    },
+}
+
+impl BusError {
+    /// For `map_err` on file operations.
+    pub(crate) fn io<E: Into<io::Error>>(what: &'static str, path: &Path) -> impl FnOnce(E) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { what, path, source: source.into() }
+    }
+
+    /// For `map_err` on system calls without a path.
+    pub(crate) fn system<E: Into<io::Error>>(what: &'static str) -> impl FnOnce(E) -> Self {
+        move |source| Self::System { what, source: source.into() }
+    }
+}

@@ -1,0 +1,81 @@
+//! What crosses in iceoryx2 samples. Every layout has a name with a version: a service is refused to whoever comes with
+//! another one.
+#![allow(unsafe_code)]
+
+use iceoryx2::prelude::ZeroCopySend;
+use skein_protocol::frame::Frame;
+use std::fmt;
+
+// The names below carry the version of the protocol's payloads: raise both together.
+const _: () = assert!(skein_protocol::payload::VERSION == 1);
+
+/// Eight bytes of a byte stream; which stream is told by the type.
+///
+/// # Safety
+/// Only for `repr(transparent)` wrappers of `u64`.
+pub unsafe trait Word: ZeroCopySend + fmt::Debug + Copy + 'static {}
+
+/// Eight bytes of a downlink.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct DownWord(u64);
+
+/// Eight bytes of a record.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct RecordWord(u64);
+
+// SAFETY: an integer, self-contained and of one layout.
+unsafe impl ZeroCopySend for DownWord {
+    unsafe fn type_name() -> &'static str {
+        "skein.downlink.v1"
+    }
+}
+
+// SAFETY: an integer, self-contained and of one layout.
+unsafe impl ZeroCopySend for RecordWord {
+    unsafe fn type_name() -> &'static str {
+        "skein.record.v1"
+    }
+}
+
+// SAFETY: transparent over u64.
+unsafe impl Word for DownWord {}
+// SAFETY: transparent over u64.
+unsafe impl Word for RecordWord {}
+
+/// A frame as it is published; `Frame` itself belongs to a crate that knows no iceoryx2.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug)]
+pub struct WireFrame(pub(crate) Frame);
+
+// SAFETY: `Frame` is plain `repr(C)` data without padding or pointers.
+unsafe impl ZeroCopySend for WireFrame {
+    unsafe fn type_name() -> &'static str {
+        "skein.frame.v1"
+    }
+}
+
+/// User header of a byte stream.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[type_name("skein.stream-header.v1")]
+pub struct StreamHeader {
+    /// The tick that the sample belongs to.
+    pub tick: u64,
+    /// Bytes in use; the last word may have more.
+    pub byte_len: u64,
+}
+
+/// User header of an uplink sample.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[type_name("skein.uplink-header.v1")]
+pub struct UplinkHeader {
+    /// The tick in which the frames were sent.
+    pub tick: u64,
+    /// The drone that sent them.
+    pub source: u32,
+    /// Incarnation of its process.
+    pub incarnation: u32,
+}

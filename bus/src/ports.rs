@@ -1,0 +1,321 @@
+//! Ports: what a process holds to send and receive.
+//!
+//! A subscriber is joined to a publisher when each has looked for the other: in its next `send` or `receive`, or in
+//! `connect`. Until then a publisher's samples wait in the subscriber's buffer, what does not fit is lost without an
+//! error, and if the publisher goes all is lost. So: everybody makes ports, then everybody calls `connect`, then the
+//! mission begins; and publishers stay until their last sample is received.
+#![allow(unsafe_code)]
+
+use crate::error::BusError;
+use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame, Word};
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::port::{LoanError, ReceiveError, SendError};
+use iceoryx2::prelude::{ZeroCopySend, ipc};
+use iceoryx2::sample::Sample;
+use skein_protocol::Tick;
+use skein_protocol::frame::Frame;
+use std::fmt::Debug;
+use std::mem::MaybeUninit;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// What the world sends in a tick, to all drones.
+pub type DownlinkPublisher = StreamPublisher<DownWord>;
+/// What a drone hears the world by.
+pub type DownlinkSubscriber = StreamSubscriber<DownWord>;
+/// What the recorder hears the world by.
+pub type RecordSubscriber = StreamSubscriber<RecordWord>;
+
+/// What the world does when the recorder's buffer is full. An observer's full buffer always just loses the sample.
+pub enum RecordPolicy {
+    /// Waits for the recorder as long as the function says that it lives: for lockstep.
+    Wait(Box<dyn Fn() -> bool + Send>),
+    /// Drops the sample and counts it, see [`RecordPublisher::dropped`]: for the wall clock.
+    Drop,
+}
+
+/// Who subscribes to the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RecordRole {
+    /// The run's recorder: the world may wait for it.
+    Recorder,
+    /// Anybody else: the world never waits for it.
+    Observer,
+}
+
+/// Set by the degradation handlers. Without them iceoryx2 loses samples with no error, at the latest when the limit of
+/// open files is reached; and even with them it tells only once, and not while a port is made.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Health(Arc<AtomicBool>);
+
+impl Health {
+    pub(crate) fn degrade(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn check(&self, service: &str) -> Result<(), BusError> {
+        if self.0.load(Ordering::Relaxed) {
+            return Err(BusError::Degraded { service: service.to_owned() });
+        }
+        Ok(())
+    }
+}
+
+/// A publisher, its service and its health.
+#[derive(Debug)]
+pub(crate) struct Sender<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug> {
+    pub(crate) port: Publisher<ipc::Service, [P], H>,
+    pub(crate) service: String,
+    pub(crate) health: Health,
+}
+
+impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + Default> Sender<P, H> {
+    fn connect(&self) -> Result<(), BusError> {
+        let result = self.port.update_connections();
+        self.health.check(&self.service)?;
+        result
+            .map_err(|error| self.transfer("connect", error.to_string(), "raise the limit of open files (`ulimit -n`)"))
+    }
+
+    /// Loans `len` elements, has them filled in place, and sends; the number of receivers.
+    fn send(&self, header: H, len: usize, fill: impl FnOnce(&mut [MaybeUninit<P>])) -> Result<usize, BusError> {
+        self.health.check(&self.service)?;
+        let mut sample = self.port.loan_slice_uninit(len).map_err(|error| self.refused(error))?;
+        *sample.user_header_mut() = header;
+        fill(sample.payload_mut());
+        // SAFETY: `P` is plain data without invalid values, and the memory is a mapped file: every byte has a value.
+        let sent = unsafe { sample.assume_init() }.send();
+        self.health.check(&self.service)?;
+        sent.map_err(|error| match error {
+            SendError::UnableToDeliver => BusError::Full { service: self.service.clone() },
+            other => self.transfer("send", other.to_string(), "the run cannot go on"),
+        })
+    }
+
+    fn refused(&self, error: LoanError) -> BusError {
+        self.transfer("loan a sample", error.to_string(), "free space in /dev/shm")
+    }
+
+    fn transfer(&self, what: &'static str, cause: String, hint: &'static str) -> BusError {
+        BusError::Transfer { what, service: self.service.clone(), cause, hint }
+    }
+}
+
+/// A subscriber, its service and its health.
+#[derive(Debug)]
+pub(crate) struct Receiver<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug> {
+    pub(crate) port: Subscriber<ipc::Service, [P], H>,
+    pub(crate) service: String,
+    pub(crate) health: Health,
+}
+
+impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug> Receiver<P, H> {
+    fn connect(&self) -> Result<(), BusError> {
+        let result = self.port.update_connections();
+        self.health.check(&self.service)?;
+        result.map_err(|error| self.transfer(error.into()))
+    }
+
+    fn receive(&self) -> Result<Option<Sample<ipc::Service, [P], H>>, BusError> {
+        let received = self.port.receive();
+        self.health.check(&self.service)?;
+        received.map_err(|error| self.transfer(error))
+    }
+
+    fn transfer(&self, error: ReceiveError) -> BusError {
+        let hint = match error {
+            ReceiveError::ExceedsMaxBorrows => "drop the samples held before",
+            ReceiveError::ConnectionFailure(_) => "raise the limit of open files (`ulimit -n`)",
+        };
+        BusError::Transfer { what: "receive", service: self.service.clone(), cause: error.to_string(), hint }
+    }
+}
+
+/// Sends byte streams, in place.
+#[derive(Debug)]
+pub struct StreamPublisher<W: Word>(pub(crate) Sender<W, StreamHeader>);
+
+impl<W: Word> StreamPublisher<W> {
+    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn connect(&self) -> Result<(), BusError> {
+        self.0.connect()
+    }
+
+    /// Loans `byte_len` bytes (8-aligned), has `fill` write them in place, and sends them under `tick`. What `fill`
+    /// leaves alone holds old bytes. Returns the number of receivers.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn send(&self, tick: Tick, byte_len: usize, fill: impl FnOnce(&mut [u8])) -> Result<usize, BusError> {
+        let header = StreamHeader { tick, byte_len: byte_len as u64 };
+        self.0.send(header, byte_len.div_ceil(size_of::<u64>()), |words| {
+            // SAFETY: a `Word` is eight plain bytes, all of which have a value in the mapped file they lie in.
+            let bytes = unsafe { std::slice::from_raw_parts_mut(words.as_mut_ptr().cast::<u8>(), size_of_val(words)) };
+            bytes[byte_len..].fill(0);
+            fill(&mut bytes[..byte_len]);
+        })
+    }
+}
+
+/// Receives byte streams.
+#[derive(Debug)]
+pub struct StreamSubscriber<W: Word>(pub(crate) Receiver<W, StreamHeader>);
+
+impl<W: Word> StreamSubscriber<W> {
+    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn connect(&self) -> Result<(), BusError> {
+        self.0.connect()
+    }
+
+    /// The oldest sample not yet received. At most two are held at a time; drop what is read.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn receive(&self) -> Result<Option<StreamSample<W>>, BusError> {
+        Ok(self.0.receive()?.map(StreamSample))
+    }
+
+    /// The sample of this tick; older ones are dropped, and so is a newer one, for which `None` is said as if there
+    /// were none.
+    ///
+    /// # Errors
+    /// As [`StreamSubscriber::receive`].
+    pub fn receive_tick(&self, tick: Tick) -> Result<Option<StreamSample<W>>, BusError> {
+        while let Some(sample) = self.receive()? {
+            if sample.tick() >= tick {
+                return Ok(Some(sample).filter(|sample| sample.tick() == tick));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// A received byte stream, read in place; given back when dropped.
+pub struct StreamSample<W: Word>(Sample<ipc::Service, [W], StreamHeader>);
+
+impl<W: Word> StreamSample<W> {
+    /// The tick it belongs to.
+    #[must_use]
+    pub fn tick(&self) -> Tick {
+        self.0.user_header().tick
+    }
+
+    /// Its bytes, 8-aligned.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        let words = self.0.payload();
+        // Another process wrote the length: never beyond the payload.
+        let len = usize::try_from(self.0.user_header().byte_len)
+            .map_or(size_of_val(words), |len| len.min(size_of_val(words)));
+        // SAFETY: a `Word` is eight plain bytes, and the sample is ours until dropped.
+        unsafe { std::slice::from_raw_parts(words.as_ptr().cast::<u8>(), len) }
+    }
+}
+
+/// Sends a drone's frames.
+#[derive(Debug)]
+pub struct UplinkPublisher(pub(crate) Sender<WireFrame, UplinkHeader>);
+
+impl UplinkPublisher {
+    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn connect(&self) -> Result<(), BusError> {
+        self.0.connect()
+    }
+
+    /// Loans `count` frames, has `fill` write them all in place, and sends them. At most once a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Full`] if the world has not drained the eight samples before, [`BusError::Degraded`] for good once a
+    /// connection failed, [`BusError::Transfer`].
+    pub fn send(&self, header: UplinkHeader, count: usize, fill: impl FnOnce(&mut [Frame])) -> Result<(), BusError> {
+        self.0.send(header, count, |frames| {
+            // SAFETY: `WireFrame` is transparent over `Frame`, which is plain data; every byte has a value in the file.
+            fill(unsafe { std::slice::from_raw_parts_mut(frames.as_mut_ptr().cast::<Frame>(), frames.len()) });
+        })?;
+        Ok(())
+    }
+}
+
+/// Receives the frames of a shard's drones: the world's.
+#[derive(Debug)]
+pub struct UplinkSubscriber(pub(crate) Receiver<WireFrame, UplinkHeader>);
+
+impl UplinkSubscriber {
+    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn connect(&self) -> Result<(), BusError> {
+        self.0.connect()
+    }
+
+    /// The next sample of any drone of the shard, each drone's in order. To be called as often as samples are expected:
+    /// each call looks through the shard's drones from the first.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn receive(&self) -> Result<Option<UplinkSample>, BusError> {
+        Ok(self.0.receive()?.map(UplinkSample))
+    }
+}
+
+/// Frames of one drone and tick, read in place; given back when dropped.
+pub struct UplinkSample(Sample<ipc::Service, [WireFrame], UplinkHeader>);
+
+impl UplinkSample {
+    /// Who sent them, and when.
+    #[must_use]
+    pub fn header(&self) -> UplinkHeader {
+        *self.0.user_header()
+    }
+
+    /// The frames.
+    #[must_use]
+    pub fn frames(&self) -> &[Frame] {
+        let frames = self.0.payload();
+        // SAFETY: `WireFrame` is transparent over `Frame`.
+        unsafe { std::slice::from_raw_parts(frames.as_ptr().cast::<Frame>(), frames.len()) }
+    }
+}
+
+/// Sends the record.
+#[derive(Debug)]
+pub struct RecordPublisher {
+    pub(crate) stream: StreamPublisher<RecordWord>,
+    pub(crate) dropped: Arc<AtomicU64>,
+}
+
+impl RecordPublisher {
+    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    ///
+    /// # Errors
+    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    pub fn connect(&self) -> Result<(), BusError> {
+        self.stream.connect()
+    }
+
+    /// As [`StreamPublisher::send`]; waits for the recorder or not, by the policy.
+    ///
+    /// # Errors
+    /// As [`StreamPublisher::send`].
+    pub fn send(&self, tick: Tick, byte_len: usize, fill: impl FnOnce(&mut [u8])) -> Result<usize, BusError> {
+        self.stream.send(tick, byte_len, fill)
+    }
+
+    /// Samples that the recorder has missed because its buffer was full.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,377 @@
+//! The run's services: made by the launcher with every limit set, opened by everybody else.
+
+use crate::domain::Domain;
+use crate::error::BusError;
+use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame};
+use crate::ports::{
+    DownlinkPublisher, DownlinkSubscriber, Health, Receiver, RecordPolicy, RecordPublisher, RecordRole,
+    RecordSubscriber, Sender, StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber,
+};
+use iceoryx2::port::{BackpressureAction, BackpressureInfo, DegradationAction};
+use iceoryx2::prelude::{
+    AllocationStrategy, BackpressureStrategy, CallbackProgression, LogLevel, Node, NodeBuilder, NodeName, NodeState,
+    PortFactory as _, PortName, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
+};
+use iceoryx2::service::builder::publish_subscribe::Builder;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use skein_protocol::downlink::{DownHead, SenseHead};
+use skein_protocol::record::{DroneRow, RecordHead};
+use std::fmt::{Debug, Display};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Drones on one uplink service: draining is quadratic in the number of its publishers.
+pub const SHARD_DRONES: usize = 32;
+
+/// Free places a service, for restarted drones whose dead node is not yet cleaned, and for observers.
+const SPARE: usize = 4;
+/// Samples that wait in a subscriber's buffer.
+const BUFFER: usize = 8;
+/// The recorder's buffer: a second at 50 Hz and more.
+const RECORD_BUFFER: usize = 64;
+/// Samples that a subscriber holds at a time.
+const BORROWED: usize = 2;
+/// Chunks of the downlink's data segment beside those in the buffers, which all hold the same newest samples. If more
+/// were needed iceoryx2 0.10 would make a segment larger than its own counters cover, and panic: so many subscribers may
+/// have died or been frozen while each held an older sample. Its own worst case is gigabytes at 1000 drones. Services
+/// that do not overflow get that worst case, since their buffers hold different samples.
+const HELD_CHUNKS: usize = 120;
+/// Frames that an uplink sample has room for before its segment grows.
+const UPLINK_FRAMES: usize = 16;
+/// Room for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
+const DOWNLINK_ROOM: usize = 448;
+/// The recorder's port name.
+const RECORDER: &str = "recorder";
+
+const DOWNLINK: &str = "skein/downlink";
+const RECORD: &str = "skein/record";
+
+type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
+
+/// Limits of one service.
+#[derive(Clone, Copy)]
+struct Limits {
+    publishers: usize,
+    subscribers: usize,
+    nodes: usize,
+    buffer: usize,
+    overflow: bool,
+}
+
+/// The services of a run, as one process sees them. Its ports stay on the thread that made them. In the launcher, to be
+/// dropped, ports included, before the [`Domain`], which removes their files.
+#[derive(Debug)]
+pub struct Services {
+    node: Node<ipc::Service>,
+    drones: usize,
+    /// A service lives as long as somebody has it open: the launcher, all its life.
+    _kept: Option<Kept>,
+}
+
+#[derive(Debug)]
+struct Kept {
+    _downlink: Factory<DownWord, StreamHeader>,
+    _uplinks: Vec<Factory<WireFrame, UplinkHeader>>,
+    _record: Factory<RecordWord, StreamHeader>,
+}
+
+/// Number of uplink shards; drone i is on shard i / [`SHARD_DRONES`].
+#[must_use]
+pub fn shards(drones: usize) -> usize {
+    drones.div_ceil(SHARD_DRONES)
+}
+
+impl Services {
+    /// Makes all services of a run: the launcher's part. `name` is the node's, for people.
+    ///
+    /// # Errors
+    /// [`BusError::Service`].
+    pub fn create(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
+        let node = node(domain, name)?;
+        let kept = Kept {
+            _downlink: create(&node, DOWNLINK, downlink_limits(drones))?,
+            _uplinks: (0..shards(drones))
+                .map(|shard| create(&node, &uplink_name(shard), uplink_limits()))
+                .collect::<Result<_, _>>()?,
+            _record: create(&node, RECORD, record_limits())?,
+        };
+        Ok(Self { node, drones, _kept: Some(kept) })
+    }
+
+    /// Joins the run's services: everybody else's part. Each is opened with its first port.
+    ///
+    /// # Errors
+    /// [`BusError::Service`].
+    pub fn open(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
+        Ok(Self { node: node(domain, name)?, drones, _kept: None })
+    }
+
+    /// The world's: senses and air.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn downlink_publisher(&self) -> Result<DownlinkPublisher, BusError> {
+        let drone = size_of::<SenseHead>() + DOWNLINK_ROOM;
+        let room = (size_of::<DownHead>() + self.drones * drone) / size_of::<u64>();
+        Ok(StreamPublisher(self.sender(DOWNLINK, room, |_| BackpressureAction::DiscardData)?))
+    }
+
+    /// A drone's, or an observer's. A subscriber hears what is sent after it was made, and never holds up the world: if
+    /// its buffer of eight is full it loses the oldest.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn downlink_subscriber(&self) -> Result<DownlinkSubscriber, BusError> {
+        Ok(StreamSubscriber(self.receiver(DOWNLINK, "")?))
+    }
+
+    /// A drone's.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], also for a drone that is not in the swarm; [`BusError::Degraded`].
+    pub fn uplink_publisher(&self, drone: usize) -> Result<UplinkPublisher, BusError> {
+        let name = uplink_name(drone / SHARD_DRONES);
+        Ok(UplinkPublisher(self.sender(&name, UPLINK_FRAMES, |_| BackpressureAction::DiscardDataAndFail)?))
+    }
+
+    /// The world's, one a shard, see [`shards`]. Nobody else's: a reader that does not drain makes the drones' sends
+    /// fail. Observers find all frames on the downlink.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn uplink_subscriber(&self, shard: usize) -> Result<UplinkSubscriber, BusError> {
+        Ok(UplinkSubscriber(self.receiver(&uplink_name(shard), "")?))
+    }
+
+    /// The world's.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn record_publisher(&self, policy: RecordPolicy) -> Result<RecordPublisher, BusError> {
+        let dropped = Arc::new(AtomicU64::new(0));
+        let room = (size_of::<RecordHead>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>();
+        let handler = self.record_handler(policy, Arc::clone(&dropped))?;
+        Ok(RecordPublisher { stream: StreamPublisher(self.sender(RECORD, room, handler)?), dropped })
+    }
+
+    /// The recorder's, or an observer's; a buffer of 64.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn record_subscriber(&self, role: RecordRole) -> Result<RecordSubscriber, BusError> {
+        let name = if role == RecordRole::Recorder { RECORDER } else { "" };
+        Ok(StreamSubscriber(self.receiver(RECORD, name)?))
+    }
+
+    /// What happens when a subscriber's buffer is full: by the policy for the recorder, and observers just lose.
+    fn record_handler(
+        &self,
+        policy: RecordPolicy,
+        dropped: Arc<AtomicU64>,
+    ) -> Result<impl Fn(&BackpressureInfo) -> BackpressureAction + Send + use<>, BusError> {
+        let service: Factory<RecordWord, StreamHeader> = open(&self.node, RECORD)?;
+        Ok(move |info: &BackpressureInfo| {
+            if !is_recorder(&service, info.receiver_port_id) {
+                return BackpressureAction::DiscardData;
+            }
+            match &policy {
+                RecordPolicy::Wait(alive) if alive() => BackpressureAction::Retry,
+                _ => {
+                    dropped.fetch_add(1, Ordering::Relaxed);
+                    BackpressureAction::DiscardData
+                }
+            }
+        })
+    }
+
+    /// Opens a service and makes a publisher whose first segment has `room` elements a sample. `on_full` says what
+    /// happens when a subscriber's buffer is full, unless the service overflows.
+    fn sender<P, H, F>(&self, name: &str, room: usize, on_full: F) -> Result<Sender<P, H>, BusError>
+    where
+        P: ZeroCopySend + Debug + 'static,
+        H: ZeroCopySend + Debug,
+        F: Fn(&BackpressureInfo) -> BackpressureAction + Send + 'static,
+    {
+        let service: Factory<P, H> = open(&self.node, name)?;
+        let health = Health::default();
+        let degraded = health.clone();
+        let overflows = service.static_config().has_safe_overflow();
+        let builder = service
+            .publisher_builder()
+            .initial_max_slice_len(room)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .max_loaned_samples(1)
+            .override_sample_preallocation(move |worst| if overflows { worst.min(BUFFER + HELD_CHUNKS) } else { worst })
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_backpressure_handler(on_full)
+            .set_degradation_handler(move |_, _| {
+                degraded.degrade();
+                DegradationAction::DegradeAndFail
+            });
+        let port = builder.create().map_err(failed("make a publisher of", name))?;
+        health.check(name)?;
+        Ok(Sender { port, service: name.to_owned(), health })
+    }
+
+    /// Opens a service and makes a subscriber.
+    fn receiver<P, H>(&self, name: &str, port_name: &str) -> Result<Receiver<P, H>, BusError>
+    where
+        P: ZeroCopySend + Debug + 'static,
+        H: ZeroCopySend + Debug,
+    {
+        let service: Factory<P, H> = open(&self.node, name)?;
+        let health = Health::default();
+        let degraded = health.clone();
+        let port_name = PortName::new(port_name).map_err(failed("name a subscriber of", name))?;
+        let builder = service.subscriber_builder().name(&port_name).set_degradation_handler(move |_, _| {
+            degraded.degrade();
+            DegradationAction::DegradeAndFail
+        });
+        let port = builder.create().map_err(failed("make a subscriber of", name))?;
+        health.check(name)?;
+        Ok(Receiver { port, service: name.to_owned(), health })
+    }
+}
+
+fn node(domain: &Domain, name: &str) -> Result<Node<ipc::Service>, BusError> {
+    set_log_level_from_env_or(LogLevel::Warn);
+    let node_name = NodeName::new(name).map_err(failed("name the node", name))?;
+    NodeBuilder::new()
+        .name(&node_name)
+        .config(domain.config())
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create()
+        .map_err(failed("make the node", name))
+}
+
+fn uplink_name(shard: usize) -> String {
+    format!("skein/uplink/{shard}")
+}
+
+fn downlink_limits(drones: usize) -> Limits {
+    let subscribers = drones + SPARE;
+    Limits { publishers: 1 + 1, subscribers, nodes: subscribers + 2, buffer: BUFFER, overflow: true }
+}
+
+/// A second subscriber is for a second world; observers have no business here.
+fn uplink_limits() -> Limits {
+    let publishers = SHARD_DRONES + SPARE;
+    Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer: BUFFER, overflow: false }
+}
+
+fn record_limits() -> Limits {
+    let subscribers = 1 + SPARE;
+    Limits { publishers: 1 + 1, subscribers, nodes: subscribers + 3, buffer: RECORD_BUFFER, overflow: false }
+}
+
+fn builder<P, H>(node: &Node<ipc::Service>, name: &str) -> Result<Builder<[P], H, ipc::Service>, BusError>
+where
+    P: ZeroCopySend + Debug + 'static,
+    H: ZeroCopySend + Debug,
+{
+    let service = ServiceName::new(name).map_err(failed("name the service", name))?;
+    Ok(node.service_builder(&service).publish_subscribe::<[P]>().user_header::<H>())
+}
+
+fn create<P, H>(node: &Node<ipc::Service>, name: &str, limits: Limits) -> Result<Factory<P, H>, BusError>
+where
+    P: ZeroCopySend + Debug + 'static,
+    H: ZeroCopySend + Debug,
+{
+    builder(node, name)?
+        .max_publishers(limits.publishers)
+        .max_subscribers(limits.subscribers)
+        .max_nodes(limits.nodes)
+        .subscriber_max_buffer_size(limits.buffer)
+        .subscriber_max_borrowed_samples(BORROWED)
+        .history_size(0)
+        .enable_safe_overflow(limits.overflow)
+        .create()
+        .map_err(failed("create the service", name))
+}
+
+fn open<P, H>(node: &Node<ipc::Service>, name: &str) -> Result<Factory<P, H>, BusError>
+where
+    P: ZeroCopySend + Debug + 'static,
+    H: ZeroCopySend + Debug,
+{
+    builder(node, name)?.open().map_err(failed("open the service", name))
+}
+
+fn is_recorder(service: &Factory<RecordWord, StreamHeader>, port: u128) -> bool {
+    let mut found = false;
+    service.dynamic_config().list_subscribers(|details| {
+        found |= details.subscriber_id.value() == port && details.subscriber_name.as_str() == RECORDER;
+        CallbackProgression::Continue
+    });
+    found
+}
+
+/// For `map_err` on what iceoryx2 refuses.
+fn failed<E: Display>(what: &'static str, service: &str) -> impl FnOnce(E) -> BusError {
+    let service = service.to_owned();
+    move |error| {
+        let cause = error.to_string();
+        let hint = hint(&cause);
+        BusError::Service { what, service, cause, hint }
+    }
+}
+
+fn hint(cause: &str) -> &'static str {
+    let hints = [
+        ("IncompatibleTypes", "its payload has another type or version: use one build for launcher and children"),
+        ("DoesNotExist", "the run has no such service: is its launcher still alive, is the drone of this swarm?"),
+        ("Exceeds", "all its places are taken: clean dead nodes before a restart, close observers"),
+        ("AlreadyExists", "it belongs to a running swarm: use a domain of its own"),
+    ];
+    let known = hints.iter().find(|(part, _)| cause.contains(part));
+    known.map_or("see the limit of open files (`ulimit -n`) and the free space in /dev/shm", |(_, hint)| hint)
+}
+
+/// What became of the nodes of dead processes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DeadNodes {
+    /// Cleaned: their places are free again.
+    pub removed: usize,
+    /// Could not be cleaned; perhaps another process was at it.
+    pub failed: usize,
+}
+
+/// Gives back what processes killed in this run had: to be called before a drone is restarted, outside of a tick (2 to
+/// 130 ms).
+///
+/// # Errors
+/// [`BusError::Service`].
+pub fn clean_dead_nodes(domain: &Domain) -> Result<DeadNodes, BusError> {
+    let mut dead = DeadNodes::default();
+    Node::<ipc::Service>::list(domain.config(), |state| {
+        if let NodeState::Dead(view) = state {
+            let removed = view.try_remove_stale_resources().is_ok();
+            dead.removed += usize::from(removed);
+            dead.failed += usize::from(!removed);
+        }
+        CallbackProgression::Continue
+    })
+    .map_err(failed("list the nodes of", domain.prefix()))?;
+    Ok(dead)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    #[test]
+    fn another_payload_or_header_is_refused() {
+        let mode = std::fs::Permissions::from_mode(0o700);
+        let root = tempfile::Builder::new().permissions(mode).tempdir().unwrap();
+        let domain = Domain::create_in(root.path(), "types").unwrap();
+        let services = Services::create(&domain, 1, "launcher").unwrap();
+        let payload = open::<RecordWord, StreamHeader>(&services.node, DOWNLINK).unwrap_err();
+        let header = open::<DownWord, UplinkHeader>(&services.node, DOWNLINK).unwrap_err();
+        for error in [payload.to_string(), header.to_string()] {
+            assert!(error.contains("IncompatibleTypes") && error.contains("one build"), "{error}");
+        }
+        assert!(open::<DownWord, StreamHeader>(&services.node, DOWNLINK).is_ok());
+    }
+}

@@ -1,0 +1,203 @@
+//! The barrier, with threads in the place of processes: each maps the segment for itself.
+#![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
+
+use skein_bus::{Answer, BusError, Control, ControlSpec, DroneEnd, Patience, TickSignal, WaitMode};
+use skein_protocol::slot::Slot;
+use std::io::Write;
+use std::os::fd::AsRawFd;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+const LONG: Patience = Patience::For(Duration::from_secs(5));
+
+fn segment(drones: usize, cores: usize, wait: WaitMode) -> Control {
+    Control::create(ControlSpec { drones, cores, wait }).unwrap()
+}
+
+fn end_of(launcher: &Control, drone: usize) -> DroneEnd {
+    let control = Control::attach(launcher.fd().unwrap()).unwrap();
+    DroneEnd::new(Arc::new(control), drone).unwrap()
+}
+
+fn slot(drone: usize, tick: u64) -> Slot {
+    Slot { heard_hash: tick * 1000 + drone as u64, step_ns: tick as u32, ..Slot::default() }
+}
+
+/// Answers every tick until the mission is over; the ticks it saw.
+fn drone(launcher: &Control, drone: usize) -> JoinHandle<Vec<u64>> {
+    let mut end = end_of(launcher, drone);
+    thread::spawn(move || {
+        let mut seen = Vec::new();
+        end.announce(1);
+        while let TickSignal::Tick(k) = end.wait_tick(|| true) {
+            end.stats_mut().heard += 1;
+            assert!(end.finish(k, &slot(drone, k)));
+            seen.push(k);
+        }
+        seen
+    })
+}
+
+fn lockstep(drones: usize, cores: usize, ticks: u64, wait: WaitMode) {
+    let launcher = segment(drones, cores, wait);
+    let world = Control::attach(launcher.fd().unwrap()).unwrap();
+    let flock: Vec<_> = (0..drones).map(|i| drone(&launcher, i)).collect();
+    let mut answers = vec![Answer::Pending; drones];
+    for k in 0..ticks {
+        world.open_tick(k).unwrap();
+        world.wait_done(k, LONG, &mut answers).unwrap();
+        assert!(answers.iter().all(|&answer| answer == Answer::Done), "tick {k}: {answers:?}");
+        assert!((0..drones).all(|i| world.slot(i) == slot(i, k)), "tick {k}");
+    }
+    world.close();
+    for (i, drone) in flock.into_iter().enumerate() {
+        assert!(drone.join().unwrap().into_iter().eq(0..ticks), "drone {i} saw each tick once");
+        assert_eq!(launcher.stats(i).heard, ticks);
+    }
+}
+
+#[test]
+fn lockstep_loses_no_wake_up() {
+    lockstep(1, 1, 5000, WaitMode::Block);
+    lockstep(2, 2, 5000, WaitMode::Block);
+    lockstep(7, 2, 3000, WaitMode::Block);
+    lockstep(16, 3, 2000, WaitMode::Block);
+}
+
+#[test]
+fn lockstep_by_yielding() {
+    lockstep(4, 2, 1000, WaitMode::Yield);
+}
+
+#[test]
+fn a_death_wakes_the_world() {
+    let world = Arc::new(segment(2, 1, WaitMode::Block));
+    let flier = drone(&world, 1);
+    world.open_tick(0).unwrap();
+    let supervisor = Control::attach(world.fd().unwrap()).unwrap();
+    let watcher = thread::spawn(move || {
+        thread::sleep(Duration::from_millis(30));
+        supervisor.mark_dead(0);
+    });
+    let mut answers = [Answer::Pending; 2];
+    let start = Instant::now();
+    world.wait_done(0, LONG, &mut answers).unwrap();
+    assert!(start.elapsed() < Duration::from_secs(2), "the mark did not wake the world");
+    assert_eq!(answers, [Answer::Dead, Answer::Done]);
+    watcher.join().unwrap();
+
+    // A new process answers from tick 5 on, and the tick before goes on without it.
+    world.revive(0, 5);
+    assert_eq!(world.ready(0), None);
+    let again = drone(&world, 0);
+    for k in 3..7 {
+        world.open_tick(k).unwrap();
+        answers[0] = if k < 5 { Answer::Absent } else { Answer::Pending };
+        world.wait_done(k, LONG, &mut answers).unwrap();
+        assert_eq!(answers, [if k < 5 { Answer::Absent } else { Answer::Done }, Answer::Done]);
+    }
+    world.close();
+    assert_eq!(again.join().unwrap(), [5, 6]);
+    assert_eq!(flier.join().unwrap(), [0, 3, 4, 5, 6]);
+}
+
+#[test]
+fn who_answered_before_it_died_has_answered() {
+    let world = segment(1, 1, WaitMode::Block);
+    let mut end = end_of(&world, 0);
+    world.open_tick(0).unwrap();
+    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(0));
+    assert!(end.finish(0, &slot(0, 0)));
+    world.mark_dead(0);
+    let mut answers = [Answer::Pending];
+    world.wait_done(0, LONG, &mut answers).unwrap();
+    assert_eq!(answers, [Answer::Done]);
+    world.open_tick(1).unwrap();
+    world.wait_done(1, LONG, &mut answers).unwrap();
+    assert_eq!(answers, [Answer::Dead]);
+}
+
+#[test]
+fn the_late_and_the_hung() {
+    let world = segment(2, 1, WaitMode::Block);
+    let prompt = drone(&world, 1);
+    let mut slow = end_of(&world, 0);
+    world.open_tick(0).unwrap();
+    assert_eq!(slow.wait_tick(|| true), TickSignal::Tick(0));
+    let mut answers = [Answer::Pending; 2];
+    let start = Instant::now();
+    world.wait_done(0, Patience::Until(start + Duration::from_millis(300)), &mut answers).unwrap();
+    assert_eq!(answers, [Answer::Late, Answer::Done]);
+    assert!(start.elapsed() >= Duration::from_millis(300));
+
+    // It answers tick 0 while tick 2 is open: that is no answer to tick 2, and the next it sees is the newest.
+    world.open_tick(1).unwrap();
+    world.open_tick(2).unwrap();
+    assert!(slow.finish(0, &slot(0, 0)));
+    world.wait_done(2, Patience::For(Duration::from_millis(300)), &mut answers).unwrap();
+    assert_eq!(answers, [Answer::Hung, Answer::Done]);
+    assert_eq!(slow.wait_tick(|| true), TickSignal::Tick(2));
+    assert!(slow.finish(2, &slot(0, 2)));
+    world.wait_done(2, LONG, &mut answers).unwrap();
+    assert_eq!((answers, world.slot(0)), ([Answer::Done; 2], slot(0, 2)));
+    world.close();
+    assert_eq!(slow.wait_tick(|| true), TickSignal::Stop);
+    assert_eq!(prompt.join().unwrap().last(), Some(&2));
+}
+
+#[test]
+fn a_frozen_drone_neither_reads_nor_answers_an_old_tick() {
+    let world = segment(1, 1, WaitMode::Block);
+    let mut end = end_of(&world, 0);
+    world.open_tick(4).unwrap();
+    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(4));
+    world.freeze(0);
+    assert!(!end.finish(4, &slot(0, 4)), "frozen in the middle of its step");
+    assert_eq!(world.slot(0), Slot::default());
+    world.open_tick(5).unwrap();
+    assert_eq!(end.wait_tick(|| false), TickSignal::Orphaned, "tick 5 is not for it");
+    world.set_resume_from(0, 6);
+    assert_eq!(end.wait_tick(|| false), TickSignal::Orphaned, "still not");
+    world.open_tick(6).unwrap();
+    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(6));
+    assert!(end.finish(6, &slot(0, 6)));
+    assert!(!end.finish(5, &slot(0, 5)), "only the tick it was given");
+}
+
+#[test]
+fn nobody_waits_for_ever_for_a_vanished_peer() {
+    let launcher = segment(1, 1, WaitMode::Block);
+    let mut asked = 0;
+    let signal = end_of(&launcher, 0).wait_tick(|| {
+        asked += 1;
+        asked < 3
+    });
+    assert_eq!((signal, asked), (TickSignal::Orphaned, 3));
+    assert!(!launcher.wait_go(|| false));
+    launcher.give_go();
+    assert!(launcher.wait_go(|| false));
+    assert_eq!(launcher.stop_requested(), None);
+    launcher.request_stop(15);
+    assert_eq!(launcher.stop_requested(), Some(15));
+}
+
+#[test]
+fn what_is_no_control_segment_is_refused() {
+    let mut other = tempfile::tempfile().unwrap();
+    let error = Control::attach(other.as_raw_fd()).unwrap_err();
+    assert!(matches!(&error, BusError::Control(why) if why.contains("holds 0 bytes")), "{error}");
+    other.write_all(&[7; 1 << 16]).unwrap();
+    let error = Control::attach(other.as_raw_fd()).unwrap_err();
+    assert!(matches!(&error, BusError::Control(why) if why.contains("not a control segment")), "{error}");
+    assert!(matches!(Control::attach(-1), Err(BusError::Io { .. })));
+    for (drones, cores) in [(0, 1), (1, 0), (1 << 17, 1)] {
+        assert!(Control::create(ControlSpec { drones, cores, wait: WaitMode::Block }).is_err());
+    }
+    let good = segment(3, 1, WaitMode::Yield);
+    let attached = Control::attach(good.fd().unwrap()).unwrap();
+    assert_eq!(attached.spec(), good.spec());
+    assert!(DroneEnd::new(Arc::new(attached), 3).is_err());
+    assert!(good.open_tick(u64::from(u32::MAX)).is_err());
+    assert!(good.wait_done(0, LONG, &mut [Answer::Pending]).is_err());
+}

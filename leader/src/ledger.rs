@@ -1,0 +1,167 @@
+//! What a drone knows of plans: the newest it has heard of, the one it obeys, and everybody's parts in it. The same
+//! ledger serves the one who obeys and the one who plans; a new leader continues from its own.
+
+use crate::obstacles::{Obstacles, set_ids};
+use crate::routes::{RouteParams, Routes};
+use skein_protocol::digest::Digest;
+use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, set_tag};
+use skein_protocol::{DroneId, ObstacleId, PlanStamp};
+use std::collections::BTreeMap;
+
+/// A plan and everybody's part in it, as its leader made it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Orders {
+    /// The plan.
+    pub plan: Plan,
+    /// One part a member, by id.
+    pub parts: BTreeMap<DroneId, Assignment>,
+}
+
+/// An obstacle set that is being passed: its routes, and who flies which.
+#[derive(Clone, Debug)]
+pub struct PlannedSet {
+    /// Its obstacles, ascending.
+    pub ids: Vec<ObstacleId>,
+    /// Their short name.
+    pub tag: u32,
+    /// Under which plan the parts were given.
+    pub stamp: PlanStamp,
+    /// The ways past it.
+    pub routes: Routes,
+    /// Everybody's part, as far as it was heard.
+    pub parts: BTreeMap<DroneId, Assignment>,
+}
+
+/// The ledger of one drone. Bounded by the size of the swarm and of an obstacle set.
+#[derive(Clone, Debug)]
+pub struct Ledger {
+    me: DroneId,
+    drones: u32,
+    params: RouteParams,
+    stamp: PlanStamp,
+    plan: Option<Plan>,
+    parts: BTreeMap<DroneId, Assignment>,
+    obeyed: Option<Orders>,
+    sets: Vec<PlannedSet>,
+}
+
+impl Ledger {
+    /// An empty ledger of drone `me` in a swarm of `drones`.
+    #[must_use]
+    pub fn new(me: DroneId, drones: u32, params: RouteParams) -> Self {
+        Self {
+            me,
+            drones,
+            params,
+            stamp: PlanStamp::default(),
+            plan: None,
+            parts: BTreeMap::new(),
+            obeyed: None,
+            sets: Vec::new(),
+        }
+    }
+
+    /// The plan this drone obeys, with the parts it has heard of.
+    #[must_use]
+    pub fn obeyed(&self) -> Option<&Orders> {
+        self.obeyed.as_ref()
+    }
+
+    /// The stamp it obeys; the default, lower than any, before the first.
+    #[must_use]
+    pub fn stamp(&self) -> PlanStamp {
+        self.obeyed.as_ref().map_or(PlanStamp::default(), |orders| orders.plan.id)
+    }
+
+    /// The newest stamp heard of, whether it can be obeyed yet or not.
+    #[must_use]
+    pub fn newest(&self) -> PlanStamp {
+        self.stamp
+    }
+
+    /// This drone's part in the plan it obeys.
+    #[must_use]
+    pub fn part(&self) -> Option<&Assignment> {
+        self.obeyed.as_ref()?.parts.get(&self.me)
+    }
+
+    /// The sets that are being passed, in flight order.
+    #[must_use]
+    pub fn sets(&self) -> &[PlannedSet] {
+        &self.sets
+    }
+
+    /// Hash of this drone's part under what it obeys: equal stamps must mean equal hashes. 0 before the first.
+    #[must_use]
+    pub fn part_hash(&self) -> u64 {
+        let (Some(orders), Some(part)) = (&self.obeyed, self.part()) else { return 0 };
+        let mut digest = Digest::default();
+        digest.bytes(bytemuck::bytes_of(part)).word(u64::from(orders.plan.phase));
+        digest.bytes(bytemuck::cast_slice(set_ids(&orders.plan.set, orders.plan.set_count)));
+        digest.value().max(1)
+    }
+
+    /// Hears a plan. Older ones are ignored.
+    pub fn hear_plan(&mut self, plan: &Plan, obstacles: &Obstacles) {
+        if self.open(plan.id) {
+            self.plan.get_or_insert(*plan);
+            self.settle(obstacles);
+        }
+    }
+
+    /// Hears somebody's part. Those of older plans, and of nobody in the swarm, are ignored.
+    pub fn hear_assignment(&mut self, part: &Assignment, obstacles: &Obstacles) {
+        if part.drone.0 >= self.drones || !self.open(part.id) {
+            return;
+        }
+        self.parts.entry(part.drone).or_insert(*part);
+        if let Some(orders) = self.obeyed.as_mut().filter(|orders| orders.plan.id == part.id) {
+            orders.parts.entry(part.drone).or_insert(*part);
+            for set in self.sets.iter_mut().filter(|set| set.stamp == part.id) {
+                set.parts.entry(part.drone).or_insert(*part);
+            }
+        } else {
+            self.settle(obstacles);
+        }
+    }
+
+    /// Takes up orders of one's own making.
+    pub fn adopt(&mut self, orders: Orders, obstacles: &Obstacles) {
+        if self.open(orders.plan.id) {
+            self.plan = Some(orders.plan);
+            self.parts = orders.parts;
+            self.settle(obstacles);
+        }
+    }
+
+    /// Starts over for a newer stamp; false if this one is older than what is known.
+    fn open(&mut self, stamp: PlanStamp) -> bool {
+        if stamp > self.stamp {
+            self.stamp = stamp;
+            self.plan = None;
+            self.parts.clear();
+        }
+        stamp == self.stamp
+    }
+
+    /// Obeys the newest plan once the plan, one's own part in it and all its obstacles are known. Call again when an
+    /// obstacle was learnt.
+    pub fn settle(&mut self, obstacles: &Obstacles) {
+        let Some(plan) = self.plan.filter(|plan| plan.id > self.stamp()) else { return };
+        if !self.parts.contains_key(&self.me) {
+            return;
+        }
+        if plan.phase == PHASE_AVOID {
+            let ids = set_ids(&plan.set, plan.set_count);
+            let Some(shapes) = obstacles.shapes(ids) else { return };
+            let routes = Routes::new(&shapes, &self.params);
+            self.sets.retain(|set| !set.ids.iter().any(|id| ids.contains(id)));
+            let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.clone());
+            self.sets.push(PlannedSet { ids, tag, stamp: plan.id, routes, parts });
+            self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));
+        } else {
+            self.sets.clear();
+        }
+        self.obeyed = Some(Orders { plan, parts: self.parts.clone() });
+    }
+}

@@ -1,0 +1,154 @@
+//! What a drone knows of obstacles, by its own senses or by being told, and who is past them.
+
+use skein_protocol::payload::{MAX_SET, Passed};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{DroneId, ObstacleId, SimTime};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Most obstacles a drone keeps; further ones are not taken up.
+pub const MAX_KNOWN: usize = 1024;
+
+/// A known obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// Its outline, world frame.
+    pub shape: ConvexShape,
+    /// Who sensed it first.
+    pub witness: DroneId,
+    /// When this drone learnt of it.
+    pub since: SimTime,
+}
+
+/// Known obstacles and who passed them. Bounded.
+#[derive(Clone, Debug, Default)]
+pub struct Obstacles {
+    known: BTreeMap<ObstacleId, Known>,
+    passed: BTreeMap<ObstacleId, BTreeSet<DroneId>>,
+    drones: u32,
+}
+
+impl Obstacles {
+    /// Nothing known, in a swarm of `drones`.
+    #[must_use]
+    pub fn new(drones: u32) -> Self {
+        Self { drones, ..Self::default() }
+    }
+
+    /// Learns of an obstacle; true if it is new.
+    pub fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
+        if self.known.contains_key(&id) || self.known.len() >= MAX_KNOWN {
+            return false;
+        }
+        self.known.insert(id, Known { shape, witness, since: now });
+        true
+    }
+
+    /// Learns who is past what.
+    pub fn hear_passed(&mut self, source: DroneId, message: &Passed) {
+        self.note_passed(source, set_ids(&message.set, message.set_count));
+    }
+
+    /// Notes that a drone is past these obstacles, however far it may turn back later.
+    pub fn note_passed(&mut self, drone: DroneId, ids: &[ObstacleId]) {
+        if drone.0 >= self.drones {
+            return;
+        }
+        for id in ids.iter().filter(|id| self.known.contains_key(id)) {
+            self.passed.entry(*id).or_default().insert(drone);
+        }
+    }
+
+    /// Whether a drone said that it is past an obstacle.
+    #[must_use]
+    pub fn has_passed(&self, drone: DroneId, id: ObstacleId) -> bool {
+        self.passed.get(&id).is_some_and(|who| who.contains(&drone))
+    }
+
+    /// One obstacle.
+    #[must_use]
+    pub fn get(&self, id: ObstacleId) -> Option<&Known> {
+        self.known.get(&id)
+    }
+
+    /// All of them, by id.
+    pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> {
+        self.known.iter().map(|(&id, known)| (id, known))
+    }
+
+    /// The outlines of these obstacles; `None` if one of them is not known.
+    #[must_use]
+    pub fn shapes(&self, ids: &[ObstacleId]) -> Option<Vec<(ObstacleId, ConvexShape)>> {
+        ids.iter().map(|&id| self.get(id).map(|known| (id, known.shape))).collect()
+    }
+
+    /// The obstacle sets, in flight order: obstacles whose extents along the flight are closer than `reach_m` belong
+    /// together. Ids ascending; a set has at most [`MAX_SET`] obstacles, the farther ones of a larger set form the next.
+    #[must_use]
+    pub fn sets(&self, reach_m: f64) -> Vec<Vec<ObstacleId>> {
+        let mut extents: Vec<(f64, f64, ObstacleId)> =
+            self.iter().map(|(id, known)| (known.shape.bounds().0.x, known.shape.bounds().1.x, id)).collect();
+        extents.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        let mut sets: Vec<Vec<ObstacleId>> = Vec::new();
+        let mut rear = f64::NEG_INFINITY;
+        for (front, end, id) in extents {
+            match sets.last_mut() {
+                Some(set) if front < rear + reach_m && set.len() < MAX_SET => set.push(id),
+                _ => {
+                    sets.push(vec![id]);
+                    rear = f64::NEG_INFINITY;
+                }
+            }
+            rear = rear.max(end);
+        }
+        sets.iter_mut().for_each(|set| set.sort_unstable());
+        sets
+    }
+}
+
+/// The part of a message's obstacle array that is in use.
+#[must_use]
+pub fn set_ids(set: &[ObstacleId; MAX_SET], count: u32) -> &[ObstacleId] {
+    &set[..(count as usize).min(MAX_SET)]
+}
+
+/// The obstacle array of a message.
+#[must_use]
+pub fn set_array(ids: &[ObstacleId]) -> ([ObstacleId; MAX_SET], u32) {
+    let mut set = [ObstacleId(0); MAX_SET];
+    let count = ids.len().min(MAX_SET);
+    set[..count].copy_from_slice(&ids[..count]);
+    (set, count as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_protocol::Vec2;
+
+    fn disc(x: f64) -> ConvexShape {
+        ConvexShape::circle(Vec2::new(x, 0.0), 5.0).unwrap()
+    }
+
+    #[test]
+    fn obstacles_closer_than_the_reach_form_a_set() {
+        let mut obstacles = Obstacles::new(4);
+        for (id, x) in [(3, 100.0), (1, 140.0), (2, 300.0)] {
+            assert!(obstacles.learn(SimTime::ZERO, ObstacleId(id), disc(x), DroneId(0)));
+        }
+        assert!(!obstacles.learn(SimTime::ZERO, ObstacleId(3), disc(0.0), DroneId(0)));
+        assert_eq!(obstacles.sets(40.0), vec![vec![ObstacleId(1), ObstacleId(3)], vec![ObstacleId(2)]]);
+        assert_eq!(obstacles.sets(20.0).len(), 3);
+    }
+
+    #[test]
+    fn what_nobody_knows_cannot_be_passed() {
+        let mut obstacles = Obstacles::new(4);
+        obstacles.learn(SimTime::ZERO, ObstacleId(1), disc(0.0), DroneId(0));
+        let (set, set_count) = set_array(&[ObstacleId(1), ObstacleId(9)]);
+        let message = Passed { stamp: SimTime::ZERO, set_count, set, reserved: 0 };
+        obstacles.hear_passed(DroneId(2), &message);
+        obstacles.hear_passed(DroneId(99), &message);
+        assert!(obstacles.has_passed(DroneId(2), ObstacleId(1)));
+        assert!(!obstacles.has_passed(DroneId(2), ObstacleId(9)) && !obstacles.has_passed(DroneId(99), ObstacleId(1)));
+    }
+}

@@ -1,0 +1,270 @@
+//! Routes past a set of obstacles (paper, Alg. 4 and E5: k obstacles have k + 1 routes).
+//!
+//! Obstacles with a gap that is too narrow between them are enveloped as one. A route is told by constraint
+//! points: corners of the inflated obstacles that the flight path has to pass on the given side.
+
+use crate::geometry::{hull, inflate, inscribed, lower_chain, nearest, separation, upper_chain};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{ObstacleId, Vec2};
+
+/// Distances that routes are made with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RouteParams {
+    /// r_obs: least distance of a drone's centre to an obstacle, m. A gap wider than twice this is passable.
+    pub clearance_m: f64,
+    /// r_plan: distance at which paths are planned, m; at least `clearance_m`.
+    pub planning_distance_m: f64,
+}
+
+/// On which side of a point a path has to pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Side {
+    /// To the left of it: y at least the point's.
+    Above,
+    /// To the right of it: y at most the point's.
+    Below,
+}
+
+/// A point that a path has to pass on one side. World frame, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constraint {
+    /// Along the flight.
+    pub x_m: f64,
+    /// Across the flight, to the left.
+    pub y_m: f64,
+    /// Where the path is.
+    pub side: Side,
+}
+
+/// A disc in the way that is no obstacle of the set, such as a dead drone that hovers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Body {
+    /// Its centre, world frame, m.
+    pub centre_m: Vec2,
+    /// Distance that a path keeps from the centre, m.
+    pub radius_m: f64,
+}
+
+impl Body {
+    /// The wall it is to a path on this side of it.
+    pub(crate) fn wall(&self, side: Side) -> Wall {
+        Wall { side, outline: inflate(&[self.centre_m], self.radius_m) }
+    }
+}
+
+/// An inflated obstacle beside a route.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Where a path is, seen from the obstacle.
+    pub side: Side,
+    /// The inflated obstacle: where no path may lead, m.
+    pub outline: Vec<Vec2>,
+}
+
+impl Wall {
+    /// Its corners on the path's side, by x.
+    pub fn constraints(&self) -> impl Iterator<Item = Constraint> + use<> {
+        let side = self.side;
+        let chain = match side {
+            Side::Above => upper_chain(&self.outline),
+            Side::Below => lower_chain(&self.outline),
+        };
+        chain.into_iter().map(move |p| Constraint { x_m: p.x, y_m: p.y, side })
+    }
+
+    /// Distance of a point to the outline, m; 0 inside.
+    #[must_use]
+    pub fn distance_m(&self, point: Vec2) -> f64 {
+        (nearest(&self.outline, point) - point).norm()
+    }
+}
+
+/// One way past a set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Route {
+    walls: Vec<Wall>,
+    constraints: Vec<Constraint>,
+}
+
+impl Route {
+    fn new(walls: Vec<Wall>) -> Self {
+        let mut constraints: Vec<Constraint> = walls.iter().flat_map(Wall::constraints).collect();
+        sort(&mut constraints);
+        Self { walls, constraints }
+    }
+
+    /// The inflated obstacles, from right to left.
+    #[must_use]
+    pub fn walls(&self) -> &[Wall] {
+        &self.walls
+    }
+
+    /// The points to pass, by x.
+    #[must_use]
+    pub fn constraints(&self) -> &[Constraint] {
+        &self.constraints
+    }
+}
+
+/// Orders constraints by x; ties by side and y, so that the order of the obstacles does not matter.
+pub(crate) fn sort(constraints: &mut [Constraint]) {
+    constraints.sort_by(|a, b| a.x_m.total_cmp(&b.x_m).then(a.side.cmp(&b.side)).then(a.y_m.total_cmp(&b.y_m)));
+}
+
+/// All routes past one set, from right to left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Routes {
+    routes: Vec<Route>,
+    gate_x_m: f64,
+    exit_x_m: f64,
+}
+
+impl Routes {
+    /// The routes past these obstacles, in whatever order they are given. Shapes that fail
+    /// [`ConvexShape::check`] are left out. Without obstacles: one free route, its gate and exit at x = 0.
+    #[must_use]
+    pub fn new(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
+        let masses = ordered(merged(obstacles, params), params);
+        if masses.is_empty() {
+            return Self { routes: vec![Route::default()], gate_x_m: 0.0, exit_x_m: 0.0 };
+        }
+        let routes = (0..=masses.len()).map(|route| Route::new(walls(&masses, route, params))).collect();
+        let centres = masses.iter().map(|mass| (mass.low.x + mass.high.x) / 2.0);
+        let rear_m = masses.iter().map(|mass| mass.high.x).fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            routes,
+            gate_x_m: centres.sum::<f64>() / masses.len() as f64,
+            exit_x_m: rear_m + params.planning_distance_m,
+        }
+    }
+
+    /// Number of routes: obstacles, those enveloped as one counting once, plus one (paper, E5).
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.routes.len()
+    }
+
+    /// A route, 0 = rightmost. Beyond the last: the leftmost.
+    #[must_use]
+    pub fn route(&self, index: usize) -> &Route {
+        &self.routes[index.min(self.routes.len() - 1)]
+    }
+
+    /// Abscissa at which the set counts as passed (paper, C1): mean of the centres of the obstacles (or of the
+    /// envelopes of those that have no way between them), m.
+    #[must_use]
+    pub fn gate_x_m(&self) -> f64 {
+        self.gate_x_m
+    }
+
+    /// Abscissa past which the set does not matter any more: rear edge and planning distance, m.
+    #[must_use]
+    pub fn exit_x_m(&self) -> f64 {
+        self.exit_x_m
+    }
+}
+
+/// One or several obstacles taken as one: all points within `radius_m` of `core`.
+#[derive(Clone, Debug)]
+struct Mass {
+    id: ObstacleId,
+    core: Vec<Vec2>,
+    radius_m: f64,
+    low: Vec2,
+    high: Vec2,
+}
+
+impl Mass {
+    fn new(id: ObstacleId, core: Vec<Vec2>, radius_m: f64) -> Self {
+        let margin = Vec2::repeat(radius_m);
+        let low = core.iter().fold(Vec2::repeat(f64::INFINITY), |low, p| low.inf(p)) - margin;
+        let high = core.iter().fold(Vec2::repeat(f64::NEG_INFINITY), |high, p| high.sup(p)) + margin;
+        Self { id, core, radius_m, low, high }
+    }
+
+    /// Shortest vector between the cores, and what is left of its length without the roundings, m.
+    fn gap(&self, other: &Self) -> (Vec2, f64) {
+        let between = separation(&self.core, &other.core);
+        (between, (between.norm() - self.radius_m - other.radius_m).max(0.0))
+    }
+
+    /// Whether the boxes around both are within `reach_m` of each other on both axes.
+    fn is_near(&self, other: &Self, reach_m: f64) -> bool {
+        let apart = (other.low - self.high).sup(&(self.low - other.high));
+        apart.x <= reach_m && apart.y <= reach_m
+    }
+
+    /// The convex hull of both. The smaller rounding is kept exactly, the rest of the larger one by its polygon.
+    fn envelope(&self, other: &Self) -> Self {
+        let radius_m = self.radius_m.min(other.radius_m);
+        let mut points = inflate(&self.core, self.radius_m - radius_m);
+        points.extend(inflate(&other.core, other.radius_m - radius_m));
+        Self::new(self.id.min(other.id), hull(&points), radius_m)
+    }
+}
+
+/// Envelopes whatever has no passable gap between it, until all gaps that are left are passable.
+fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<Mass> {
+    let valid = obstacles.iter().filter(|(_, shape)| shape.check().is_ok());
+    let mut masses: Vec<Mass> =
+        valid.map(|(id, shape)| Mass::new(*id, hull(&shape.vertices().collect::<Vec<_>>()), shape.radius_m)).collect();
+    masses.sort_by_key(|mass| mass.id);
+    let least_m = 2.0 * params.clearance_m;
+    let closed = |a: &Mass, b: &Mass| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
+    let pair = |masses: &[Mass]| {
+        (0..masses.len()).flat_map(|i| (0..i).map(move |j| (i, j))).find(|&(i, j)| closed(&masses[i], &masses[j]))
+    };
+    while let Some((i, j)) = pair(&masses) {
+        let other = masses.remove(i);
+        masses[j] = masses[j].envelope(&other);
+    }
+    masses
+}
+
+/// From right to left: by lateral position, but of two that one line across the flight can meet, the one that lies to
+/// the right there comes first, so that there is a way between them. A mirrored set has the reverse order: ranks from
+/// the right and from the left count alike.
+fn ordered(masses: Vec<Mass>, params: &RouteParams) -> Vec<Mass> {
+    let reach_m = 2.0 * params.planning_distance_m;
+    let right_of = |a: &Mass, b: &Mass| {
+        let apart_m = (b.low.x - a.high.x).max(a.low.x - b.high.x);
+        apart_m < reach_m && a.gap(b).0.y > 0.0
+    };
+    let lateral_m: Vec<f64> = masses.iter().map(|mass| (mass.low.y + mass.high.y) / 2.0).collect();
+    let right: Vec<Vec<bool>> = masses.iter().map(|a| masses.iter().map(|b| right_of(a, b)).collect()).collect();
+    let from_right = ranks(&lateral_m, |i, j| right[i][j]);
+    let from_left = ranks(&lateral_m.iter().map(|y| -y).collect::<Vec<_>>(), |i, j| right[j][i]);
+    let mut sorted: Vec<(usize, Mass)> = masses.into_iter().enumerate().collect();
+    let place = |i: usize| from_right[i] as i64 - from_left[i] as i64;
+    sorted.sort_by(|(a, _), (b, _)| {
+        place(*a).cmp(&place(*b)).then(lateral_m[*a].total_cmp(&lateral_m[*b])).then(a.cmp(b))
+    });
+    sorted.into_iter().map(|(_, mass)| mass).collect()
+}
+
+/// Ranks by key, except that whoever is `before` another has the lower rank.
+fn ranks(keys: &[f64], before: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+    let mut open: Vec<usize> = (0..keys.len()).collect();
+    open.sort_by(|&a, &b| keys[a].total_cmp(&keys[b]).then(a.cmp(&b)));
+    let mut ranks = vec![0; keys.len()];
+    for rank in 0..keys.len() {
+        let free = |&at: &usize| !open.iter().any(|&other| before(other, open[at]));
+        let next = (0..open.len()).find(free).unwrap_or(0);
+        ranks[open.remove(next)] = rank;
+    }
+    ranks
+}
+
+/// The masses beside a route, inflated by r_plan; where the gap across the route is less than twice that, by half of it
+/// (less what the corners of the rounding stick out by, so that walls never overlap), but by r_obs at least.
+fn walls(masses: &[Mass], route: usize, params: &RouteParams) -> Vec<Wall> {
+    let (right, left) = masses.split_at(route);
+    let wall = |mass: &Mass, across: &[Mass], side: Side| {
+        let half_gap_m = across.iter().map(|other| mass.gap(other).1 / 2.0).fold(f64::INFINITY, f64::min);
+        let inscribed_m = (mass.radius_m + half_gap_m) * inscribed() - mass.radius_m;
+        let reach_m = params.planning_distance_m.min(inscribed_m.max(params.clearance_m));
+        Wall { side, outline: inflate(&mass.core, mass.radius_m + reach_m) }
+    };
+    let right_walls = right.iter().map(|mass| wall(mass, left, Side::Above));
+    right_walls.chain(left.iter().map(|mass| wall(mass, right, Side::Below))).collect()
+}

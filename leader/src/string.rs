@@ -1,0 +1,146 @@
+//! The taut string: the shortest path past constraint points whose x never goes back (a funnel).
+
+use crate::routes::{Body, Constraint, Routes, Side, Wall, sort};
+use skein_protocol::Vec2;
+
+/// A lane's target is this far past the last set's exit, m.
+pub const RUN_OUT_M: f64 = 60.0;
+/// And never less than this far ahead of the drone, m.
+pub const LOOK_AHEAD_M: f64 = 30.0;
+/// Constraint points less than this ahead are passed, m.
+const PASSED_M: f64 = 1e-6;
+
+/// The way past one or several sets and back to the course line, made once and pulled taut every tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lane {
+    constraints: Vec<Constraint>,
+    target: Vec2,
+}
+
+/// A taut string.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pull {
+    /// Unit vector of its first leg.
+    pub direction: Vec2,
+    /// Length to the gate, m; past the gate the negative difference in x, beyond the target straight on.
+    pub to_gate_m: f64,
+    /// Length to the target, m.
+    pub total_m: f64,
+}
+
+impl Lane {
+    /// A lane past these sets, each with the route taken past it (0 = rightmost), to a target on the course line,
+    /// [`RUN_OUT_M`] past the last exit.
+    ///
+    /// A body that leaves no way between itself and a wall of the routes counts to that wall (the nearer one, if
+    /// several); any other one stays on the side on which the string from the course line passes its centre anyway.
+    #[must_use]
+    pub fn new(passages: &[(&Routes, usize)], bodies: &[Body], target: Vec2) -> Self {
+        let taken = || passages.iter().map(|&(routes, route)| routes.route(route));
+        let constraints = taken().flat_map(|route| route.constraints().iter().copied()).collect();
+        let mut lane = Self { constraints, target };
+        sort(&mut lane.constraints);
+        if !bodies.is_empty() {
+            lane.evade(bodies, taken().flat_map(|route| route.walls().iter().cloned()).collect());
+        }
+        lane
+    }
+
+    /// Pulls the string taut from a position (finite, m) and measures it up to the abscissa `gate_x_m`. Does not
+    /// allocate. Finite wherever the drone is: one that is inside a wall is led out of it.
+    #[must_use]
+    pub fn pull(&self, position: Vec2, gate_x_m: f64) -> Pull {
+        let past_m = position.x - gate_x_m;
+        let mut to_gate_m = (past_m >= 0.0).then_some(-past_m);
+        let (mut direction, mut total_m, mut end) = (None, 0.0, position);
+        self.walk(position, |a, b| {
+            let leg_m = (b - a).norm();
+            direction = direction.or(Some((b - a) / leg_m));
+            if b.x >= gate_x_m && to_gate_m.is_none() {
+                to_gate_m = Some(total_m + leg_m * (gate_x_m - a.x) / (b.x - a.x));
+            }
+            total_m += leg_m;
+            end = b;
+        });
+        let to_gate_m = to_gate_m.unwrap_or(total_m + gate_x_m - end.x);
+        Pull { direction: direction.unwrap_or(Vec2::x()), to_gate_m, total_m }
+    }
+
+    /// Visits the legs of the taut string, each at least [`PASSED_M`] long in x.
+    fn walk(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
+        let end = Vec2::new(self.target.x.max(position.x + LOOK_AHEAD_M), self.target.y);
+        let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
+        let mut from = position;
+        let mut next = ahead.partition_point(|c| c.x_m <= from.x + PASSED_M);
+        while let Some(bend) = first_bend(from, &ahead[next..], end) {
+            let to = Vec2::new(ahead[next + bend].x_m, ahead[next + bend].y_m);
+            leg(from, to);
+            from = to;
+            next += bend + ahead[next + bend..].partition_point(|c| c.x_m <= from.x + PASSED_M);
+        }
+        leg(from, end);
+    }
+
+    /// Ordinate at an abscissa of the string that comes along the course line.
+    fn height_m(&self, x_m: f64) -> f64 {
+        let first_x_m = self.constraints.first().map_or(x_m, |c| c.x_m.min(x_m));
+        let start = Vec2::new(first_x_m - RUN_OUT_M, self.target.y);
+        let mut y_m = self.target.y;
+        self.walk(start, |a, b| {
+            if a.x < x_m && x_m <= b.x {
+                y_m = a.y + (b.y - a.y) * (x_m - a.x) / (b.x - a.x);
+            }
+        });
+        y_m
+    }
+
+    /// Adds bodies: first those that close up with a wall, or with one that does; then the free ones.
+    fn evade(&mut self, bodies: &[Body], mut walls: Vec<Wall>) {
+        let usable = |b: &&Body| b.radius_m > 0.0 && (b.centre_m.x + b.centre_m.y + b.radius_m).is_finite();
+        let mut free: Vec<&Body> = bodies.iter().filter(usable).collect();
+        let first_new = walls.len();
+        while let Some((i, side)) = free.iter().enumerate().find_map(|(i, body)| Some((i, closed_side(&walls, body)?)))
+        {
+            walls.push(free.remove(i).wall(side));
+        }
+        self.constraints.extend(walls[first_new..].iter().flat_map(Wall::constraints));
+        sort(&mut self.constraints);
+        for body in free {
+            let above = self.height_m(body.centre_m.x) >= body.centre_m.y;
+            self.constraints.extend(body.wall(if above { Side::Above } else { Side::Below }).constraints());
+            sort(&mut self.constraints);
+        }
+    }
+}
+
+/// The side of the nearest wall, if it leaves no way between itself and a body.
+fn closed_side(walls: &[Wall], body: &Body) -> Option<Side> {
+    let distances = walls.iter().map(|wall| (wall.distance_m(body.centre_m), wall.side));
+    let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (nearest.0 < body.radius_m).then_some(nearest.1)
+}
+
+/// Where the string from `from` to `end` first bends: the funnel of directions narrows point by point until one, or the
+/// end, is outside of it. `None` if it runs straight. Points are ahead of `from`.
+fn first_bend(from: Vec2, points: &[Constraint], end: Vec2) -> Option<usize> {
+    let slope = |x_m: f64, y_m: f64| (y_m - from.y) / (x_m - from.x);
+    let (mut low, mut high) = ((f64::NEG_INFINITY, None), (f64::INFINITY, None));
+    for (i, point) in points.iter().enumerate() {
+        let slope = slope(point.x_m, point.y_m);
+        match point.side {
+            Side::Above if slope > high.0 => return high.1,
+            Side::Above if slope > low.0 => low = (slope, Some(i)),
+            Side::Below if slope < low.0 => return low.1,
+            Side::Below if slope < high.0 => high = (slope, Some(i)),
+            _ => {}
+        }
+    }
+    let slope = slope(end.x, end.y);
+    if slope > high.0 {
+        high.1
+    } else if slope < low.0 {
+        low.1
+    } else {
+        None
+    }
+}

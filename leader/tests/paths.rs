@@ -1,0 +1,296 @@
+//! Routes and taut strings: golden tables, and properties that hold for any obstacles and positions.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use proptest::prelude::*;
+use skein_leader::routes::{Body, Constraint, RouteParams, Routes, Side};
+use skein_leader::string::{Lane, RUN_OUT_M};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{ObstacleId, Vec2};
+use std::fmt::Write;
+
+const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 };
+
+fn rectangle(x: f64, y: f64, half_x: f64, half_y: f64) -> ConvexShape {
+    ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(half_x, half_y), 0.0).unwrap()
+}
+
+fn circle(x: f64, y: f64, radius: f64) -> ConvexShape {
+    ConvexShape::circle(Vec2::new(x, y), radius).unwrap()
+}
+
+fn routes(shapes: &[ConvexShape]) -> Routes {
+    let numbered: Vec<_> = shapes.iter().enumerate().map(|(i, shape)| (ObstacleId(i as u32), *shape)).collect();
+    Routes::new(&numbered, &PARAMS)
+}
+
+fn lane(routes: &Routes, route: usize, bodies: &[Body]) -> Lane {
+    Lane::new(&[(routes, route)], bodies, Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0))
+}
+
+/// Gate, exit, and for each route its walls: the path's side, the box around the wall, the number of points to pass.
+fn table(shapes: &[ConvexShape]) -> String {
+    let routes = routes(shapes);
+    let mut text = format!("gate {:.1} exit {:.1}\n", routes.gate_x_m(), routes.exit_x_m());
+    for index in 0..routes.count() {
+        let route = routes.route(index);
+        write!(text, "route {index}, {} points:", route.constraints().len()).unwrap();
+        for wall in route.walls() {
+            let low = wall.outline.iter().copied().reduce(|a, b| a.inf(&b)).unwrap();
+            let high = wall.outline.iter().copied().reduce(|a, b| a.sup(&b)).unwrap();
+            let side = wall.side;
+            write!(text, " {side:?} ({:.1} {:.1})..({:.1} {:.1})", low.x, low.y, high.x, high.y).unwrap();
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn one_rectangle_has_two_routes() {
+    let wanted = "gate 167.0 exit 197.0\n\
+        route 0, 16 points: Below (137.0 -205.0)..(197.0 -15.0)\n\
+        route 1, 16 points: Above (137.0 -205.0)..(197.0 -15.0)\n";
+    assert_eq!(table(&[rectangle(167.0, -110.0, 10.0, 75.0)]), wanted);
+}
+
+#[test]
+fn a_wide_gap_is_a_route_at_full_distance() {
+    let wanted = "gate 640.0 exit 670.0\n\
+        route 0, 32 points: Below (610.0 -80.0)..(670.0 -10.0) Below (610.0 10.0)..(670.0 80.0)\n\
+        route 1, 32 points: Above (610.0 -80.0)..(670.0 -10.0) Below (610.0 10.0)..(670.0 80.0)\n\
+        route 2, 32 points: Above (610.0 -80.0)..(670.0 -10.0) Above (610.0 10.0)..(670.0 80.0)\n";
+    assert_eq!(table(&[rectangle(640.0, 45.0, 10.0, 15.0), rectangle(640.0, -45.0, 10.0, 15.0)]), wanted);
+}
+
+#[test]
+fn a_gap_below_twice_the_planning_distance_is_halved_for_those_who_fly_through_it() {
+    let wanted = "gate 105.0 exit 140.0\n\
+        route 0, 32 points: Below (70.0 -70.0)..(130.0 -10.0) Below (80.0 -16.0)..(140.0 44.0)\n\
+        route 1, 32 points: Above (73.1 -66.9)..(126.9 -13.1) Below (83.1 -12.9)..(136.9 40.9)\n\
+        route 2, 32 points: Above (70.0 -70.0)..(130.0 -10.0) Above (80.0 -16.0)..(140.0 44.0)\n";
+    assert_eq!(table(&[rectangle(110.0, 14.0, 10.0, 10.0), rectangle(100.0, -40.0, 10.0, 10.0)]), wanted);
+}
+
+#[test]
+fn a_gap_of_twice_the_clearance_is_closed() {
+    let wanted = "gate 105.0 exit 140.0\n\
+        route 0, 17 points: Below (70.0 -70.0)..(140.0 50.0)\n\
+        route 1, 17 points: Above (70.0 -70.0)..(140.0 50.0)\n";
+    assert_eq!(table(&[rectangle(110.0, 10.0, 10.0, 20.0), rectangle(100.0, -45.0, 10.0, 5.0)]), wanted);
+}
+
+#[test]
+fn a_circle_and_a_rectangle_are_enveloped() {
+    let wanted = "gate 102.5 exit 135.0\n\
+        route 0, 17 points: Below (70.0 -30.0)..(135.0 65.0)\n\
+        route 1, 17 points: Above (70.0 -30.0)..(135.0 65.0)\n";
+    assert_eq!(table(&[circle(100.0, 0.0, 10.0), rectangle(110.0, 40.0, 5.0, 5.0)]), wanted);
+}
+
+#[test]
+fn an_envelope_can_close_the_gap_to_a_third() {
+    let (a, b, c) = (rectangle(0.0, 0.0, 5.0, 5.0), rectangle(30.0, 30.0, 5.0, 5.0), rectangle(-13.0, 43.0, 5.0, 5.0));
+    let wanted = "gate 8.5 exit 55.0\n\
+        route 0, 17 points: Below (-38.0 -25.0)..(55.0 68.0)\n\
+        route 1, 17 points: Above (-38.0 -25.0)..(55.0 68.0)\n";
+    assert_eq!(routes(&[a, c]).count(), 3);
+    assert_eq!(routes(&[b, c]).count(), 3);
+    assert_eq!(table(&[a, b, c]), wanted);
+}
+
+#[test]
+fn tilted_neighbours_are_ordered_as_a_line_across_meets_them() {
+    // The long bar's centre lies to the left of the disc's, but where they are abreast the bar is to the right.
+    let bar = ConvexShape::rectangle(Vec2::new(200.0, 60.0), Vec2::new(150.0, 5.0), 0.5).unwrap();
+    let disc = circle(90.0, 55.0, 10.0);
+    let routes = routes(&[bar, disc]);
+    assert_eq!(routes.count(), 3);
+    let (right, left) = (&routes.route(1).walls()[0], &routes.route(1).walls()[1]);
+    assert_eq!((right.side, left.side), (Side::Above, Side::Below));
+    assert_eq!(left.distance_m(Vec2::new(90.0, 55.0)), 0.0);
+}
+
+#[test]
+fn without_obstacles_there_is_one_free_route() {
+    let mut broken = circle(0.0, 0.0, 1.0);
+    broken.count = 99;
+    for routes in [routes(&[]), routes(&[broken])] {
+        assert_eq!((routes.count(), routes.route(7).constraints().len()), (1, 0));
+        let pull = lane(&routes, 0, &[]).pull(Vec2::new(-90.0, 0.0), routes.gate_x_m());
+        assert_eq!((pull.direction, pull.to_gate_m, pull.total_m), (Vec2::x(), 90.0, 90.0 + RUN_OUT_M));
+    }
+}
+
+#[test]
+fn the_string_bends_at_the_corners_and_is_measured_to_the_gate() {
+    let routes = routes(&[rectangle(167.0, 0.0, 10.0, 75.0)]);
+    let lane = lane(&routes, 1, &[]);
+    let pull = lane.pull(Vec2::new(0.0, 0.0), 167.0);
+    assert!(pull.direction.y > 0.5 && (pull.direction.norm() - 1.0).abs() < 1e-12);
+    // Longer than straight to the corner of the planning distance, shorter than round its box.
+    assert!(pull.to_gate_m > Vec2::new(157.0, 95.0).norm() && pull.to_gate_m < 137.0 + 95.0);
+    let straight_m = pull.total_m - pull.to_gate_m;
+    assert!(straight_m > Vec2::new(90.0, 95.0).norm() && straight_m < 90.0 + 95.0);
+    assert_eq!(lane.pull(Vec2::new(180.0, 95.0), 167.0).to_gate_m, -13.0);
+    assert!((lane.pull(Vec2::new(0.0, 0.0), 1167.0).to_gate_m - (pull.total_m + 1167.0 - 257.0)).abs() < 1e-9);
+}
+
+#[test]
+fn past_the_target_the_string_leads_on_along_the_course() {
+    let routes = routes(&[rectangle(100.0, 0.0, 10.0, 10.0)]);
+    let pull = lane(&routes, 0, &[]).pull(Vec2::new(900.0, 40.0), 100.0);
+    assert_eq!(pull.direction, Vec2::new(30.0, -40.0) / 50.0);
+    assert_eq!(pull.to_gate_m, -800.0);
+}
+
+#[test]
+fn a_body_at_a_wall_counts_to_it_and_a_free_one_stays_aside() {
+    let routes = routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]);
+    let body = |x: f64, y: f64| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 };
+    // Half-way along the obstacle the string from nearer than this leads outward.
+    let height_m = |bodies: &[Body], route: usize| {
+        let (lane, sign) = (lane(&routes, route, bodies), if route == 0 { -1.0 } else { 1.0 });
+        let inward = |y: &f64| lane.pull(Vec2::new(100.0, *y), 100.0).direction.y * sign <= 0.0;
+        (0..2000).map(|i| f64::from(i) / 10.0 * sign).find(inward)
+    };
+    for (route, sign) in [(0, -1.0), (1, 1.0)] {
+        let free = height_m(&[], route).unwrap();
+        assert!((free - sign * 60.0).abs() < 1.0, "{free}");
+        let closed = height_m(&[body(100.0, sign * 70.0)], route).unwrap();
+        assert!((closed - sign * 100.0).abs() < 1.0, "{closed}");
+        // Not closed by itself, but by the body between it and the wall.
+        let chained = height_m(&[body(100.0, sign * 110.0), body(100.0, sign * 70.0)], route).unwrap();
+        assert!((chained - sign * 140.0).abs() < 1.0, "{chained}");
+        let aside = height_m(&[body(100.0, sign * 110.0)], route).unwrap();
+        assert!((aside - sign * 60.0).abs() < 1.0, "{aside}");
+    }
+}
+
+#[test]
+fn in_a_gap_a_body_counts_to_the_nearer_wall() {
+    let routes = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
+    for sign in [-1.0, 1.0] {
+        let body = Body { centre_m: Vec2::new(640.0, sign * 35.0), radius_m: 30.0 };
+        let pull = lane(&routes, 1, &[body]).pull(Vec2::new(500.0, sign * 25.0), 640.0);
+        // It leads away from the body, to the other half of the gap.
+        assert!(pull.direction.y * sign < -0.1, "{pull:?}");
+    }
+}
+
+#[test]
+fn a_lane_past_two_sets_keeps_both() {
+    let (first, second) = (routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]), routes(&[rectangle(220.0, 0.0, 10.0, 40.0)]));
+    let target = Vec2::new(second.exit_x_m() + RUN_OUT_M, 0.0);
+    let crossing = Lane::new(&[(&first, 0), (&second, 1)], &[], target);
+    let position = Vec2::new(100.0, -60.0);
+    let pull = crossing.pull(position, second.gate_x_m());
+    // From the right of the first to the left of the second: level along the first, then across, then level again.
+    assert_eq!(pull.direction, Vec2::x());
+    assert!(pull.to_gate_m > Vec2::new(120.0, 120.0).norm() && pull.to_gate_m < 240.0, "{pull:?}");
+    assert_eq!(crossing.pull(position, first.gate_x_m()).to_gate_m, 0.0);
+    let straight = Lane::new(&[(&second, 0), (&first, 0)], &[], target).pull(position, second.gate_x_m());
+    assert!((straight.to_gate_m - 120.0).abs() < 1e-9);
+}
+
+fn shape() -> impl Strategy<Value = ConvexShape> {
+    let rectangles = (0.0..200.0, -150.0..150.0, 2.0..40.0, 2.0..80.0, -1.5..1.5)
+        .prop_map(|(x, y, hx, hy, turn)| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(hx, hy), turn).unwrap());
+    let circles = (0.0..200.0, -150.0..150.0, 1.0..40.0).prop_map(|(x, y, r)| circle(x, y, r));
+    prop_oneof![rectangles, circles]
+}
+
+fn shapes() -> impl Strategy<Value = Vec<ConvexShape>> {
+    prop::collection::vec(shape(), 1..6)
+}
+
+fn mirrored(shape: &ConvexShape) -> ConvexShape {
+    let mut vertices: Vec<Vec2> = shape.vertices().map(|v| Vec2::new(v.x, -v.y)).collect();
+    vertices.reverse();
+    ConvexShape::new(&vertices, shape.radius_m).unwrap()
+}
+
+/// Length of the shortest path over constraint points whose legs keep all constraints; `None` if there is none.
+fn shortest(constraints: &[Constraint], from: Vec2, target: Vec2) -> Option<f64> {
+    let ahead: Vec<&Constraint> = constraints.iter().filter(|c| c.x_m > from.x + 1e-6 && c.x_m < target.x).collect();
+    let mut nodes = vec![from];
+    nodes.extend(ahead.iter().map(|c| Vec2::new(c.x_m, c.y_m)));
+    nodes.push(target);
+    let keeps = |a: Vec2, b: Vec2| {
+        ahead.iter().filter(|c| c.x_m > a.x && c.x_m <= b.x).all(|c| {
+            let y_m = a.y + (b.y - a.y) * (c.x_m - a.x) / (b.x - a.x);
+            if c.side == Side::Above { y_m >= c.y_m - 1e-6 } else { y_m <= c.y_m + 1e-6 }
+        })
+    };
+    let mut least = vec![f64::INFINITY; nodes.len()];
+    least[0] = 0.0;
+    for j in 1..nodes.len() {
+        for i in 0..j {
+            if least[i].is_finite() && nodes[j].x > nodes[i].x && keeps(nodes[i], nodes[j]) {
+                least[j] = least[j].min(least[i] + (nodes[j] - nodes[i]).norm());
+            }
+        }
+    }
+    least.last().copied().filter(|length| length.is_finite())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_string_is_the_shortest_path(shapes in shapes(), y in -200.0..200.0, pick in any::<prop::sample::Index>()) {
+        let routes = routes(&shapes);
+        let route = pick.index(routes.count());
+        let (from, target) = (Vec2::new(-150.0, y), Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0));
+        let pull = lane(&routes, route, &[]).pull(from, routes.gate_x_m());
+        let Some(least_m) = shortest(routes.route(route).constraints(), from, target) else {
+            return Err(TestCaseError::fail(format!("route {route} is closed")));
+        };
+        prop_assert!((pull.total_m - least_m).abs() < 1e-3, "{} is not {}", pull.total_m, least_m);
+        prop_assert!(pull.to_gate_m >= routes.gate_x_m() - from.x - 1e-9 && pull.to_gate_m <= pull.total_m);
+    }
+
+    #[test]
+    fn the_string_is_finite_wherever_the_drone_is(
+        shapes in shapes(), (x, y) in (-100.0..400.0, -250.0..250.0), corner in any::<prop::sample::Index>(),
+        bodies in prop::collection::vec((-50.0..300.0, -150.0..150.0), 0..4),
+    ) {
+        let routes = routes(&shapes);
+        let bodies: Vec<Body> =
+            bodies.iter().map(|&(x, y)| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 }).collect();
+        for index in 0..routes.count() {
+            let route = routes.route(index);
+            let point = route.constraints()[corner.index(route.constraints().len())];
+            let lane = lane(&routes, index, &bodies);
+            for position in [Vec2::new(x, y), Vec2::new(point.x_m, y), Vec2::new(point.x_m, point.y_m)] {
+                let pull = lane.pull(position, routes.gate_x_m());
+                prop_assert!((pull.direction.norm() - 1.0).abs() < 1e-9 && pull.direction.x > 0.0, "{:?}", pull);
+                prop_assert!(pull.to_gate_m.is_finite() && pull.total_m.is_finite() && pull.total_m > 0.0);
+                prop_assert!(pull.to_gate_m >= routes.gate_x_m() - position.x - 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn the_order_of_the_obstacles_does_not_matter(shapes in shapes()) {
+        let mut numbered: Vec<_> = shapes.iter().enumerate().map(|(i, s)| (ObstacleId(i as u32), *s)).collect();
+        let routes = Routes::new(&numbered, &PARAMS);
+        numbered.reverse();
+        prop_assert_eq!(&routes, &Routes::new(&numbered, &PARAMS));
+        numbered.rotate_left(1);
+        prop_assert_eq!(&routes, &Routes::new(&numbered, &PARAMS));
+    }
+
+    #[test]
+    fn mirrored_obstacles_have_mirrored_routes(shapes in shapes(), y in -200.0..200.0) {
+        let other = routes(&shapes.iter().map(mirrored).collect::<Vec<_>>());
+        let routes = routes(&shapes);
+        prop_assert_eq!(routes.count(), other.count());
+        for index in 0..routes.count() {
+            let pull = |routes: &Routes, index, y| lane(routes, index, &[]).pull(Vec2::new(-150.0, y), routes.gate_x_m());
+            let (a, b) = (pull(&routes, index, y), pull(&other, routes.count() - 1 - index, -y));
+            prop_assert!((a.total_m - b.total_m).abs() < 1e-3, "route {}: {:?} is not {:?}", index, a, b);
+            prop_assert!((a.to_gate_m - b.to_gate_m).abs() < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! The summary, tick by tick.
+
+use crate::facts::RunFacts;
+use crate::formation::{self, Closing};
+use crate::leading::Leading;
+use crate::metrics::SwarmMetrics;
+use crate::recorder::Ending;
+use crate::stages::Stages;
+use crate::steps::StepTimer;
+use crate::summary::{Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, Spread, Summary, Violation, numbers};
+use crate::vicinity::Vicinity;
+use skein_protocol::payload::PHASE_REFORM;
+use skein_protocol::record::{self, DroneRow, Happening, Outcome, ROW_LATE, RecordView, RunEvent, Totals};
+use skein_protocol::{SimTime, Vec2};
+
+/// Time between two samples of the swarm metrics, s.
+const SAMPLE_S: f64 = 0.1;
+
+/// An instant in seconds, rounded once: 60 ms are 0.06, not 0.060000000000000005.
+pub(crate) fn seconds(time: SimTime) -> f64 {
+    time.0 as f64 / 1e9
+}
+
+/// Everything about a run that its summary tells.
+pub(crate) struct Accumulator {
+    facts: RunFacts,
+    stages: Stages,
+    leading: Leading,
+    vicinity: Vicinity,
+    metrics: SwarmMetrics,
+    steps: StepTimer,
+    closing: Closing,
+    reform_start_s: Option<f64>,
+    energy: EnergyMarks,
+    violations: Vec<Violation>,
+    faults: Vec<FaultEntry>,
+    end: Option<End>,
+    counts: Counts,
+    last: Vec<DroneRow>,
+    positions: Vec<Vec2>,
+    velocities: Vec<Vec2>,
+}
+
+/// How far the record has come, and what it counts by itself.
+#[derive(Default)]
+struct Counts {
+    tick: Option<u64>,
+    t_s: f64,
+    digest: Option<u64>,
+    lost: u64,
+    sent: u64,
+    heard: u64,
+    late: u64,
+}
+
+/// Energies at the moments that matter.
+#[derive(Default)]
+struct EnergyMarks {
+    at_detection: Option<Vec<f64>>,
+    until_passed: Option<f64>,
+    detection_to_pass: Option<f64>,
+}
+
+struct End {
+    t_s: f64,
+    outcome: Outcome,
+    reason: String,
+    totals: Totals,
+}
+
+impl Accumulator {
+    pub fn new(facts: RunFacts) -> Self {
+        Self {
+            stages: Stages::new(&facts),
+            leading: Leading::default(),
+            vicinity: Vicinity::new(&facts),
+            metrics: SwarmMetrics::new(facts.safe_distance_m, facts.radio_range_m),
+            steps: StepTimer::new(),
+            closing: Closing::default(),
+            reform_start_s: None,
+            energy: EnergyMarks::default(),
+            violations: Vec::new(),
+            faults: Vec::new(),
+            end: None,
+            counts: Counts::default(),
+            last: Vec::new(),
+            positions: Vec::new(),
+            velocities: Vec::new(),
+            facts,
+        }
+    }
+
+    /// Takes one record. True if its rows are of a new tick: the last record may repeat them.
+    pub fn take(&mut self, record: RecordView<'_>) -> Result<bool, String> {
+        let tick = record.head.tick;
+        let fresh = !record.rows.is_empty() && self.counts.tick.is_none_or(|last| tick > last);
+        if fresh && record.rows.len() != self.facts.drones as usize {
+            return Err(format!("tick {tick}: a record of {} rows, expected {}", record.rows.len(), self.facts.drones));
+        }
+        let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line);
+        let events = record.parse_events(parse).map_err(|error| format!("tick {tick}: not an event: {error}"))?;
+        self.counts.digest = Some(record.head.digest);
+        self.counts.lost += u64::from(record.head.lost);
+        if fresh {
+            self.stages.hear(record.frames);
+        }
+        events.into_iter().for_each(|event| self.event(event, record.rows));
+        if fresh {
+            self.counts.sent += record.frames.len() as u64;
+            self.rows(tick, seconds(record.head.now), record.rows);
+        }
+        Ok(fresh)
+    }
+
+    fn event(&mut self, event: RunEvent, rows: &[DroneRow]) {
+        let t_s = event.t_s;
+        match event.what {
+            Happening::Detected { stage, .. } => {
+                if self.stages.detected(stage, t_s) {
+                    self.energy.detected(&self.last, self.facts.drones);
+                }
+            }
+            Happening::Passed { stage } => {
+                self.stages.passed(stage, t_s);
+                if self.stages.all_passed() {
+                    self.energy.passed(rows);
+                }
+            }
+            Happening::Leader { group, ballot, leader, leads: true } => {
+                self.leading.elected(t_s, group, ballot, leader)
+            }
+            Happening::Fault { kind, target, scheduled, detail } => {
+                if let Some(row) = self.last.get(target.index()) {
+                    self.leading.died(t_s, row);
+                }
+                self.faults.push(FaultEntry { t_s, kind, target: target.0, scheduled, detail });
+            }
+            Happening::Violation { kind, drones, value_m } => {
+                self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
+            }
+            Happening::End { outcome, reason, totals } => {
+                self.end = Some(End { t_s, outcome, reason, totals: *totals });
+            }
+            // What was decided shows in the frames, and laying down in the rows.
+            Happening::Leader { .. } | Happening::Grouping { .. } | Happening::Assigned { .. } => {}
+        }
+    }
+
+    fn rows(&mut self, tick: u64, t_s: f64, rows: &[DroneRow]) {
+        let dt_s = self.counts.tick.map_or(self.facts.dt_s, |_| t_s - self.counts.t_s);
+        (self.counts.tick, self.counts.t_s) = (Some(tick), t_s);
+        for row in rows {
+            self.counts.heard += u64::from(row.heard);
+            self.counts.late += u64::from(row.flags & ROW_LATE != 0);
+            if row.alive() {
+                self.steps.take(row.step_ns);
+            }
+        }
+        self.stages.take(rows);
+        self.leading.take(t_s, dt_s, rows, self.facts.radio_range_m);
+        self.vicinity.take(rows, dt_s);
+        self.gather_living(rows);
+        if tick.is_multiple_of((SAMPLE_S / self.facts.dt_s).round().max(1.0) as u64) {
+            self.metrics.take(&self.positions, &self.velocities);
+        }
+        self.reform(t_s, rows);
+        self.last.clear();
+        self.last.extend_from_slice(rows);
+    }
+
+    fn gather_living(&mut self, rows: &[DroneRow]) {
+        self.positions.clear();
+        self.velocities.clear();
+        for row in rows.iter().filter(|row| row.alive()) {
+            self.positions.push(Vec2::from(row.position_m));
+            self.velocities.push(Vec2::from(row.velocity_mps));
+        }
+    }
+
+    fn reform(&mut self, t_s: f64, rows: &[DroneRow]) {
+        let mut living = rows.iter().filter(|row| row.alive());
+        let reforms = |row: &DroneRow| row.phase == PHASE_REFORM && row.obeyed.ballot.is_some();
+        if self.reform_start_s.is_none() && self.stages.all_passed() && living.clone().any(reforms) {
+            self.reform_start_s = Some(t_s);
+        }
+        if self.reform_start_s.is_some() && living.all(reforms) {
+            self.closing.take(&self.facts, t_s, &self.positions);
+        } else {
+            self.closing.open();
+        }
+    }
+
+    /// The summary of what was taken.
+    pub fn finish(self, ending: &Ending) -> Summary {
+        let error = formation::error(&self.facts, &self.positions);
+        let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick + 1), self.counts.t_s);
+        let wall_s = self.end.as_ref().map(|end| end.totals.wall_s).or(ending.wall_s).filter(|wall_s| *wall_s > 0.0);
+        let steps = ticks as f64 * f64::from(self.facts.drones);
+        let totals = self.end.as_ref().map(|end| &end.totals);
+        Summary {
+            schema: SUMMARY_SCHEMA.to_owned(),
+            drones: self.facts.drones,
+            dt_s: self.facts.dt_s,
+            ticks,
+            sim_s,
+            realtime_factor: wall_s.map(|wall_s| sim_s / wall_s),
+            agent_steps_per_s: wall_s.map(|wall_s| steps / wall_s),
+            wall_s,
+            startup_s: ending.startup_s,
+            report_s: None,
+            outcome: self.end.as_ref().map_or(ending.fallback, |end| end.outcome),
+            reason: self.end.as_ref().map(|end| end.reason.clone()),
+            mission_s: self.end.as_ref().map_or(sim_s, |end| end.t_s),
+            reform_start_s: self.reform_start_s,
+            reform_end_s: self.closing.since_s,
+            formation_error_m: error.as_ref().map(|error| error.largest_m),
+            formation_rmse_m: error.as_ref().map(|error| error.rmse_m),
+            mean_distance_error_m: error.and_then(|error| error.mean_distance_m),
+            energy_j: self.energy.finish(&self.last, self.stages.any()),
+            min_separation_m: self.vicinity.separation_m,
+            min_clearance_m: self.vicinity.clearance_m,
+            metrics: self.metrics.means(),
+            elections: self.leading.elections(),
+            messages: messages(&self.counts, totals),
+            deadline_misses: totals.map_or(self.counts.late, |totals| totals.deadline_misses),
+            step_us: self.steps.times().filter(|_| self.facts.runtime != "inline"),
+            rejected_commands: totals.map(|totals| totals.rejected_commands),
+            lost_ticks: self.counts.lost,
+            digest: self.counts.digest.map(|digest| format!("{digest:016x}")),
+            stages: self.stages.finish(),
+            leaders: self.leading.entries,
+            split_brain_s: self.leading.split_brain_s,
+            failover_s: self.leading.failover_s,
+            violations: self.violations,
+            faults: self.faults,
+            scenario: self.facts.scenario,
+            strategy: self.facts.strategy,
+            seed: self.facts.seed,
+            runtime: self.facts.runtime,
+            clock: self.facts.clock,
+        }
+    }
+}
+
+impl EnergyMarks {
+    /// The first tick of the mission has no rows before it: nothing was used yet.
+    fn detected(&mut self, rows: &[DroneRow], drones: u32) {
+        let before = if rows.is_empty() { vec![0.0; drones as usize] } else { energies(rows) };
+        self.at_detection = Some(before);
+    }
+
+    fn passed(&mut self, rows: &[DroneRow]) {
+        self.until_passed = Some(living_sum(rows, energies(rows)));
+        self.detection_to_pass = self.at_detection.as_ref().map(|before| {
+            let since = rows.iter().zip(before).map(|(row, before)| row.energy_j - before);
+            living_sum(rows, since.collect())
+        });
+    }
+
+    fn finish(self, rows: &[DroneRow], stages: bool) -> Energy {
+        Energy {
+            total: living_sum(rows, energies(rows)),
+            until_passed: self.until_passed.filter(|_| stages),
+            detection_to_pass: self.detection_to_pass.filter(|_| stages),
+            per_drone: energies(rows),
+        }
+    }
+}
+
+fn energies(rows: &[DroneRow]) -> Vec<f64> {
+    rows.iter().map(|row| row.energy_j).collect()
+}
+
+fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
+    rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
+}
+
+/// What the world counted; without its last word, what the record shows.
+fn messages(counts: &Counts, totals: Option<&Totals>) -> Messages {
+    let Some(totals) = totals else {
+        let (dropped, delay_s, age_s) = Default::default();
+        return Messages { sent: counts.sent, delivered: counts.heard, dropped, delay_s, age_s };
+    };
+    let [loss, burst, range, partition, deaf, malformed] = totals.dropped.map(Some);
+    Messages {
+        sent: totals.sent,
+        delivered: totals.delivered,
+        dropped: Dropped { loss, burst, range, partition, deaf, malformed },
+        delay_s: spread(&totals.delay_s),
+        age_s: spread(&totals.age_s),
+    }
+}
+
+fn spread(counted: &record::Spread) -> Spread {
+    Spread { mean: counted.mean, p50: counted.p50, p99: counted.p99, max: counted.max }
+}

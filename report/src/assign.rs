@@ -1,0 +1,149 @@
+//! Optimal assignment of drones to slots: the Hungarian method with potentials, O(n³).
+
+use skein_protocol::Vec2;
+
+/// The slot of each drone, by least total squared distance; ties fall to the lower slot. At least as many slots as
+/// drones.
+pub(crate) fn assign(positions: &[Vec2], slots: &[Vec2]) -> Vec<usize> {
+    let mut matching = Matching::new(slots.len());
+    for row in 0..positions.len() {
+        matching.add(row, &|row, slot| (positions[row] - slots[slot]).norm_squared());
+    }
+    let mut slot_of = vec![0; positions.len()];
+    for (slot, row) in matching.row_of.iter().enumerate() {
+        if let Some(row) = row {
+            slot_of[*row] = slot;
+        }
+    }
+    slot_of
+}
+
+/// A least-cost matching of the rows added so far, and the potentials that prove it.
+struct Matching {
+    row_of: Vec<Option<usize>>,
+    row_potential: Vec<f64>,
+    column_potential: Vec<f64>,
+}
+
+/// The search for the cheapest augmenting path of one row.
+struct Search {
+    /// Reduced cost of the cheapest path to each column found so far.
+    reach: Vec<f64>,
+    /// Column before it on that path; `None`: the new row itself.
+    before: Vec<Option<usize>>,
+    done: Vec<bool>,
+}
+
+impl Matching {
+    fn new(columns: usize) -> Self {
+        Self { row_of: vec![None; columns], row_potential: Vec::new(), column_potential: vec![0.0; columns] }
+    }
+
+    fn add(&mut self, row: usize, cost: &impl Fn(usize, usize) -> f64) {
+        self.row_potential.push(0.0);
+        let columns = self.row_of.len();
+        let mut search =
+            Search { reach: vec![f64::INFINITY; columns], before: vec![None; columns], done: vec![false; columns] };
+        let (mut at, mut from, mut length) = (row, None, 0.0);
+        let free = loop {
+            search.relax(
+                |column| length + cost(at, column) - self.row_potential[at] - self.column_potential[column],
+                from,
+            );
+            let next = search.nearest();
+            length = search.reach[next];
+            search.done[next] = true;
+            match self.row_of[next] {
+                None => break next,
+                Some(taken) => (at, from) = (taken, Some(next)),
+            }
+        };
+        self.reprice(row, length, &search);
+        self.augment(row, free, &search.before);
+    }
+
+    fn reprice(&mut self, row: usize, length: f64, search: &Search) {
+        self.row_potential[row] += length;
+        for column in (0..self.row_of.len()).filter(|&column| search.done[column]) {
+            let slack = length - search.reach[column];
+            self.column_potential[column] -= slack;
+            if let Some(taken) = self.row_of[column] {
+                self.row_potential[taken] += slack;
+            }
+        }
+    }
+
+    fn augment(&mut self, row: usize, free: usize, before: &[Option<usize>]) {
+        let mut column = free;
+        while let Some(previous) = before[column] {
+            self.row_of[column] = self.row_of[previous];
+            column = previous;
+        }
+        self.row_of[column] = Some(row);
+    }
+}
+
+impl Search {
+    fn relax(&mut self, length: impl Fn(usize) -> f64, from: Option<usize>) {
+        for column in 0..self.reach.len() {
+            if self.done[column] {
+                continue;
+            }
+            let length = length(column);
+            if length < self.reach[column] {
+                (self.reach[column], self.before[column]) = (length, from);
+            }
+        }
+    }
+
+    /// The open column with the shortest path: the first one of equals, and some column whatever the costs.
+    fn nearest(&self) -> usize {
+        let open = (0..self.reach.len()).filter(|&column| !self.done[column]);
+        open.min_by(|&a, &b| self.reach[a].total_cmp(&self.reach[b])).expect("no more rows than columns")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn cost(positions: &[Vec2], slots: &[Vec2], slot_of: &[usize]) -> f64 {
+        positions.iter().zip(slot_of).map(|(p, &s)| (p - slots[s]).norm_squared()).sum()
+    }
+
+    /// Least total over all ways to give the rest of the drones the rest of the slots.
+    fn brute(positions: &[Vec2], slots: &[Vec2], taken: &mut Vec<usize>) -> f64 {
+        if taken.len() == positions.len() {
+            return cost(positions, slots, taken);
+        }
+        let mut best = f64::INFINITY;
+        for slot in 0..slots.len() {
+            if !taken.contains(&slot) {
+                taken.push(slot);
+                best = best.min(brute(positions, slots, taken));
+                taken.pop();
+            }
+        }
+        best
+    }
+
+    fn points(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Vec2>> {
+        // Whole numbers, so that ties happen.
+        prop::collection::vec((-5i32..6, -5i32..6).prop_map(|(x, y)| Vec2::new(x.into(), y.into())), count)
+    }
+
+    proptest! {
+        #[test]
+        fn no_assignment_is_cheaper(positions in points(0..6), more in points(0..2), slots in points(6..7)) {
+            let slots = [slots, more].concat();
+            let slot_of = assign(&positions, &slots);
+            let mut sorted = slot_of.clone();
+            sorted.sort_unstable();
+            sorted.dedup();
+            prop_assert_eq!(sorted.len(), positions.len());
+            let best = brute(&positions, &slots, &mut Vec::new());
+            prop_assert!((cost(&positions, &slots, &slot_of) - best).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! What is known of a run before it starts, and the record stream does not carry.
+
+use serde::{Deserialize, Serialize};
+use skein_protocol::Vec2;
+use skein_protocol::formation::Shape;
+use skein_protocol::shape::ConvexShape;
+
+/// A run as it was ordered. SI units, world frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunFacts {
+    /// The scenario's name; names the run's folder.
+    pub scenario: String,
+    /// How drones were grouped, as on the command line.
+    pub strategy: String,
+    /// Key of everything random.
+    pub seed: u64,
+    /// `processes` or `inline`.
+    pub runtime: String,
+    /// `lockstep`, `realtime` or `realtime:SPEED`.
+    pub clock: String,
+    /// Number of drones at the start.
+    pub drones: u32,
+    /// Length of a tick, s.
+    pub dt_s: f64,
+    /// The formation.
+    pub shape: Shape,
+    /// Its spacing, m.
+    pub spacing_m: f64,
+    /// Where the mission ends.
+    pub end: MissionEnd,
+    /// Ordinate of the line along which the formation's front slot flies, m.
+    pub course_y_m: f64,
+    /// Least distance of two bodies, m.
+    pub safe_distance_m: f64,
+    /// Least distance of a body to an obstacle, m.
+    pub clearance_m: f64,
+    /// Distance that paths keep from obstacles, m. Obstacles closer than twice this in flight direction are one set.
+    pub planning_distance_m: f64,
+    /// Largest slot error of a closed formation, m.
+    pub arrival_error_m: f64,
+    /// Greatest distance at which drones hear each other, m; `None`: no limit.
+    pub radio_range_m: Option<f64>,
+    /// How long a dead drone stays a body once it stands still, s; `None`: for good, it hovers.
+    pub landing_s: Option<f64>,
+    /// The obstacles; an obstacle's id is its place.
+    #[serde(with = "outlines")]
+    pub obstacles: Vec<ConvexShape>,
+}
+
+/// Where a mission ends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MissionEnd {
+    /// Wherever the formation is closed again.
+    Hold,
+    /// In fixed slots.
+    Goal {
+        /// Where the front slot is, m.
+        front_m: [f64; 2],
+    },
+}
+
+/// Obstacles that are passed together: one stage of the mission.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ObstacleSet {
+    /// Ascending.
+    pub obstacles: Vec<u32>,
+    /// Mean centre abscissa, m: a drone beyond it has passed the set.
+    pub gate_x_m: f64,
+}
+
+impl RunFacts {
+    /// Obstacles clustered by their extents in flight direction, in flight order.
+    pub(crate) fn sets(&self) -> Vec<ObstacleSet> {
+        let bounds: Vec<(Vec2, Vec2)> = self.obstacles.iter().map(ConvexShape::bounds).collect();
+        let mut order: Vec<usize> = (0..bounds.len()).collect();
+        order.sort_by(|&a, &b| bounds[a].0.x.total_cmp(&bounds[b].0.x));
+        let mut sets: Vec<Vec<usize>> = Vec::new();
+        let mut reach = f64::NEG_INFINITY;
+        for obstacle in order {
+            let (low, high) = bounds[obstacle];
+            match sets.last_mut() {
+                Some(set) if low.x - reach < 2.0 * self.planning_distance_m => set.push(obstacle),
+                _ => sets.push(vec![obstacle]),
+            }
+            reach = reach.max(high.x);
+        }
+        sets.into_iter().map(|set| self.set_of(set)).collect()
+    }
+
+    fn set_of(&self, mut set: Vec<usize>) -> ObstacleSet {
+        set.sort_unstable();
+        let sum: f64 = set.iter().map(|&o| self.obstacles[o].centre().x).sum();
+        ObstacleSet { gate_x_m: sum / set.len() as f64, obstacles: set.into_iter().map(|o| o as u32).collect() }
+    }
+}
+
+/// Outlines as people write them: vertices and a rounding radius.
+mod outlines {
+    use super::{ConvexShape, Vec2};
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Outline {
+        vertices_m: Vec<[f64; 2]>,
+        radius_m: f64,
+    }
+
+    pub fn serialize<S: Serializer>(shapes: &[ConvexShape], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(
+            shapes.iter().map(|shape| Outline {
+                vertices_m: shape.vertices().map(Into::into).collect(),
+                radius_m: shape.radius_m,
+            }),
+        )
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<ConvexShape>, D::Error> {
+        let shape = |outline: Outline| {
+            let vertices: Vec<Vec2> = outline.vertices_m.into_iter().map(Vec2::from).collect();
+            ConvexShape::new(&vertices, outline.radius_m).map_err(D::Error::custom)
+        };
+        Vec::<Outline>::deserialize(from)?.into_iter().map(shape).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::facts;
+
+    fn block(x: f64, y: f64) -> ConvexShape {
+        ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(10.0, 15.0), 0.0).unwrap()
+    }
+
+    #[test]
+    fn sets_are_clustered_in_flight_order() {
+        let facts = RunFacts {
+            obstacles: vec![block(640.0, 45.0), block(320.0, 0.0), block(640.0, -45.0), block(381.0, 0.0)],
+            planning_distance_m: 20.0,
+            ..facts(8)
+        };
+        let sets = facts.sets();
+        let ids: Vec<_> = sets.iter().map(|set| set.obstacles.clone()).collect();
+        assert_eq!(ids, [vec![1], vec![3], vec![0, 2]]);
+        assert_eq!(sets[2].gate_x_m, 640.0);
+        let wider = RunFacts { planning_distance_m: 21.0, ..facts };
+        assert_eq!(wider.sets()[0], ObstacleSet { obstacles: vec![1, 3], gate_x_m: 350.5 });
+    }
+
+    #[test]
+    fn facts_survive_json_and_bad_outlines_are_refused() {
+        let facts = RunFacts { obstacles: vec![block(1.0, 2.0)], ..facts(3) };
+        let json = serde_json::to_string(&facts).unwrap();
+        assert_eq!(serde_json::from_str::<RunFacts>(&json).unwrap(), facts);
+        let bad = json.replace("\"radius_m\":0.0", "\"radius_m\":-1.0");
+        let error = serde_json::from_str::<RunFacts>(&bad).unwrap_err().to_string();
+        assert!(error.contains("finite"), "{error}");
+    }
+}

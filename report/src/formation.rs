@@ -1,0 +1,161 @@
+//! How far the living drones are from the target shape, wherever it may stand.
+
+use crate::assign::assign;
+use crate::facts::RunFacts;
+use skein_protocol::Vec2;
+
+/// Up to this many drones the assignment is solved whenever the last one does not close the formation.
+const SOLVE_ALWAYS_MAX: usize = 64;
+/// Above, at most once in this time, s.
+const SOLVE_EVERY_S: f64 = 1.0;
+
+/// The error of a formation after the best translation and assignment.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FormationError {
+    /// Of the drone farthest from its slot, m.
+    pub largest_m: f64,
+    /// Root of the mean square, m.
+    pub rmse_m: f64,
+    /// Mean distance between drones, less the slots', absolute, m; `None` for fewer than two.
+    pub mean_distance_m: Option<f64>,
+}
+
+/// The error of drones at these positions; `None` without drones, or if the shape has too few slots.
+pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationError> {
+    let slots = slots(facts, positions.len())?;
+    let positions = centred(positions.to_vec());
+    let offsets = offsets(&positions, &slots, &assign(&positions, &slots));
+    let mean_distance_m = (positions.len() > 1).then(|| (mean_distance(&positions) - mean_distance(&slots)).abs());
+    Some(FormationError {
+        largest_m: offsets.iter().copied().fold(0.0, f64::max),
+        rmse_m: (offsets.iter().map(|m| m * m).sum::<f64>() / offsets.len() as f64).sqrt(),
+        mean_distance_m,
+    })
+}
+
+/// The slots of `count` drones about their mean. The translation that is best in the least squares sense takes mean
+/// to mean, whatever the assignment.
+fn slots(facts: &RunFacts, count: usize) -> Option<Vec<Vec2>> {
+    let slots = facts.shape.slots(count, facts.spacing_m);
+    (count > 0 && slots.len() == count).then(|| centred(slots))
+}
+
+fn centred(mut points: Vec<Vec2>) -> Vec<Vec2> {
+    let mean = points.iter().sum::<Vec2>() / points.len() as f64;
+    points.iter_mut().for_each(|point| *point -= mean);
+    points
+}
+
+fn offsets(positions: &[Vec2], slots: &[Vec2], slot_of: &[usize]) -> Vec<f64> {
+    positions.iter().zip(slot_of).map(|(position, &slot)| (position - slots[slot]).norm()).collect()
+}
+
+/// Mean distance over all pairs; 0 for fewer than two points.
+pub(crate) fn mean_distance(points: &[Vec2]) -> f64 {
+    let pairs = points.len() * points.len().saturating_sub(1) / 2;
+    let sum: f64 = points.iter().enumerate().flat_map(|(i, a)| points[..i].iter().map(move |b| (a - b).norm())).sum();
+    sum / pairs.max(1) as f64
+}
+
+/// When the formation was closed for good.
+#[derive(Default)]
+pub(crate) struct Closing {
+    /// First time of the stretch, up to now, in which it has been closed, s.
+    pub since_s: Option<f64>,
+    slots: Vec<Vec2>,
+    slot_of: Vec<usize>,
+    solved_s: Option<f64>,
+}
+
+impl Closing {
+    /// The formation is not being closed now.
+    pub fn open(&mut self) {
+        self.since_s = None;
+    }
+
+    /// Takes the living drones' positions while all of them reform.
+    pub fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
+        if self.closed(facts, t_s, positions) {
+            self.since_s.get_or_insert(t_s);
+        } else {
+            self.open();
+        }
+    }
+
+    /// Whether each drone is near enough to a slot of its own. The last assignment is tried before it is solved anew.
+    fn closed(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> bool {
+        if self.slots.len() != positions.len() {
+            self.slots = slots(facts, positions.len()).unwrap_or_default();
+            (self.slot_of, self.solved_s) = (Vec::new(), None);
+        }
+        if self.slots.is_empty() {
+            return false;
+        }
+        let positions = centred(positions.to_vec());
+        let fits = |slots: &[Vec2], slot_of: &[usize]| {
+            offsets(&positions, slots, slot_of).iter().all(|&offset| offset <= facts.arrival_error_m)
+        };
+        if self.solved_s.is_some() && fits(&self.slots, &self.slot_of) {
+            return true;
+        }
+        let due = self.solved_s.is_none_or(|solved_s| t_s - solved_s >= SOLVE_EVERY_S);
+        if positions.len() > SOLVE_ALWAYS_MAX && !due {
+            return false;
+        }
+        self.slot_of = assign(&positions, &self.slots);
+        self.solved_s = Some(t_s);
+        fits(&self.slots, &self.slot_of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::facts;
+
+    /// The slots, moved, in another order, and each drone of them off by what `off` says.
+    fn near_slots(count: usize, off: impl Fn(usize) -> Vec2) -> Vec<Vec2> {
+        let slots = facts(8).shape.slots(count, 35.0);
+        (0..count).map(|i| slots[(i * 3 + 1) % count] + Vec2::new(900.0, -40.0) + off(i)).collect()
+    }
+
+    #[test]
+    fn a_moved_and_permuted_formation_has_no_error() {
+        let error = error(&facts(8), &near_slots(8, |_| Vec2::zeros())).unwrap();
+        assert!(error.largest_m < 1e-9 && error.rmse_m < 1e-9 && error.mean_distance_m.unwrap() < 1e-9, "{error:?}");
+    }
+
+    #[test]
+    fn one_drone_astray_moves_the_mean_too() {
+        let error = error(&facts(8), &near_slots(8, |i| Vec2::new(if i == 2 { 8.0 } else { 0.0 }, 0.0))).unwrap();
+        assert!((error.largest_m - 7.0).abs() < 1e-9, "{error:?}");
+        assert!((error.rmse_m - (56.0f64 / 8.0).sqrt()).abs() < 1e-9, "{error:?}");
+    }
+
+    #[test]
+    fn the_living_close_up() {
+        assert!(error(&facts(8), &[]).is_none());
+        let alone = error(&facts(8), &[Vec2::new(3.0, 3.0)]).unwrap();
+        assert_eq!((alone.largest_m, alone.mean_distance_m), (0.0, None));
+        let pair = error(&facts(8), &[Vec2::zeros(), Vec2::new(0.0, 36.0)]).unwrap();
+        assert!((pair.mean_distance_m.unwrap() - 1.0).abs() < 1e-9, "{pair:?}");
+        let offsets = skein_protocol::formation::Shape::Offsets(vec![[0.0, 0.0]]);
+        assert!(error(&RunFacts { shape: offsets, ..facts(8) }, &[Vec2::zeros(); 2]).is_none());
+    }
+
+    #[test]
+    fn closed_means_closed_until_the_end() {
+        for count in [8, 80] {
+            let facts = facts(count as u32);
+            let mut closing = Closing::default();
+            let wide = |i: usize| Vec2::new(if i == 0 { 3.0 } else { 0.0 }, 0.0);
+            closing.take(&facts, 1.0, &near_slots(count, |_| Vec2::zeros()));
+            assert_eq!(closing.since_s, Some(1.0));
+            closing.take(&facts, 2.0, &near_slots(count, wide));
+            assert_eq!(closing.since_s, None);
+            closing.take(&facts, 3.0, &near_slots(count, |_| Vec2::zeros()));
+            closing.take(&facts, 4.0, &near_slots(count, |_| Vec2::zeros()));
+            assert_eq!(closing.since_s, Some(3.0));
+        }
+    }
+}

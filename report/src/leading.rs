@@ -1,0 +1,128 @@
+//! Who led, when two led at once, and how long a group was without a leader after its leader's death.
+
+use crate::summary::{LeaderEntry, Term};
+use skein_protocol::record::{DroneRow, ROW_LEADS};
+use skein_protocol::{Ballot, DroneId, GroupId, Vec2};
+use std::collections::BTreeSet;
+
+/// Leadership over a mission.
+#[derive(Default)]
+pub(crate) struct Leading {
+    /// Who took up leading.
+    pub entries: Vec<LeaderEntry>,
+    /// Time with two leaders of one group in radio range of each other, s.
+    pub split_brain_s: f64,
+    /// For each death of a leader, the time until another one led its group, s.
+    pub failover_s: Vec<Option<f64>>,
+    ballots: BTreeSet<Term>,
+    orphans: Vec<Orphan>,
+    leaders: Vec<(GroupId, usize)>,
+}
+
+/// A group whose leader died.
+struct Orphan {
+    group: GroupId,
+    since_s: f64,
+    failover: usize,
+}
+
+impl Leading {
+    /// Number of different ballots that led.
+    pub fn elections(&self) -> u32 {
+        self.ballots.len() as u32
+    }
+
+    /// A drone took up leading.
+    pub fn elected(&mut self, t_s: f64, group: String, ballot: Ballot, leader: DroneId) {
+        self.ballots.insert(ballot.into());
+        self.entries.push(LeaderEntry { t_s, group, ballot: ballot.into(), leader: leader.0 });
+    }
+
+    /// A drone died that was last seen as `row`.
+    pub fn died(&mut self, t_s: f64, row: &DroneRow) {
+        if leads(row) {
+            self.orphans.push(Orphan { group: row.group, since_s: t_s, failover: self.failover_s.len() });
+            self.failover_s.push(None);
+        }
+    }
+
+    /// Takes the rows of a tick that lasted `dt_s`. The dead lead nobody.
+    pub fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
+        self.leaders.clear();
+        self.leaders
+            .extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.group, drone)));
+        self.leaders.sort_unstable();
+        let (leaders, failover_s) = (&self.leaders, &mut self.failover_s);
+        self.orphans.retain(|orphan| {
+            let led = leaders.iter().any(|(group, _)| *group == orphan.group);
+            if led {
+                failover_s[orphan.failover] = Some(t_s - orphan.since_s);
+            }
+            !led
+        });
+        let place = |drone: usize| Vec2::from(rows[drone].position_m);
+        let hear = |a: usize, b: usize| range_m.is_none_or(|range| (place(a) - place(b)).norm() <= range);
+        let rivals = |group: &[(GroupId, usize)]| {
+            group.iter().enumerate().any(|(i, &(_, a))| group[..i].iter().any(|&(_, b)| hear(a, b)))
+        };
+        if leaders.chunk_by(|a, b| a.0 == b.0).any(rivals) {
+            self.split_brain_s += dt_s;
+        }
+    }
+}
+
+fn leads(row: &DroneRow) -> bool {
+    row.alive() && row.flags & ROW_LEADS != 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::row;
+    use skein_protocol::record::ROW_ALIVE;
+
+    fn leader(x_m: f64, group: GroupId) -> DroneRow {
+        DroneRow { flags: ROW_ALIVE | ROW_LEADS, group, ..row(x_m, 0.0) }
+    }
+
+    #[test]
+    fn two_leaders_of_a_group_are_a_split_brain_if_they_hear_each_other() {
+        let one = GroupId::ALL.child(1);
+        let split = |range, rows: &[DroneRow]| {
+            let mut leading = Leading::default();
+            leading.take(1.0, 0.5, rows, range);
+            leading.split_brain_s
+        };
+        let rivals = [leader(0.0, one), row(5.0, 0.0), leader(60.0, one)];
+        assert_eq!(split(None, &rivals), 0.5);
+        assert_eq!(split(Some(60.0), &rivals), 0.5);
+        assert_eq!(split(Some(50.0), &rivals), 0.0);
+        assert_eq!(split(None, &[leader(0.0, one), leader(60.0, GroupId::ALL)]), 0.0);
+        let dead = DroneRow { flags: ROW_LEADS, ..leader(60.0, one) };
+        assert_eq!(split(None, &[leader(0.0, one), dead]), 0.0);
+    }
+
+    #[test]
+    fn failover_lasts_until_another_leads_the_group() {
+        let (one, two) = (GroupId::ALL.child(1), GroupId::ALL.child(2));
+        let mut leading = Leading::default();
+        leading.died(10.0, &leader(0.0, one));
+        leading.died(10.0, &row(0.0, 0.0));
+        leading.died(10.5, &leader(0.0, two));
+        leading.take(10.6, 0.1, &[leader(0.0, GroupId::ALL)], None);
+        assert_eq!(leading.failover_s, [None, None]);
+        leading.take(11.25, 0.1, &[leader(0.0, one)], None);
+        leading.take(12.0, 0.1, &[leader(0.0, one)], None);
+        assert_eq!(leading.failover_s, [Some(1.25), None]);
+    }
+
+    #[test]
+    fn a_ballot_counts_once() {
+        let mut leading = Leading::default();
+        for (round, leader) in [(1, 0), (1, 0), (2, 3)] {
+            let ballot = Ballot { round, incarnation: 1, claimant: DroneId(leader) };
+            leading.elected(1.0, "N".to_owned(), ballot, DroneId(leader));
+        }
+        assert_eq!((leading.elections(), leading.entries.len()), (2, 3));
+    }
+}

@@ -1,0 +1,130 @@
+//! Plots of a flown run, drawn from its trace.csv, so that they can be redone at any time. SVG, light background, colours
+//! that colour-blind people tell apart (Okabe and Ito).
+
+mod curves;
+mod samples;
+mod style;
+mod tracks;
+
+use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::folder::RunFolder;
+use curves::{Band, Curve, Figure};
+use samples::Samples;
+use std::path::PathBuf;
+use style::{BLUE, RED};
+
+/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones.
+pub const FILES: [&str; 4] = ["trace.svg", "separation.svg", "speed.svg", "distance.svg"];
+
+/// Draws the plots of a run from its trace.csv. Those that have no data are left out: all of them for an empty trace,
+/// those of distances for a lone drone.
+///
+/// # Errors
+/// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Plot`].
+pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
+    let samples = Samples::read(&folder.path().join(crate::trace::FILE))?;
+    let plots = folder.plots()?;
+    let mut written = Vec::new();
+    for (name, svg) in FILES.iter().zip(draw(&samples, facts)) {
+        let path = plots.join(name);
+        if let Some(svg) = svg {
+            let svg = svg.map_err(|reason| ReportError::Plot { path: path.clone(), reason })?;
+            std::fs::write(&path, svg).map_err(ReportError::io(&path))?;
+            written.push(path);
+        }
+    }
+    Ok(written)
+}
+
+/// A drawn plot, or why it cannot be drawn; `None` without data.
+type Drawn = Option<Result<String, String>>;
+
+fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 4] {
+    let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
+    let safe = || Curve {
+        label: format!("safe distance, {} m", facts.safe_distance_m),
+        colour: RED,
+        level: facts.safe_distance_m,
+    };
+    let separation = Figure {
+        title: format!("Least separation: {run}"),
+        y_label: "distance between the two nearest drones (m)",
+        line_label: "least separation",
+        band: samples.separation.iter().map(|&(t_s, m)| Band { t_s, mean: m, deviation: 0.0 }).collect(),
+        level: Some(safe()),
+    };
+    let speed = Figure {
+        title: format!("Speed: {run}"),
+        y_label: "speed (m/s)",
+        line_label: "mean over drones",
+        band: samples.speed.clone(),
+        level: None,
+    };
+    let distance = Figure {
+        title: format!("Distance between drones: {run}"),
+        y_label: "distance between drones (m)",
+        line_label: "mean over pairs",
+        band: samples.distance.clone(),
+        level: Some(safe()),
+    };
+    let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
+    let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
+    [tracks, curve(separation), curve(speed), curve(distance)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::facts;
+    use skein_protocol::Vec2;
+    use skein_protocol::shape::ConvexShape;
+    use std::fmt::Write;
+
+    fn flown(drones: u32, ticks: u32) -> (tempfile::TempDir, RunFolder) {
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
+        for tick in 1..=ticks {
+            let t_s = f64::from(tick) * 0.02;
+            for drone in 0..drones {
+                writeln!(csv, "{t_s},{drone},{},{},10,0,N{},0,1", t_s * 10.0, drone * 40, drone + 1).unwrap();
+            }
+        }
+        std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
+        (root, folder)
+    }
+
+    #[test]
+    fn every_plot_says_what_it_shows() {
+        let (_root, folder) = flown(3, 500);
+        let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
+        let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }).unwrap();
+        let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, FILES);
+        let text = |i: usize| std::fs::read_to_string(&written[i]).unwrap();
+        for group in ["N1", "N2", "N3", "start", "end", "obstacle", "x (m)"] {
+            assert!(text(0).contains(group), "{group} is not in the legend");
+        }
+        assert!(text(1).contains("safe distance, 25 m") && text(3).contains("safe distance, 25 m"));
+        assert!(text(2).contains("speed (m/s)") && !text(2).contains("safe distance"));
+        assert!(text(1).contains("time (s)"));
+    }
+
+    #[test]
+    fn what_has_no_data_is_left_out() {
+        let (_root, folder) = flown(0, 0);
+        assert_eq!(write(&folder, &facts(3)).unwrap(), Vec::<PathBuf>::new());
+        let (_root, folder) = flown(1, 10);
+        let written = write(&folder, &facts(1)).unwrap();
+        assert!(written.len() == 2 && written[1].ends_with("speed.svg"), "{written:?}");
+    }
+
+    #[test]
+    fn a_missing_trace_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+        let error = write(&folder, &facts(3)).unwrap_err().to_string();
+        assert!(error.contains("trace.csv"), "{error}");
+    }
+}

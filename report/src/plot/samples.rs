@@ -1,0 +1,141 @@
+//! A trace, thinned to what an eye can see.
+
+use super::curves::Band;
+use crate::close::Sweep;
+use crate::error::ReportError;
+use crate::trace::{self, TraceRow};
+use skein_protocol::Vec2;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Time between two samples, s.
+const EVERY_S: f64 = 0.1;
+/// Most points of all tracks together: a plot of a thousand drones must still open.
+const MAX_POINTS: usize = 60_000;
+
+/// What the plots show.
+#[derive(Default)]
+pub(super) struct Samples {
+    /// Time, and the least separation since the last sample, m: no short dip is lost.
+    pub separation: Vec<(f64, f64)>,
+    /// Of the drones' speeds, m/s.
+    pub speed: Vec<Band>,
+    /// Of the distances of all pairs, m.
+    pub distance: Vec<Band>,
+    /// By drone.
+    pub tracks: BTreeMap<usize, Track>,
+    /// Time of the last tick, s.
+    pub end_s: f64,
+}
+
+/// One drone's way.
+#[derive(Default)]
+pub(super) struct Track {
+    /// Where it was, m; the first and the last point are exact.
+    pub points: Vec<Vec2>,
+    /// The last group it was in.
+    pub group: String,
+    /// When it was last seen, s.
+    pub last_s: f64,
+    /// Where it was then, m.
+    pub last_m: Vec2,
+}
+
+impl Samples {
+    /// Reads trace.csv.
+    pub fn read(path: &Path) -> Result<Self, ReportError> {
+        let (mut samples, mut sweep, mut bin) = (Self::default(), Sweep::default(), None);
+        trace::read(path, |rows| {
+            let now = (rows[0].t_s / EVERY_S + 1e-6).floor() as i64;
+            samples.take(rows, bin.replace(now) != Some(now), &mut sweep);
+        })?;
+        for track in samples.tracks.values_mut() {
+            track.points.push(track.last_m);
+        }
+        samples.thin();
+        Ok(samples)
+    }
+
+    fn take(&mut self, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
+        let t_s = rows[0].t_s;
+        self.end_s = t_s;
+        let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
+        match (sweep.least_distance(&positions), self.separation.last_mut()) {
+            (Some(least), Some(last)) if !sampled => last.1 = last.1.min(least),
+            (Some(least), _) => self.separation.push((t_s, least)),
+            (None, _) => {}
+        }
+        for row in rows {
+            let track = self.tracks.entry(row.drone).or_default();
+            (track.last_s, track.last_m) = (t_s, row.position_m);
+            if sampled || track.points.is_empty() {
+                track.points.push(row.position_m);
+            }
+            if track.group != row.group {
+                track.group.clone_from(&row.group);
+            }
+        }
+        if sampled {
+            self.speed.extend(band(t_s, rows.iter().map(|row| row.velocity_mps.norm())));
+            let pair = |i: usize| positions[..i].iter().map(move |other| (i, other));
+            let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
+            self.distance.extend(band(t_s, distances));
+        }
+    }
+
+    fn thin(&mut self) {
+        let points: usize = self.tracks.values().map(|track| track.points.len()).sum();
+        let step = points.div_ceil(MAX_POINTS).max(1);
+        for track in self.tracks.values_mut() {
+            let last = track.points.len() - 1;
+            let mut place = 0;
+            track.points.retain(|_| {
+                place += 1;
+                (place - 1) % step == 0 || place - 1 == last
+            });
+        }
+    }
+}
+
+/// Mean and standard deviation; `None` of nothing.
+fn band(t_s: f64, values: impl Iterator<Item = f64>) -> Option<Band> {
+    let (mut count, mut mean, mut squares) = (0.0, 0.0, 0.0);
+    for value in values {
+        count += 1.0;
+        let off = value - mean;
+        mean += off / count;
+        squares += off * (value - mean);
+    }
+    (count > 0.0).then(|| Band { t_s, mean, deviation: f64::sqrt(squares / count) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dip_between_samples_is_kept_and_tracks_end_where_they_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trace.csv");
+        let header = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n";
+        let line = |tick: u32, drone, x: f64, v: f64, group| {
+            format!("{},{drone},{x},0,{v},0,{group},,0\n", f64::from(tick) * 0.02)
+        };
+        let mut csv = header.to_owned();
+        for tick in 1..=13 {
+            csv += &line(tick, 0, 0.0, 3.0, if tick < 9 { "N" } else { "N1" });
+            if tick < 9 {
+                csv += &line(tick, 4, if tick == 7 { 30.0 } else { 40.0 }, 5.0, "N");
+            }
+        }
+        std::fs::write(&path, csv).unwrap();
+        let samples = Samples::read(&path).unwrap();
+        let least: Vec<f64> = samples.separation.iter().map(|&(_, m)| m).collect();
+        assert_eq!(least, [40.0, 30.0]);
+        let (mean, deviation) = (samples.speed[0].mean, samples.speed[0].deviation);
+        assert_eq!((samples.speed.len(), mean, deviation), (3, 4.0, 1.0));
+        assert_eq!((samples.distance.len(), samples.distance[0].mean), (2, 40.0));
+        let tracks: Vec<_> = samples.tracks.iter().map(|(&id, t)| (id, t.group.as_str(), t.last_s)).collect();
+        assert_eq!(tracks, [(0, "N1", 0.26), (4, "N", 0.16)]);
+    }
+}

@@ -1,0 +1,213 @@
+//! How each obstacle set was passed: by which routes, in which groups, under whose plan.
+
+use crate::facts::{ObstacleSet, RunFacts};
+use crate::summary::{Stage, StageGroup};
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, PHASE_AVOID, Plan};
+use skein_protocol::record::{DroneRow, ROW_QUEUED};
+use skein_protocol::{DroneId, GroupId, Message, PlanStamp};
+use std::collections::BTreeMap;
+
+/// All stages of a mission.
+pub(crate) struct Stages {
+    stages: Vec<Progress>,
+    plans: BTreeMap<PlanStamp, AvoidPlan>,
+    leaders: BTreeMap<(PlanStamp, u32), DroneId>,
+}
+
+struct Progress {
+    set: ObstacleSet,
+    detected_s: Option<f64>,
+    passed_s: Option<f64>,
+    /// For each drone, how it flies the set, or flew it when it passed the gate.
+    flown: Vec<Option<Flown>>,
+    /// For each drone, whether it is past the gate.
+    beyond: Vec<bool>,
+}
+
+#[derive(Clone, Copy)]
+struct Flown {
+    stamp: PlanStamp,
+    group: GroupId,
+    route: u16,
+    leader: Option<DroneId>,
+}
+
+/// A plan to go around a set, as first said.
+struct AvoidPlan {
+    group: GroupId,
+    obstacles: Vec<u32>,
+    routes: u32,
+    candidates: u32,
+    made_s: f64,
+    predicted_s: Option<f64>,
+}
+
+impl Stages {
+    pub fn new(facts: &RunFacts) -> Self {
+        let drones = facts.drones as usize;
+        let stage = |set| Progress {
+            set,
+            detected_s: None,
+            passed_s: None,
+            flown: vec![None; drones],
+            beyond: vec![false; drones],
+        };
+        Self { stages: facts.sets().into_iter().map(stage).collect(), plans: BTreeMap::new(), leaders: BTreeMap::new() }
+    }
+
+    /// A living drone senses the set for the first time. Whether it is the first set that anybody senses.
+    pub fn detected(&mut self, stage: u32, t_s: f64) -> bool {
+        let first = self.stages.iter().all(|stage| stage.detected_s.is_none());
+        let known = self.stages.get_mut(stage as usize);
+        known.is_some_and(|stage| stage.detected_s.replace(stage.detected_s.unwrap_or(t_s)).is_none()) && first
+    }
+
+    /// The last living drone is past the set.
+    pub fn passed(&mut self, stage: u32, t_s: f64) {
+        if let Some(stage) = self.stages.get_mut(stage as usize) {
+            stage.passed_s.get_or_insert(t_s);
+        }
+    }
+
+    /// Whether every set is passed; true without obstacles.
+    pub fn all_passed(&self) -> bool {
+        self.stages.iter().all(|stage| stage.passed_s.is_some())
+    }
+
+    /// Whether there is anything to pass.
+    pub fn any(&self) -> bool {
+        !self.stages.is_empty()
+    }
+
+    /// Learns the plans said in a tick.
+    pub fn hear(&mut self, frames: &[AirFrame]) {
+        let planned = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
+        for frame in frames.iter().filter(planned) {
+            match Message::decode(&frame.frame) {
+                Ok(Message::Plan(plan)) if plan.phase == PHASE_AVOID => {
+                    self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
+                }
+                Ok(Message::Assignment(Assignment { id, drone, leader, .. })) => {
+                    self.leaders.insert((id, drone.0), leader);
+                }
+                // Frames of other kinds, and those that no receiver could read.
+                _ => {}
+            }
+        }
+    }
+
+    /// Takes the rows of a tick: until a drone is past the gate, what it obeys may change.
+    pub fn take(&mut self, rows: &[DroneRow]) {
+        for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
+            let queued = row.flags & ROW_QUEUED != 0 && row.route != NO_ROUTE;
+            let plan = self.plans.get(&row.obeyed).filter(|_| queued);
+            let ahead = self.stages.iter_mut().filter(|stage| stage.beyond.get(drone) == Some(&false));
+            for stage in ahead {
+                if plan.is_some_and(|plan| plan.obstacles.iter().any(|id| stage.set.obstacles.contains(id))) {
+                    let (stamp, group, route) = (row.obeyed, row.group, row.route);
+                    stage.flown[drone] = Some(Flown { stamp, group, route, leader: row.leader() });
+                }
+                stage.beyond[drone] = row.position_m[0] >= stage.set.gate_x_m;
+            }
+        }
+    }
+
+    /// The stages of the summary.
+    pub fn finish(self) -> Vec<Stage> {
+        self.stages.iter().map(|stage| self.summary(stage)).collect()
+    }
+
+    fn summary(&self, stage: &Progress) -> Stage {
+        let plans = self.last_plans(stage);
+        let routes = plans.iter().map(|plan| plan.routes).max();
+        let split = routes.map(|routes| stage.split(routes));
+        let predicted = plans.iter().filter_map(|plan| Some(plan.made_s + plan.predicted_s?)).max_by(f64::total_cmp);
+        Stage {
+            obstacles: stage.set.obstacles.clone(),
+            detected_s: stage.detected_s,
+            passed_s: stage.passed_s,
+            pass_time_s: stage.passed_s.zip(stage.detected_s).map(|(passed, detected)| passed - detected),
+            routes,
+            split_left_right: split.as_deref().and_then(left_right),
+            split,
+            predicted_s: predicted.zip(stage.detected_s).map(|(instant, detected)| instant - detected),
+            candidates_rehearsed: plans.iter().map(|plan| plan.candidates).max(),
+            groups: stage.detected_s.map(|_| self.groups(stage)),
+        }
+    }
+
+    /// The last plan for each group, of those under which drones flew the set.
+    fn last_plans(&self, stage: &Progress) -> Vec<&AvoidPlan> {
+        let mut last: BTreeMap<GroupId, &AvoidPlan> = BTreeMap::new();
+        for plan in stage.flown.iter().flatten().filter_map(|flown| self.plans.get(&flown.stamp)) {
+            let newest = last.entry(plan.group).or_insert(plan);
+            if plan.made_s > newest.made_s {
+                *newest = plan;
+            }
+        }
+        last.into_values().collect()
+    }
+
+    fn groups(&self, stage: &Progress) -> Vec<StageGroup> {
+        let mut groups: BTreeMap<(GroupId, u16), Vec<u32>> = BTreeMap::new();
+        for (drone, flown) in stage.passed_by() {
+            groups.entry((flown.group, flown.route)).or_default().push(drone);
+        }
+        let group = |((group, route), drones): (_, Vec<u32>)| {
+            let leader = self.leader(stage, &drones);
+            StageGroup { name: GroupId::to_string(&group), route, leader, drones }
+        };
+        groups.into_iter().map(group).collect()
+    }
+
+    /// Who led these drones: as their newest assignment says, else the claimant they obeyed, if it is one of them.
+    fn leader(&self, stage: &Progress, drones: &[u32]) -> Option<u32> {
+        let flown = |drone: &u32| stage.flown[*drone as usize];
+        let newest = drones.iter().max_by_key(|&drone| flown(drone).map(|flown| flown.stamp))?;
+        let assigned = self.leaders.get(&(flown(newest)?.stamp, *newest)).copied().filter(|&id| id != DroneId::NONE);
+        let obeyed = flown(newest)?.leader.filter(|leader| drones.contains(&leader.0));
+        assigned.or(obeyed).map(|leader| leader.0)
+    }
+}
+
+impl Progress {
+    /// Those who are past the gate, and how they flew.
+    fn passed_by(&self) -> impl Iterator<Item = (u32, Flown)> + '_ {
+        let flown = self.flown.iter().zip(&self.beyond).zip(0..);
+        flown.filter_map(|((flown, beyond), drone)| flown.filter(|_| *beyond).map(|flown| (drone, flown)))
+    }
+
+    fn split(&self, routes: u32) -> Vec<u32> {
+        let mut split = vec![0; routes as usize];
+        for (_, flown) in self.passed_by() {
+            if let Some(count) = split.get_mut(usize::from(flown.route)) {
+                *count += 1;
+            }
+        }
+        split
+    }
+}
+
+impl AvoidPlan {
+    fn new(plan: &Plan) -> Self {
+        let count = (plan.set_count as usize).min(MAX_SET);
+        Self {
+            group: plan.group,
+            obstacles: plan.set[..count].iter().map(|id| id.0).collect(),
+            // A route is a u16: a frame that announces more is rubbish.
+            routes: plan.routes.min(u32::from(NO_ROUTE)),
+            candidates: plan.candidates,
+            made_s: plan.stamp.secs(),
+            predicted_s: plan.predicted_s.is_finite().then_some(plan.predicted_s),
+        }
+    }
+}
+
+fn left_right(split: &[u32]) -> Option<[u32; 2]> {
+    match split {
+        [right, left] => Some([*left, *right]),
+        _ => None,
+    }
+}

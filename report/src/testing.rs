@@ -1,0 +1,34 @@
+//! Hand-made runs for this crate's tests.
+
+use crate::facts::{MissionEnd, RunFacts};
+use skein_protocol::formation::Shape;
+use skein_protocol::record::{DroneRow, ROW_ALIVE};
+
+/// A run of `drones` in the nested V, without obstacles.
+pub(crate) fn facts(drones: u32) -> RunFacts {
+    RunFacts {
+        scenario: "s1".to_owned(),
+        strategy: "congestion-aware".to_owned(),
+        seed: 7,
+        runtime: "processes".to_owned(),
+        clock: "lockstep".to_owned(),
+        drones,
+        dt_s: 0.02,
+        shape: Shape::NestedV,
+        spacing_m: 35.0,
+        end: MissionEnd::Hold,
+        course_y_m: 0.0,
+        safe_distance_m: 25.0,
+        clearance_m: 15.0,
+        planning_distance_m: 20.0,
+        arrival_error_m: 0.8,
+        radio_range_m: None,
+        landing_s: None,
+        obstacles: Vec::new(),
+    }
+}
+
+/// A living drone that stands.
+pub(crate) fn row(x_m: f64, y_m: f64) -> DroneRow {
+    DroneRow { position_m: [x_m, y_m], flags: ROW_ALIVE, ..DroneRow::default() }
+}

@@ -1,0 +1,395 @@
+//! A small mission made by hand: four drones fly straight past a disc, the leader of one group dies, another leads on.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use skein_protocol::formation::Shape;
+use skein_protocol::frame::AirFrame;
+use skein_protocol::payload::{Assignment, MAX_SET, PHASE_AVOID, PHASE_REFORM, Plan};
+use skein_protocol::record::{
+    DroneRow, FaultKind, Happening, Outcome, ROW_ALIVE, ROW_LEADS, ROW_QUEUED, RecordHead, RecordSink, RecordView,
+    RunEvent, Spread, Totals, ViolationKind,
+};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_report::{Ending, Manifest, MissionEnd, Recorder, RunFacts, RunFolder, Summary};
+
+/// Last tick; a tick is 0.1 s.
+const LAST: u64 = 99;
+/// Drone 3, who leads N1, dies here; drone 0 leads on from `LED`.
+const DEATH: u64 = 60;
+const LED: u64 = 65;
+const BALLOT: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
+const STAMP: PlanStamp = PlanStamp { ballot: BALLOT, epoch: 2 };
+
+fn facts() -> RunFacts {
+    RunFacts {
+        scenario: "disc".to_owned(),
+        strategy: "congestion-aware".to_owned(),
+        seed: u64::MAX,
+        runtime: "processes".to_owned(),
+        clock: "lockstep".to_owned(),
+        drones: 4,
+        dt_s: 0.1,
+        shape: Shape::Line,
+        spacing_m: 30.0,
+        end: MissionEnd::Hold,
+        course_y_m: 0.0,
+        safe_distance_m: 25.0,
+        clearance_m: 4.0,
+        planning_distance_m: 20.0,
+        arrival_error_m: 0.8,
+        radio_range_m: None,
+        landing_s: None,
+        obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
+    }
+}
+
+fn ending() -> Ending {
+    Ending { fallback: Outcome::Aborted, wall_s: Some(4.0), startup_s: Some(0.25) }
+}
+
+/// Abreast at y = 45, 75, 15, 105, 10 m/s; 100 W.
+fn row(tick: u64, drone: usize) -> DroneRow {
+    let dead = drone == 3 && tick >= DEATH;
+    let t_s = (if dead { DEATH } else { tick + 1 }) as f64 * 0.1;
+    let leads = if tick < DEATH { drone == 3 } else { drone == 0 && tick >= LED };
+    let phase = if tick < 50 { PHASE_AVOID } else { PHASE_REFORM };
+    let (group, route) = if drone == 2 { (GroupId::ALL.child(2), 0) } else { (GroupId::ALL.child(1), 1) };
+    let queued = (10..50).contains(&tick);
+    let flags = [(!dead, ROW_ALIVE), (leads && !dead, ROW_LEADS), (queued, ROW_QUEUED)];
+    DroneRow {
+        position_m: [10.0 * t_s, [45.0, 75.0, 15.0, 105.0][drone]],
+        velocity_mps: if dead { [0.0; 2] } else { [10.0, 0.0] },
+        energy_j: 100.0 * t_s,
+        obeyed: if tick < 10 { PlanStamp::default() } else { STAMP },
+        group,
+        flags: flags.into_iter().filter(|flag| flag.0).map(|flag| flag.1).sum(),
+        phase: if tick < 10 { 0 } else { phase },
+        heard: 3,
+        step_ns: 20_000,
+        route,
+        rank: drone as u16,
+        ..DroneRow::default()
+    }
+}
+
+fn frames(tick: u64) -> Vec<AirFrame> {
+    let mut set = [ObstacleId(0); MAX_SET];
+    set[0] = ObstacleId(0);
+    let plan = Plan {
+        stamp: SimTime::from_secs(tick as f64 * 0.1),
+        id: STAMP,
+        group: GroupId::ALL,
+        phase: PHASE_AVOID,
+        members: 4,
+        anchor_m: [0.0; 2],
+        anchor_mps: [10.0, 0.0],
+        anchor_stop_x_m: f64::INFINITY,
+        predicted_s: 3.5,
+        candidates: 5,
+        routes: 2,
+        set_count: 1,
+        set,
+        reserved: 0,
+    };
+    let part = |drone: u32| Assignment {
+        id: STAMP,
+        group: GroupId::ALL.child(1),
+        drone: DroneId(drone),
+        leader: DroneId(if drone == 2 { 2 } else { 3 }),
+        slot_m: [0.0; 2],
+        arrival_s: 1.0,
+        route: 1,
+        rank: 0,
+        reserved: 0,
+    };
+    let said = [Message::Plan(plan)].into_iter().chain((0..4).map(|drone| Message::Assignment(part(drone))));
+    let air = |(sequence, message): (usize, Message)| AirFrame {
+        tick,
+        source: DroneId(0),
+        sequence: sequence as u32,
+        position_m: [0.0; 2],
+        frame: message.encode(),
+    };
+    // Said when it is made, and repeated with another time stamp.
+    if tick == 11 || tick == 20 { said.enumerate().map(air).collect() } else { Vec::new() }
+}
+
+fn events(tick: u64) -> Vec<RunEvent> {
+    let at = |t_s: f64, what| RunEvent { t_s, what };
+    let leader =
+        |leader, leads| Happening::Leader { group: "N1".to_owned(), ballot: BALLOT, leader: DroneId(leader), leads };
+    match tick {
+        9 => vec![at(1.0, leader(3, true))],
+        10 => vec![at(
+            1.0,
+            Happening::Detected { stage: 0, drone: DroneId(2), obstacle: ObstacleId(0), distance_m: 30.0 },
+        )],
+        30 => vec![at(
+            3.1,
+            Happening::Violation {
+                kind: ViolationKind::Separation,
+                drones: vec![DroneId(0), DroneId(1)],
+                value_m: 24.0,
+            },
+        )],
+        49 => vec![at(5.0, Happening::Passed { stage: 0 })],
+        DEATH => vec![
+            at(6.1, leader(3, false)),
+            at(
+                6.1,
+                Happening::Fault {
+                    kind: FaultKind::Kill,
+                    target: DroneId(3),
+                    scheduled: false,
+                    detail: "signal 9".to_owned(),
+                },
+            ),
+        ],
+        LED => vec![at(6.6, leader(0, true))],
+        _ => Vec::new(),
+    }
+}
+
+fn end() -> RunEvent {
+    let totals = Totals {
+        sent: 10,
+        delivered: 30,
+        dropped: [1, 2, 3, 4, 5, 6],
+        delay_s: Spread { mean: Some(0.02), p50: Some(0.02), p99: Some(0.04), max: Some(0.04) },
+        rejected_commands: 1,
+        wall_s: 2.0,
+        ..Totals::default()
+    };
+    RunEvent {
+        t_s: 10.0,
+        what: Happening::End { outcome: Outcome::Reached, reason: "goal met".to_owned(), totals: Box::new(totals) },
+    }
+}
+
+fn give(recorder: &mut Recorder, tick: u64, frames: &[AirFrame], events: &[RunEvent]) -> Result<(), String> {
+    let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick, drone)).collect();
+    let lines: Vec<String> = events.iter().map(|event| serde_json::to_string(event).unwrap() + "\n").collect();
+    let head = RecordHead {
+        tick,
+        now: SimTime((tick as i64 + 1) * 100_000_000),
+        rows: 4,
+        frames: frames.len() as u32,
+        events_len: lines.concat().len() as u32,
+        lost: 0,
+        digest: 0xabc + tick,
+    };
+    recorder.take(RecordView { head: &head, rows: &rows, frames, events: lines.concat().as_bytes() })
+}
+
+fn fly(recorder: &mut Recorder, ticks: std::ops::RangeInclusive<u64>) {
+    for tick in ticks {
+        give(recorder, tick, &frames(tick), &events(tick)).unwrap();
+    }
+}
+
+fn flown() -> Summary {
+    let mut recorder = Recorder::in_memory(facts());
+    fly(&mut recorder, 0..=LAST);
+    // The last word comes with the last tick's rows once more.
+    give(&mut recorder, LAST, &[], &[end()]).unwrap();
+    let (summary, files) = recorder.finish(&ending());
+    files.unwrap();
+    summary
+}
+
+fn near(value: Option<f64>, wanted: f64) -> bool {
+    value.is_some_and(|value| (value - wanted).abs() < 1e-6)
+}
+
+#[test]
+fn stages_tell_what_was_flown() {
+    let summary = flown();
+    let stage = &summary.stages[0];
+    assert_eq!((summary.stages.len(), stage.detected_s, stage.passed_s), (1, Some(1.0), Some(5.0)));
+    assert!(near(stage.pass_time_s, 4.0));
+    assert_eq!((stage.routes, stage.candidates_rehearsed), (Some(2), Some(5)));
+    assert_eq!((stage.split.as_deref(), stage.split_left_right), (Some(&[1, 3][..]), Some([3, 1])));
+    // Made at 1.1 s for 3.5 s: 3.6 s after the detection, whatever is repeated later.
+    assert!(near(stage.predicted_s, 3.6), "{:?}", stage.predicted_s);
+    let groups = serde_json::to_value(&stage.groups).unwrap();
+    let wanted = serde_json::json!([
+        {"name": "N1", "route": 1, "drones": [0, 1, 3], "leader": 3},
+        {"name": "N2", "route": 0, "drones": [2], "leader": 2},
+    ]);
+    assert_eq!(groups, wanted);
+}
+
+#[test]
+fn the_living_count_and_the_dead_are_bodies() {
+    let summary = flown();
+    assert_eq!((summary.ticks, summary.sim_s, summary.mission_s), (100, 10.0, 10.0));
+    assert!(near(Some(summary.energy_j.total), 3000.0), "{:?}", summary.energy_j);
+    assert!(near(summary.energy_j.until_passed, 2000.0) && near(summary.energy_j.detection_to_pass, 1600.0));
+    assert!(near(summary.energy_j.per_drone.last().copied(), 600.0));
+    assert_eq!((summary.reform_start_s, summary.reform_end_s), (Some(5.1), Some(5.1)));
+    assert!(near(summary.formation_error_m, 0.0) && near(summary.formation_rmse_m, 0.0));
+    assert!(near(summary.mean_distance_error_m, 0.0));
+    assert!(near(summary.min_separation_m, 30.0) && near(summary.min_clearance_m, 5.0), "{summary:?}");
+    assert_eq!(summary.metrics.order, Some(1.0));
+    assert_eq!((summary.metrics.safety, summary.metrics.union), (Some(1.0), Some(1.0)));
+}
+
+#[test]
+fn leadership_and_faults_are_told() {
+    let summary = flown();
+    assert_eq!((summary.elections, summary.leaders.len(), summary.split_brain_s), (1, 2, 0.0));
+    assert!(summary.failover_s.len() == 1 && near(summary.failover_s[0], 0.5), "{:?}", summary.failover_s);
+    let fault = serde_json::to_value(&summary.faults).unwrap();
+    let wanted =
+        serde_json::json!([{"t_s": 6.1, "kind": "kill", "target": 3, "scheduled": false, "detail": "signal 9"}]);
+    assert_eq!(fault, wanted);
+    let violations = serde_json::to_value(&summary.violations).unwrap();
+    let wanted = serde_json::json!([{"t_s": 3.1, "kind": "separation", "drones": [0, 1], "value_m": 24.0}]);
+    assert_eq!(violations, wanted);
+}
+
+#[test]
+fn the_worlds_last_word_counts() {
+    let summary = flown();
+    assert_eq!((summary.outcome, summary.reason.as_deref()), (Outcome::Reached, Some("goal met")));
+    assert_eq!(
+        (summary.wall_s, summary.realtime_factor, summary.agent_steps_per_s),
+        (Some(2.0), Some(5.0), Some(200.0))
+    );
+    assert_eq!((summary.messages.sent, summary.messages.delivered, summary.rejected_commands), (10, 30, Some(1)));
+    assert_eq!((summary.messages.dropped.burst, summary.messages.dropped.malformed), (Some(2), Some(6)));
+    assert_eq!((summary.messages.delay_s.p99, summary.messages.age_s.max), (Some(0.04), None));
+    assert_eq!(summary.digest.as_deref(), Some("0000000000000b1f"));
+    let steps = summary.step_us.unwrap();
+    assert!(steps.max == 20.0 && (steps.p50 - 20.0).abs() < 0.7);
+}
+
+#[test]
+fn without_a_last_word_the_record_is_counted() {
+    let mut recorder = Recorder::in_memory(RunFacts { runtime: "inline".to_owned(), ..facts() });
+    fly(&mut recorder, 0..=29);
+    let (summary, _) = recorder.finish(&ending());
+    assert_eq!((summary.outcome, summary.mission_s, summary.wall_s), (Outcome::Aborted, 3.0, Some(4.0)));
+    assert_eq!((summary.messages.sent, summary.messages.delivered), (10, 360));
+    assert_eq!((summary.messages.dropped.loss, summary.step_us), (None, None));
+    let stage = &summary.stages[0];
+    assert_eq!((stage.passed_s, stage.split.as_deref(), stage.routes), (None, Some(&[0, 0][..]), Some(2)));
+    assert_eq!((summary.energy_j.until_passed, summary.reform_start_s), (None, None));
+}
+
+#[test]
+fn a_run_that_never_began_is_a_summary_too() {
+    let (summary, _) = Recorder::in_memory(facts()).finish(&Ending { wall_s: None, ..ending() });
+    assert_eq!((summary.ticks, summary.digest, summary.formation_error_m), (0, None, None));
+    assert_eq!((summary.realtime_factor, summary.stages[0].groups.as_ref()), (None, None));
+}
+
+#[test]
+fn a_broken_record_is_refused_with_its_tick() {
+    let mut recorder = Recorder::in_memory(RunFacts { drones: 5, ..facts() });
+    let error = give(&mut recorder, 3, &[], &[]).unwrap_err();
+    assert_eq!(error, "tick 3: a record of 4 rows, expected 5");
+    let head = RecordHead { tick: 7, ..RecordHead::default() };
+    let record = RecordView { head: &head, rows: &[], frames: &[], events: b"{\"t_s\": 1}\n" };
+    let error = recorder.take(record).unwrap_err();
+    assert!(error.starts_with("tick 7: not an event"), "{error}");
+}
+
+/// Every key that the summary promises, `a.b` for a key of an object, `a[].b` for one of its entries.
+const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s ticks sim_s realtime_factor \
+    agent_steps_per_s wall_s startup_s report_s outcome stages[].detected_s stages[].passed_s stages[].pass_time_s \
+    stages[].routes stages[].split stages[].split_left_right stages[].predicted_s stages[].candidates_rehearsed \
+    stages[].groups[].name stages[].groups[].route stages[].groups[].drones stages[].groups[].leader mission_s \
+    reform_start_s reform_end_s formation_error_m formation_rmse_m mean_distance_error_m energy_j.total \
+    energy_j.until_passed energy_j.detection_to_pass energy_j.per_drone min_separation_m min_clearance_m \
+    violations[].t_s violations[].kind violations[].drones violations[].value_m metrics.order metrics.safety \
+    metrics.union metrics.connectivity elections leaders[].t_s leaders[].group leaders[].ballot.round \
+    leaders[].ballot.incarnation leaders[].ballot.claimant leaders[].leader split_brain_s failover_s messages.sent \
+    messages.delivered messages.dropped.loss messages.dropped.burst messages.dropped.range messages.dropped.partition \
+    messages.dropped.deaf messages.dropped.malformed messages.delay_s.mean messages.delay_s.p50 messages.delay_s.p99 \
+    messages.delay_s.max messages.age_s.mean messages.age_s.p50 messages.age_s.p99 messages.age_s.max faults[].t_s \
+    faults[].kind faults[].target faults[].scheduled deadline_misses step_us.p50 step_us.p99 step_us.max digest";
+
+#[test]
+fn every_promised_key_is_there_and_in_the_schema() {
+    let summary = serde_json::to_value(flown()).unwrap();
+    let schema = skein_report::schema_summary();
+    for key in KEYS.split_whitespace() {
+        let pointer = format!("/{}", key.replace("[]", "/0").replace('.', "/"));
+        assert!(summary.pointer(&pointer).is_some(), "no key {key}");
+        let name = key.rsplit(['.', ']']).next().unwrap();
+        assert!(schema.to_string().contains(&format!("\"{name}\":")), "{name} is not in the schema");
+    }
+    let required = schema["required"].as_array().unwrap();
+    assert_eq!(required.len(), summary.as_object().unwrap().len(), "null is not absent: every key is required");
+    assert_eq!(summary["seed"], u64::MAX);
+    let back: Summary = serde_json::from_value(summary).unwrap();
+    assert_eq!(back, flown());
+}
+
+#[test]
+fn the_runs_folder_holds_trace_and_events() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = RunFolder::numbered(root.path(), "disc").unwrap();
+    folder.write_manifest(&Manifest::new(facts(), serde_json::json!({}), "0.1.0", None)).unwrap();
+    let mut recorder = Recorder::in_folder(facts(), &folder).unwrap();
+    fly(&mut recorder, 0..=LAST);
+    give(&mut recorder, LAST, &[], &[end()]).unwrap();
+    let (summary, files) = recorder.finish(&ending());
+    files.unwrap();
+    folder.write_summary(&summary).unwrap();
+    assert_eq!(folder.read_summary().unwrap(), summary);
+    let read = |name| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let trace = read("trace.csv");
+    assert_eq!(trace.lines().count() as u64, 1 + 4 * (LAST + 1) - (LAST + 1 - DEATH));
+    assert_eq!(trace.lines().nth(1), Some("0.1,0,1.0,45.0,10.0,0.0,N1,,10.0"));
+    assert!(trace.ends_with("10.0,2,100.0,15.0,10.0,0.0,N2,0,1000.0\n"), "{trace}");
+    let events = read("events.jsonl");
+    let parsed: Vec<RunEvent> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((parsed.len(), parsed.last()), (8, Some(&end())));
+    let manifest = RunFolder::open(folder.path()).unwrap().read_manifest().unwrap();
+    assert_eq!(skein_report::plot::write(&folder, &manifest.facts).unwrap().len(), 4);
+}
+
+#[test]
+fn files_that_cannot_be_written_do_not_cost_the_summary() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = RunFolder::numbered(root.path(), "disc").unwrap();
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("trace.csv")).unwrap();
+    let mut recorder = Recorder::in_folder(facts(), &folder).unwrap();
+    fly(&mut recorder, 0..=LAST);
+    let (summary, files) = recorder.finish(&ending());
+    assert_eq!(summary.ticks, 100);
+    let error = files.unwrap_err().to_string();
+    assert!(error.contains("trace.csv"), "{error}");
+}
+
+#[test]
+fn people_read_the_verdict_first() {
+    let text = skein_report::text::summary(&flown(), false);
+    let wanted = "\
+reached after 10.00 s: the formation is closed and every invariant held
+
+  run           disc: 4 drones, congestion-aware, seed 18446744073709551615, processes, lockstep
+  stage 1       passed in 4.00 s from 1.00 s; 3 left, 1 right; forecast 3.60 s, 5 groupings rehearsed
+                N1    route 1: drones 0 1 3, led by 3
+                N2    route 0: drones 2, led by 2
+  reformation   from 5.10 s, closed at 5.10 s
+  formation     largest slot error 0.00 m, root mean square 0.00 m
+  energy        3.000 kJ; 2.000 kJ until passed, 1.600 kJ of it since detection
+  distances     at least: drones 30.00 m, obstacles 5.00 m
+  leading       1 election; led again after a leader's death: 0.50 s
+  messages      10 sent, 30 heard, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
+5 dropped (deaf), 6 dropped (malformed); delay 20 ms, p99 40 ms
+  fault         6.10 s: kill, drone 3 (not scheduled; signal 9)
+  speed         2.00 s of wall time, 5.0 × real time; a drone's step 20 µs, p99 20 µs
+  digest        0000000000000b1f
+";
+    assert_eq!(text, wanted);
+    let broken = Summary { outcome: Outcome::Unsafe, reason: None, ..flown() };
+    let text = skein_report::text::summary(&broken, true);
+    let wanted = "\x1b[1;31munsafe\x1b[0m after 10.00 s: an invariant was broken, first at 3.10 s: separation \
+        of drones 0 1, 24.00 m\n";
+    assert!(text.starts_with(wanted), "{text}");
+}

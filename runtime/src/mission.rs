@@ -1,0 +1,138 @@
+//! From a scenario to what flies it: the world, the drones' parameters, their cockpits. Both runtimes start here.
+
+use crate::RuntimeError;
+use crate::cockpit::Cockpit;
+use skein_agent::danger::Braking;
+use skein_agent::guidance::GuidanceParams;
+use skein_agent::safety::SafetyParams;
+use skein_agent::{PilotParams, SwarmPilot};
+use skein_leader::election::ElectionParams;
+use skein_leader::planner::{Destination, PlannerParams, Strategy};
+use skein_leader::routes::RouteParams;
+use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_scenario::{End, Failsafe, Scenario, Strategy as StrategyKey};
+use skein_world::{World, WorldParams};
+
+/// Neighbours are sensed within this many safe distances.
+const RANGING: f64 = 2.0;
+
+/// Number of drones in a scenario.
+#[must_use]
+pub fn drones(scenario: &Scenario) -> usize {
+    scenario.formation.drones as usize
+}
+
+/// Length of a tick, ns.
+#[must_use]
+pub fn dt_ns(scenario: &Scenario) -> i64 {
+    (scenario.time.dt_s * 1e9).round() as i64
+}
+
+/// The world at the start of the mission: every drone at its start, at nominal speed along the flight.
+///
+/// # Errors
+/// [`RuntimeError::Scenario`], [`RuntimeError::Shape`]; none for a scenario that was checked.
+pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
+    let drone = &scenario.drone;
+    let params = WorldParams {
+        dt_ns: dt_ns(scenario),
+        timeout_s: scenario.time.timeout_s,
+        speed_max_mps: drone.speed_max_mps,
+        acceleration_max_mps2: drone.acceleration_max_mps2,
+        safe_distance_m: drone.safe_distance_m,
+        clearance_m: scenario.avoidance.clearance_m,
+        planning_distance_m: scenario.avoidance.planning_distance_m,
+        detection_range_m: scenario.sensors.detection_range_m,
+        ranging_m: scenario.sensors.ranging.then_some(RANGING * drone.safe_distance_m),
+        failsafe: match scenario.faults.failsafe {
+            Failsafe::Hover => skein_world::Failsafe::Hover,
+            Failsafe::Land => skein_world::Failsafe::Land,
+        },
+        end: match destination(scenario) {
+            Destination::Hold { stop_x_m } => skein_world::End::Hold { stop_x_m },
+            Destination::Goal { front_m } => skein_world::End::Goal { front_m },
+        },
+        arrival_error_m: scenario.mission.arrival_error_m,
+        shape: scenario.formation_shape(),
+        spacing_m: scenario.formation.spacing_m,
+    };
+    let velocity = Vec2::new(drone.speed_mps, 0.0);
+    let starts: Vec<(Vec2, Vec2)> = scenario.starts().into_iter().map(|position| (position, velocity)).collect();
+    let shapes = scenario.shapes().map_err(RuntimeError::Shape)?;
+    Ok(World::new(params, &starts, &shapes)?)
+}
+
+/// Where the mission ends, as the drones know it.
+#[must_use]
+pub fn destination(scenario: &Scenario) -> Destination {
+    match (scenario.mission.end, scenario.mission.goal_m) {
+        (End::Goal, Some(goal)) => Destination::Goal { front_m: goal.into() },
+        _ => Destination::Hold { stop_x_m: scenario.mission.stop_x_m },
+    }
+}
+
+/// What one drone is told before it starts.
+#[must_use]
+pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotParams {
+    let (drone, protocol) = (&scenario.drone, &scenario.protocol);
+    PilotParams {
+        me,
+        drones: scenario.formation.drones,
+        incarnation,
+        start,
+        dt_s: scenario.time.dt_s,
+        guidance: GuidanceParams {
+            speed_mps: drone.speed_mps,
+            speed_change_mps: drone.speed_change_mps,
+            reform_speed_max_mps: scenario.mission.reform_speed_max_mps,
+            acceleration_max_mps2: drone.acceleration_max_mps2,
+        },
+        safety: SafetyParams {
+            safe_distance_m: drone.safe_distance_m,
+            clearance_m: scenario.avoidance.clearance_m,
+            acceleration_max_mps2: drone.acceleration_max_mps2,
+            gain_per_s: scenario.guidance.filter_gain_per_s,
+            margin: scenario.guidance.filter_margin,
+            reaction_time_s: drone.reaction_time_s,
+        },
+        braking: Braking { drag_coefficient: drone.drag_coefficient, reaction_time_s: drone.reaction_time_s },
+        planner: planner(scenario),
+        election: ElectionParams {
+            heartbeat_period_s: protocol.heartbeat_period_s,
+            leader_timeout_s: protocol.leader_timeout_s,
+            wait_s: protocol.election_wait_s,
+        },
+        velocity_gain_per_s: scenario.guidance.velocity_gain_per_s,
+        precedence_share: scenario.guidance.precedence_share,
+        beacon_period_s: protocol.beacon_period_s,
+        repeat_period_s: protocol.repeat_period_s,
+        peer_timeout_s: protocol.peer_timeout_s,
+    }
+}
+
+fn planner(scenario: &Scenario) -> PlannerParams {
+    let (drone, avoidance) = (&scenario.drone, &scenario.avoidance);
+    PlannerParams {
+        strategy: match scenario.strategy {
+            StrategyKey::CongestionAware | StrategyKey::CongestionAwarePaper => Strategy::CongestionAware,
+            StrategyKey::ShortestPath => Strategy::ShortestPath,
+            StrategyKey::Fixed { left, right } => Strategy::Fixed { left: left as usize, right: right as usize },
+        },
+        speed_mps: drone.speed_mps,
+        headway_s: avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps,
+        routes: RouteParams { clearance_m: avoidance.clearance_m, planning_distance_m: avoidance.planning_distance_m },
+        shape: scenario.formation_shape(),
+        spacing_m: scenario.formation.spacing_m,
+        safe_distance_m: drone.safe_distance_m,
+        course_y_m: scenario.formation.start_m[1],
+        destination: destination(scenario),
+        debounce_s: scenario.protocol.debounce_s,
+    }
+}
+
+/// One drone with the paper's pilot, ready for the tick that begins at `start`.
+#[must_use]
+pub fn cockpit(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
+    let pilot = SwarmPilot::new(pilot_params(scenario, me, incarnation, start));
+    Cockpit::new(me, scenario.time.dt_s, scenario.radio(), Box::new(pilot))
+}

@@ -1,0 +1,207 @@
+//! The launcher's part of a run in processes: it makes the domain, starts the world and the drones, records, and looks
+//! after them until the last one has ended.
+
+use crate::children::{Children, Role};
+use crate::drone_process::scenario_path;
+use crate::world_process::DISMISSED;
+use crate::{Clock, RunEnd, RuntimeError, mission};
+use skein_bus::{
+    Control, ControlSpec, Domain, OrderKind, PinMode, RecordRole, RecordSubscriber, Services, WaitMode, WorldState,
+    allowed_cores, raise_file_limit,
+};
+use skein_protocol::DroneId;
+use skein_protocol::record::{RecordSink, RecordView};
+use skein_scenario::Scenario;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// How a run in processes is started.
+pub struct Launch<'a> {
+    /// What is flown.
+    pub scenario: &'a Scenario,
+    /// What paces it.
+    pub clock: Clock,
+    /// Whether processes keep to one core each.
+    pub pin: PinMode,
+    /// How they wait for each other.
+    pub wait: WaitMode,
+    /// The executable that knows the roles `world` and `drone`.
+    pub executable: PathBuf,
+    /// Told who is there, once all are ready and before the first tick.
+    pub on_ready: &'a mut dyn FnMut(&[ProcessInfo]) -> Result<(), String>,
+    /// Asked about once a millisecond whether to stop: it gives the signal's number.
+    pub interrupted: &'a mut dyn FnMut() -> Option<i32>,
+}
+
+/// A process of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProcessInfo {
+    /// `launcher`, `world` or `drone`.
+    pub role: &'static str,
+    /// The drone's number; `None` for the others.
+    pub id: Option<u32>,
+    /// Its process id.
+    pub pid: u32,
+}
+
+/// Processes that are not ready after this were kept from it: the base, and more for each drone.
+const START_LIMIT: Duration = Duration::from_secs(20);
+const START_LIMIT_PER_DRONE: Duration = Duration::from_millis(100);
+/// How long processes may take to end by themselves.
+const END_LIMIT: Duration = Duration::from_secs(2);
+/// Between two looks at records, orders and signals; a death is noticed at once.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Flies a mission, a process each for the world and every drone, and hands each tick's record to `sink`.
+///
+/// # Errors
+/// [`RuntimeError`] if it could not be started. What goes wrong in flight stands in [`RunEnd::failure`].
+pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, RuntimeError> {
+    let started = Instant::now();
+    raise_file_limit()?;
+    let drones = mission::drones(launch.scenario);
+    let domain = Domain::create(&launch.scenario.name)?;
+    let cores = match launch.pin {
+        PinMode::Auto => allowed_cores()?.min(drones + 1),
+        PinMode::Off => 1,
+    };
+    let control = Control::create(ControlSpec { drones, cores, wait: launch.wait })?;
+    let services = Services::create(&domain, drones, "launcher")?;
+    let record = services.record_subscriber(RecordRole::Recorder)?;
+    let path = scenario_path(domain.path());
+    let json = serde_json::to_vec(launch.scenario).map_err(|error| RuntimeError::Process(error.to_string()))?;
+    std::fs::write(&path, json).map_err(RuntimeError::system(format!("writing {}", path.display())))?;
+    let mut supervisor = Supervisor {
+        children: Children::new(&launch, &domain, &control),
+        end: RunEnd::default(),
+        control,
+        record,
+        sink,
+        launch,
+    };
+    supervisor.start(drones)?;
+    supervisor.end.startup_s = started.elapsed().as_secs_f64();
+    supervisor.watch();
+    supervisor.wind_up();
+    Ok(supervisor.end)
+}
+
+struct Supervisor<'l, 's> {
+    launch: Launch<'l>,
+    control: Control,
+    record: RecordSubscriber,
+    sink: &'s mut dyn RecordSink,
+    children: Children,
+    end: RunEnd,
+}
+
+impl Supervisor<'_, '_> {
+    /// Starts everybody, waits until all are ready, tells who is there, and lets the world begin.
+    fn start(&mut self, drones: usize) -> Result<(), RuntimeError> {
+        self.children.spawn(Role::World, self.launch.clock)?;
+        for id in 0..drones as u32 {
+            self.children.spawn(Role::Drone { id: DroneId(id), incarnation: 1, first_tick: 0 }, self.launch.clock)?;
+        }
+        let limit = Instant::now() + START_LIMIT + START_LIMIT_PER_DRONE * drones as u32;
+        let mut ready = 0;
+        while ready < drones || self.control.world_state() == WorldState::Starting {
+            if let Some((role, how)) = self.children.wait_any(LOOK).into_iter().next() {
+                return Err(RuntimeError::Process(format!("{role} ended before the first tick: {how}")));
+            }
+            if let Some(signal) = (self.launch.interrupted)() {
+                self.end.signal = Some(signal);
+                return Ok(());
+            }
+            if Instant::now() > limit {
+                let waited = limit.elapsed() + START_LIMIT;
+                return Err(RuntimeError::Process(format!(
+                    "only {ready} of {drones} drones were ready after {waited:.0?}"
+                )));
+            }
+            while ready < drones && self.control.ready(ready).is_some() {
+                ready += 1;
+            }
+        }
+        self.record.connect()?;
+        let mut processes = vec![ProcessInfo { role: "launcher", id: None, pid: std::process::id() }];
+        processes.extend(self.children.list());
+        (self.launch.on_ready)(&processes).map_err(RuntimeError::Process)?;
+        self.control.give_go();
+        Ok(())
+    }
+
+    /// Records and looks after everybody until the world has ended, or does not end although it was asked to.
+    fn watch(&mut self) {
+        let mut asked = None;
+        loop {
+            for (role, how) in self.children.wait_any(LOOK) {
+                match role {
+                    Role::Drone { id, .. } => self.control.mark_dead(id.index()),
+                    Role::World => {
+                        self.take_records();
+                        self.end.failure = Some(format!("the world ended in flight: {how}"));
+                        return;
+                    }
+                }
+            }
+            let finished = self.control.world_state() == WorldState::Finished;
+            self.take_records();
+            if finished {
+                self.control.request_stop(DISMISSED);
+                return;
+            }
+            self.carry_out_orders();
+            if let (None, Some(signal)) = (self.end.signal, (self.launch.interrupted)()) {
+                self.end.signal = Some(signal);
+            }
+            if let (None, Some(signal)) = (asked, self.end.signal) {
+                self.control.request_stop(signal.unsigned_abs());
+                asked = Some(Instant::now());
+            }
+            if asked.is_some_and(|since| since.elapsed() > END_LIMIT) {
+                return;
+            }
+        }
+    }
+
+    fn take_records(&mut self) {
+        loop {
+            let sample = match self.record.receive() {
+                Ok(Some(sample)) => sample,
+                Ok(None) => return,
+                Err(error) => {
+                    self.end.sink_error.get_or_insert_with(|| error.to_string());
+                    return;
+                }
+            };
+            if self.end.sink_error.is_none() {
+                let taken = RecordView::parse(sample.bytes()).map_err(|error| error.to_string());
+                self.end.sink_error = taken.and_then(|view| self.sink.take(view)).err();
+            }
+        }
+    }
+
+    fn carry_out_orders(&mut self) {
+        if let Some(order) = self.control.next_order(Duration::ZERO) {
+            let done = order.kind == OrderKind::Kill && self.children.kill_drone(order.drone);
+            if done {
+                self.control.mark_dead(order.drone.index());
+            }
+            self.control.answer_order(u32::from(done));
+        }
+    }
+
+    /// Nobody outlives the run: drones end by themselves when the mission is closed, or are killed.
+    fn wind_up(&mut self) {
+        self.control.close();
+        if self.end.failure.is_some() {
+            self.children.kill_all();
+        }
+        let limit = Instant::now() + END_LIMIT;
+        while self.children.any() && Instant::now() < limit {
+            self.children.wait_any(LOOK);
+        }
+        self.children.kill_all();
+        self.take_records();
+    }
+}

@@ -1,0 +1,173 @@
+//! The world's process: it opens a tick, waits for the drones, moves the truth on, tells the recorder.
+
+use crate::drone_process::ChildArgs;
+use crate::{Clock, RuntimeError, clock::Pacer, mission};
+use skein_bus::{
+    Answer, Control, Domain, DownlinkPublisher, Order, OrderKind, Patience, RecordPolicy, RecordPublisher,
+    SHARD_DRONES, Services, UplinkSubscriber, WorldState, pin_to_core, raise_file_limit, shards,
+};
+use skein_protocol::DroneId;
+use skein_protocol::record::FaultKind;
+use skein_protocol::slot::LinkStats;
+use skein_world::World;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A drone that does not answer for so long in lockstep is hung.
+const HUNG: Duration = Duration::from_secs(5);
+/// Stop request of a launcher that has read the whole record.
+pub(crate) const DISMISSED: u32 = u32::MAX;
+const DISMISSAL_LOOK: Duration = Duration::from_millis(1);
+/// The supervisor kills within this.
+const KILL_LIMIT: Duration = Duration::from_secs(5);
+
+/// Runs the world of a swarm until its mission ends.
+///
+/// # Errors
+/// [`RuntimeError`]; the launcher sees the process end.
+pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
+    args.bind_to_parent()?;
+    raise_file_limit()?;
+    let scenario = args.scenario()?;
+    let control = Arc::new(Control::attach(args.control)?);
+    // The barrier expects the world on core 0.
+    pin_to_core(0, args.pin)?;
+    let drones = mission::drones(&scenario);
+    let domain = Domain::join(&args.domain)?;
+    let services = Services::open(&domain, drones, "world")?;
+    let policy = match clock {
+        // The launcher records, and this process dies with it.
+        Clock::Lockstep => RecordPolicy::Wait(Box::new(|| true)),
+        Clock::Realtime { .. } => RecordPolicy::Drop,
+    };
+    let mut air = Air {
+        down: services.downlink_publisher()?,
+        up: (0..shards(drones)).map(|shard| services.uplink_subscriber(shard)).collect::<Result<_, _>>()?,
+        record: services.record_publisher(policy)?,
+        control,
+        world: mission::world(&scenario)?,
+        answers: vec![Answer::Pending; drones],
+        taken: vec![0; drones],
+        due: vec![0; drones],
+    };
+    air.control.set_world_state(WorldState::Ready);
+    if air.control.wait_go(|| true) {
+        air.control.set_world_state(WorldState::Flying);
+        air.connect()?;
+        air.fly(clock, scenario.time.dt_s)?;
+    }
+    air.control.set_world_state(WorldState::Finished);
+    // A publisher takes its last samples with it: wait until the launcher has read them. This process dies with it.
+    while air.control.stop_requested() != Some(DISMISSED) {
+        std::thread::sleep(DISMISSAL_LOOK);
+    }
+    Ok(())
+}
+
+/// The world and its ports.
+struct Air {
+    down: DownlinkPublisher,
+    up: Vec<UplinkSubscriber>,
+    record: RecordPublisher,
+    control: Arc<Control>,
+    world: World,
+    answers: Vec<Answer>,
+    /// Frames taken from each drone so far, and frames it has announced.
+    taken: Vec<u64>,
+    due: Vec<u64>,
+}
+
+impl Air {
+    /// Joins all ports now rather than in the midst of the first tick.
+    fn connect(&self) -> Result<(), RuntimeError> {
+        self.down.connect()?;
+        self.up.iter().try_for_each(UplinkSubscriber::connect)?;
+        Ok(self.record.connect()?)
+    }
+
+    fn fly(&mut self, clock: Clock, dt_s: f64) -> Result<(), RuntimeError> {
+        let opened = Instant::now();
+        let mut pacer = match clock {
+            Clock::Lockstep => None,
+            Clock::Realtime { speed } => Some(Pacer::new(dt_s, speed)),
+        };
+        while self.world.ended().is_none() {
+            self.tick(pacer.as_mut())?;
+            if let Some(signal) = self.control.stop_requested() {
+                self.world.abort(&format!("interrupted by signal {signal}"));
+            } else if let Some(pacer) = &pacer {
+                pacer.pause();
+            }
+        }
+        let wall_s = opened.elapsed().as_secs_f64();
+        let mut stats = LinkStats::default();
+        (0..self.answers.len()).for_each(|drone| stats.merge(&self.control.stats(drone)));
+        self.world.finish(&stats, wall_s);
+        self.tell()?;
+        self.control.close();
+        Ok(())
+    }
+
+    fn tick(&mut self, pacer: Option<&mut Pacer>) -> Result<(), RuntimeError> {
+        let tick = self.world.tick();
+        let down = self.world.downlink();
+        self.down.send(tick, down.byte_len(), |bytes| down.write_to(bytes))?;
+        self.control.open_tick(tick)?;
+        let patience = pacer.map_or(Patience::For(HUNG), |pacer| Patience::Until(pacer.open()));
+        self.control.wait_done(tick, patience, &mut self.answers)?;
+        self.take_answers()?;
+        self.take_frames()?;
+        self.world.advance();
+        self.tell()
+    }
+
+    /// Slots of those that answered; those that are gone; those that are late.
+    fn take_answers(&mut self) -> Result<(), RuntimeError> {
+        for drone in 0..self.answers.len() {
+            let id = DroneId(drone as u32);
+            match self.answers[drone] {
+                Answer::Done => {
+                    let slot = self.control.slot(drone);
+                    self.due[drone] = slot.frames_total;
+                    self.world.take_slot(id, &slot);
+                }
+                Answer::Late => self.world.hold(id),
+                Answer::Dead => self.world.mark_dead(id, FaultKind::Kill, false, "its process ended unasked"),
+                Answer::Hung => {
+                    let order = Order { kind: OrderKind::Kill, drone: id, tick: self.world.tick() };
+                    self.control.give_order(order, KILL_LIMIT)?;
+                    self.world.mark_dead(id, FaultKind::Hung, false, "it did not answer for 5 s and was killed");
+                }
+                Answer::Pending | Answer::Absent => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Drains each shard of just what its drones have announced: every further call would look through all of them.
+    fn take_frames(&mut self) -> Result<(), RuntimeError> {
+        for (shard, port) in self.up.iter().enumerate() {
+            let first = shard * SHARD_DRONES;
+            let drones = first..(first + SHARD_DRONES).min(self.due.len());
+            let mut missing = drones.clone().any(|drone| self.taken[drone] < self.due[drone]);
+            while missing {
+                let Some(sample) = port.receive()? else {
+                    return Err(RuntimeError::Process(format!("frames announced on uplink {shard} did not arrive")));
+                };
+                let source = DroneId(sample.header().source);
+                if let Some(taken) = self.taken.get_mut(source.index()) {
+                    *taken += sample.frames().len() as u64;
+                    self.world.take_frames(source, sample.frames());
+                }
+                missing = drones.clone().any(|drone| self.taken[drone] < self.due[drone]);
+            }
+        }
+        Ok(())
+    }
+
+    fn tell(&self) -> Result<(), RuntimeError> {
+        let record = self.world.record();
+        self.record.send(record.head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,246 @@
+//! A tree of values against the generated schema: keys, types, words and ranges, each error with its place.
+
+use crate::node::{Data, Entry, Node, Place, number};
+use crate::reference::{self, unit};
+use crate::strategy::Strategy;
+use serde_json::{Map, Value as Json};
+use std::collections::BTreeMap;
+
+/// An error whose place is not yet put into words.
+#[derive(Debug)]
+pub(crate) struct Complaint {
+    pub place: Place,
+    pub key: String,
+    pub message: String,
+}
+
+/// Checks the tree; gives it back as JSON that holds what was written and nothing else.
+pub(crate) fn check(root: &Node, schema: &Json) -> (Json, Vec<Complaint>) {
+    // The first of several keys of one name is the one to guess.
+    let leaves = reference::keys_of(schema).into_iter().rev().map(|k| (k.leaf().to_owned(), k.path)).collect();
+    let mut walk = Walk { leaves, complaints: Vec::new() };
+    let json = walk.value(root, schema, "");
+    (json, walk.complaints)
+}
+
+struct Walk {
+    /// Every key's own name, and where it stands.
+    leaves: BTreeMap<String, String>,
+    complaints: Vec<Complaint>,
+}
+
+impl Walk {
+    fn complain(&mut self, place: &Place, key: &str, message: String) -> Json {
+        self.complaints.push(Complaint { place: place.clone(), key: key.to_owned(), message });
+        Json::Null
+    }
+
+    fn wrong(&mut self, node: &Node, key: &str, expected: &str) -> Json {
+        self.complain(&node.place, key, format!("found {}, expected {expected}", node.found()))
+    }
+
+    fn value(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
+        let schema = present(schema);
+        if let Some(words) = words(schema) {
+            return self.word(node, &words, key);
+        }
+        if let Some(variants) = schema["oneOf"].as_array() {
+            return self.variant(node, variants, key);
+        }
+        match kind(schema) {
+            "object" => self.table(node, schema, key),
+            "array" => self.list(node, schema, key),
+            "integer" => self.integer(node, schema, key),
+            "number" => self.number(node, schema, key),
+            "boolean" => match node.data {
+                Data::Bool(flag) => flag.into(),
+                _ => self.wrong(node, key, "true or false"),
+            },
+            _ if schema["format"] == "strategy" => self.strategy(node, key),
+            _ => match &node.data {
+                Data::Text(text) => text.clone().into(),
+                _ => self.wrong(node, key, "a string"),
+            },
+        }
+    }
+
+    fn word(&mut self, node: &Node, words: &[&str], key: &str) -> Json {
+        let list = words.iter().map(|w| format!("{w:?}")).collect::<Vec<_>>().join(", ");
+        match &node.data {
+            Data::Text(text) if words.contains(&text.as_str()) => text.clone().into(),
+            Data::Text(text) => {
+                let hint = did_you_mean(text, words.iter().copied());
+                self.wrong(node, key, &format!("one of {list}{hint}"))
+            }
+            _ => self.wrong(node, key, &format!("one of {list}")),
+        }
+    }
+
+    fn strategy(&mut self, node: &Node, key: &str) -> Json {
+        let Data::Text(text) = &node.data else { return self.wrong(node, key, "a strategy's name") };
+        match text.parse::<Strategy>() {
+            Ok(strategy) => strategy.to_string().into(),
+            Err(error) => {
+                let hint = did_you_mean(text, Strategy::WORDS.iter().map(|(word, _)| *word));
+                self.complain(&node.place, key, format!("{error}{hint}"))
+            }
+        }
+    }
+
+    fn integer(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
+        let expected = || format!("a whole number {}", reference::range(schema));
+        let Data::Integer(integer) = node.data else { return self.wrong(node, key, &expected()) };
+        let limit = |name: &str| schema[name].as_number().and_then(serde_json::Number::as_i128);
+        let above = limit("minimum").is_none_or(|min| integer >= min);
+        let below = limit("maximum").is_none_or(|max| integer <= max);
+        match u64::try_from(integer) {
+            Ok(value) if above && below => value.into(),
+            _ => self.wrong(node, key, &expected()),
+        }
+    }
+
+    fn number(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
+        let value = match node.data {
+            Data::Integer(integer) => integer as f64,
+            Data::Float(float) => float,
+            _ => f64::NAN,
+        };
+        let limit = |name: &str| schema[name].as_f64();
+        let inside = limit("minimum").is_none_or(|min| value >= min)
+            && limit("exclusiveMinimum").is_none_or(|min| value > min)
+            && limit("maximum").is_none_or(|max| value <= max);
+        if value.is_finite() && inside {
+            return value.into();
+        }
+        let unit = unit(key).map(|unit| format!(" ({unit})")).unwrap_or_default();
+        self.wrong(node, key, &format!("a number {}{unit}", reference::range(schema)))
+    }
+
+    fn list(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
+        let Data::List(items) = &node.data else {
+            return self.wrong(node, key, &format!("an array {}", lengths(schema)));
+        };
+        let length = items.len() as u64;
+        let fits = schema["minItems"].as_u64().is_none_or(|min| length >= min)
+            && schema["maxItems"].as_u64().is_none_or(|max| length <= max);
+        if !fits {
+            return self.wrong(node, key, &format!("an array {}", lengths(schema)));
+        }
+        let items = items.iter().enumerate();
+        items.map(|(i, item)| self.value(item, &schema["items"], &join(key, &i.to_string()))).collect()
+    }
+
+    /// One of several tables, told apart by the key that each of them has with a word of its own.
+    fn variant(&mut self, node: &Node, variants: &[Json], key: &str) -> Json {
+        let Data::Table(entries) = &node.data else { return self.wrong(node, key, "a table") };
+        let Some((tag, _)) = variants.first().and_then(tag) else { return Json::Null };
+        let words: Vec<&str> = variants.iter().filter_map(crate::check::tag).map(|(_, word)| word).collect();
+        let Some(entry) = entries.get(tag) else {
+            let list = words.iter().map(|w| format!("{w:?}")).collect::<Vec<_>>().join(", ");
+            return self.complain(&node.place, &join(key, tag), format!("is missing: expected one of {list}"));
+        };
+        let word = self.word(&entry.node, &words, &join(key, tag));
+        let chosen = variants.iter().find(|v| crate::check::tag(v).is_some_and(|(_, w)| word == w));
+        chosen.map_or(Json::Null, |schema| self.table(node, schema, key))
+    }
+
+    fn table(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
+        let Data::Table(entries) = &node.data else { return self.wrong(node, key, "a table") };
+        let empty = Map::new();
+        let properties = schema["properties"].as_object().unwrap_or(&empty);
+        for name in entries.keys().filter(|name| !properties.contains_key(*name)) {
+            self.unknown(name, &entries[name], properties, key);
+        }
+        for name in schema["required"].as_array().into_iter().flatten().filter_map(Json::as_str) {
+            if !entries.contains_key(name) {
+                let what = if kind(&properties[name]) == "object" { "table" } else { "key" };
+                let message = format!("is missing: this {what} is required");
+                self.complain(&node.place, &join(key, name), message);
+            }
+        }
+        let known = properties.iter().filter_map(|(name, schema)| Some((name, schema, entries.get(name)?)));
+        known.map(|(name, schema, entry)| (name.clone(), self.value(&entry.node, schema, &join(key, name)))).collect()
+    }
+
+    fn unknown(&mut self, name: &str, entry: &Entry, properties: &Map<String, Json>, table: &str) {
+        let elsewhere = |leaf: &str| format!("; did you mean `{}`?", self.leaves[leaf]);
+        let hint = match closest(name, properties.keys().map(String::as_str)) {
+            _ if self.leaves.contains_key(name) => elsewhere(name),
+            Some(sibling) => format!("; did you mean `{sibling}`?"),
+            None => closest(name, self.leaves.keys().map(String::as_str)).map(elsewhere).unwrap_or_default(),
+        };
+        let known = properties.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let message = format!("unknown {}, expected one of {known}{hint}", what(&entry.node));
+        self.complain(&entry.key, &join(table, name), message);
+    }
+}
+
+fn what(node: &Node) -> &'static str {
+    match node.data {
+        Data::Table(_) => "table",
+        _ => "key",
+    }
+}
+
+/// The schema of a value that is there: without the alternative `null`.
+pub(crate) fn present(schema: &Json) -> &Json {
+    let options = schema["anyOf"].as_array().map(Vec::as_slice).unwrap_or_default();
+    if options.iter().any(|o| o["type"] == "null") {
+        options.iter().find(|o| o["type"] != "null").unwrap_or(schema)
+    } else {
+        schema
+    }
+}
+
+/// The type of a value that is there.
+pub(crate) fn kind(schema: &Json) -> &str {
+    match &schema["type"] {
+        Json::Array(types) => types.iter().filter_map(Json::as_str).find(|t| *t != "null").unwrap_or_default(),
+        single => single.as_str().unwrap_or_default(),
+    }
+}
+
+/// The words of a schema that allows nothing else.
+pub(crate) fn words(schema: &Json) -> Option<Vec<&str>> {
+    schema["oneOf"].as_array()?.iter().map(|option| option["const"].as_str()).collect()
+}
+
+/// The key by which a variant is told from others, and its word.
+pub(crate) fn tag(variant: &Json) -> Option<(&str, &str)> {
+    let properties = variant["properties"].as_object()?;
+    properties.iter().find_map(|(name, schema)| Some((name.as_str(), schema["const"].as_str()?)))
+}
+
+/// Of how many items an array is.
+pub(crate) fn lengths(schema: &Json) -> String {
+    let items = match kind(&schema["items"]) {
+        "array" => format!("arrays, each {}", lengths(&schema["items"])),
+        "number" => "numbers".to_owned(),
+        _ => "tables".to_owned(),
+    };
+    match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
+        (Some(min), Some(max)) if min == max => format!("of {min} {items}"),
+        (Some(min), Some(max)) => format!("of {min} to {max} {items}"),
+        (_, Some(max)) => format!("of at most {max} {items}"),
+        _ => format!("of {items}"),
+    }
+}
+
+fn join(key: &str, name: &str) -> String {
+    if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") }
+}
+
+fn did_you_mean<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> String {
+    closest(found, words).map(|word| format!("; did you mean `{word}`?")).unwrap_or_default()
+}
+
+/// The most similar word, if any is similar at all.
+fn closest<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let scored = words.map(|word| (strsim::jaro_winkler(found, word), word));
+    scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, word)| word)
+}
+
+/// A quantity as it is shown in a message.
+pub(crate) fn quantity(value: f64, unit: &str) -> String {
+    format!("{} {unit}", number(value))
+}

@@ -1,0 +1,110 @@
+//! Who is too near to whom: points among each other, points and an obstacle. Metres.
+
+use skein_protocol::Vec2;
+use skein_protocol::shape::ConvexShape;
+
+/// The closest of the pairs that are nearer than a limit.
+pub(crate) struct ClosePair {
+    pub pair: (usize, usize),
+    pub distance_m: f64,
+    /// How many pairs are.
+    pub pairs: usize,
+}
+
+/// The closest slot of those nearer to an obstacle than a limit.
+pub(crate) struct CloseSlot {
+    pub slot: usize,
+    /// 0 inside.
+    pub distance_m: f64,
+    /// How many slots are.
+    pub slots: usize,
+}
+
+/// The closest two points, if they are nearer than `limit_m`.
+pub(crate) fn closest_pair(points: &[Vec2], limit_m: f64) -> Option<ClosePair> {
+    // A sweep along the axis on which the points are spread widest, so that ten thousand of them in a line are quick.
+    let (low, high) =
+        points.iter().fold((Vec2::repeat(f64::MAX), Vec2::repeat(f64::MIN)), |(l, h), p| (l.inf(p), h.sup(p)));
+    let axis = usize::from(high.y - low.y > high.x - low.x);
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&a, &b| points[a][axis].total_cmp(&points[b][axis]));
+    let mut close: Option<ClosePair> = None;
+    for (i, &a) in order.iter().enumerate() {
+        for &b in order[i + 1..].iter().take_while(|&&b| points[b][axis] - points[a][axis] < limit_m) {
+            let distance_m = (points[a] - points[b]).norm();
+            if distance_m < limit_m {
+                let found = ClosePair { pair: (a.min(b), a.max(b)), distance_m, pairs: 1 };
+                close = Some(match close {
+                    None => found,
+                    Some(best) => {
+                        let pairs = best.pairs + 1;
+                        let nearer = if best.distance_m <= found.distance_m { best } else { found };
+                        ClosePair { pairs, ..nearer }
+                    }
+                });
+            }
+        }
+    }
+    close
+}
+
+/// The slot closest to the shape, if it is nearer than `limit_m`.
+pub(crate) fn closest_slot(shape: &ConvexShape, slots: &[Vec2], limit_m: f64) -> Option<CloseSlot> {
+    let (low, high) = shape.bounds();
+    let boxed = |p: &Vec2| (low - p).max().max((p - high).max()) < limit_m;
+    let near = slots.iter().enumerate().filter(|(_, p)| boxed(p)).map(|(slot, &p)| (slot, distance(shape, p)));
+    let near: Vec<(usize, f64)> = near.filter(|&(_, d)| d < limit_m).collect();
+    let &(slot, distance_m) = near.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(CloseSlot { slot, distance_m, slots: near.len() })
+}
+
+/// Distance from a point to a shape, 0 inside.
+pub(crate) fn distance(shape: &ConvexShape, point: Vec2) -> f64 {
+    let n = shape.count as usize;
+    let edge = |i: usize| (shape.vertex(i), shape.vertex((i + 1) % n));
+    if n >= 3 && (0..n).map(edge).all(|(a, b)| (b - a).perp(&(point - a)) >= 0.0) {
+        return 0.0;
+    }
+    let to_edge = |(a, b): (Vec2, Vec2)| {
+        let along = (b - a).dot(&(point - a)) / (b - a).norm_squared().max(f64::MIN_POSITIVE);
+        (point - a - (b - a) * along.clamp(0.0, 1.0)).norm()
+    };
+    let outline = (0..n).map(edge).map(to_edge).fold(f64::INFINITY, f64::min);
+    (outline - shape.radius_m).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn distances_to_a_rectangle_and_a_disc() {
+        let v = Vec2::new;
+        let rectangle = ConvexShape::rectangle(v(10.0, 0.0), v(2.0, 5.0), 0.0).unwrap();
+        for (point, wanted) in [(v(10.0, 1.0), 0.0), (v(0.0, 0.0), 8.0), (v(15.0, 9.0), 5.0), (v(10.0, -7.0), 2.0)] {
+            assert!((distance(&rectangle, point) - wanted).abs() < 1e-12, "{point}");
+        }
+        let disc = ConvexShape::circle(v(0.0, 0.0), 3.0).unwrap();
+        assert!((distance(&disc, v(3.0, 4.0)) - 2.0).abs() < 1e-12);
+        assert!(distance(&disc, v(1.0, 1.0)).abs() < 1e-12);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn the_sweep_finds_what_all_pairs_give(
+            points in proptest::collection::vec((-20.0..20.0f64, -40.0..40.0f64), 2..20),
+            limit_m in 0.5..30.0f64,
+        ) {
+            let points: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
+            let pairs = (0..points.len()).flat_map(|a| (a + 1..points.len()).map(move |b| (a, b)));
+            let all: Vec<f64> = pairs.map(|(a, b)| (points[a] - points[b]).norm()).filter(|d| *d < limit_m).collect();
+            let found = closest_pair(&points, limit_m);
+            prop_assert_eq!(found.as_ref().map_or(0, |f| f.pairs), all.len());
+            if let Some(found) = found {
+                prop_assert_eq!(found.distance_m, all.iter().copied().fold(f64::INFINITY, f64::min));
+            }
+        }
+    }
+}

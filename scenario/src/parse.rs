@@ -1,0 +1,194 @@
+//! From text to a checked scenario.
+
+use crate::check::{Complaint, check};
+use crate::error::{Issue, Lines, ScenarioErrors};
+use crate::keys::Scenario;
+use crate::node::{Data, Node, Place};
+use crate::reference::schema;
+use crate::rules::{self, Broken};
+use std::ops::Range;
+use toml::de::DeTable;
+
+/// What a scenario's text is called.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// Its path, for messages.
+    pub name: &'a str,
+    /// The file's name without its ending: the scenario's name where the text gives none. Characters that a name must
+    /// not have become `-`.
+    pub stem: &'a str,
+}
+
+impl Scenario {
+    /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`,
+    /// applied in their order before anything is checked; a value that is no TOML is taken as a string.
+    ///
+    /// # Errors
+    /// [`ScenarioErrors`], each with its place. Errors of TOML's syntax come alone; so do unknown keys, wrong types and
+    /// ranges; rules between keys are checked last.
+    pub fn parse(text: &str, source: Source<'_>, overrides: &[(String, String)]) -> Result<Self, ScenarioErrors> {
+        let text_of = Text::new(text, source, overrides);
+        let (table, errors) = DeTable::parse_recoverable(text);
+        if !errors.is_empty() {
+            let issue = |error: &toml::de::Error| {
+                let place = Place::File(error.span().unwrap_or(0..0));
+                text_of.issue(&place, "", &format!("TOML syntax: {}", error.message()))
+            };
+            return Err(text_of.errors(errors.iter().map(issue).collect()));
+        }
+        let data = Node::from_table(table.get_ref(), &Place::File);
+        let mut root = Node { place: Place::File(0..0), data };
+        let mut issues = Vec::new();
+        for (number, (path, value)) in overrides.iter().enumerate() {
+            if let Err(message) = root.set(path, value, number) {
+                issues.push(text_of.issue(&Place::Set(number), path, &message));
+            }
+        }
+        text_of.finish(&root, issues)
+    }
+
+    /// As [`Scenario::parse`], from bytes that may not be UTF-8.
+    ///
+    /// # Errors
+    /// As [`Scenario::parse`]; the first byte that is not UTF-8 is an error of its own.
+    pub fn parse_bytes(
+        bytes: &[u8],
+        source: Source<'_>,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioErrors> {
+        let error = match std::str::from_utf8(bytes) {
+            Ok(text) => return Self::parse(text, source, overrides),
+            Err(error) => error,
+        };
+        let text = String::from_utf8_lossy(bytes);
+        let at = error.valid_up_to();
+        let found = bytes.get(at).copied().unwrap_or_default();
+        let message = format!("found byte 0x{found:02x}, expected UTF-8 text");
+        let text_of = Text::new(&text, source, overrides);
+        Err(text_of.errors(vec![text_of.issue(&Place::File(at..at), "", &message)]))
+    }
+
+    /// A checked scenario from the JSON that serde makes of one, such as the one in a run's manifest.
+    ///
+    /// # Errors
+    /// As [`Scenario::parse`]; JSON has no places, so every error is at 1:1.
+    pub fn from_json(json: &serde_json::Value, source: Source<'_>) -> Result<Self, ScenarioErrors> {
+        Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
+    }
+}
+
+/// The text and all that is needed to say where in it an error is.
+struct Text<'a> {
+    text: &'a str,
+    lines: Lines<'a>,
+    source: Source<'a>,
+    overrides: &'a [(String, String)],
+}
+
+impl<'a> Text<'a> {
+    fn new(text: &'a str, source: Source<'a>, overrides: &'a [(String, String)]) -> Self {
+        Self { text, lines: Lines::new(text), source, overrides }
+    }
+
+    fn finish(&self, root: &Node, mut issues: Vec<Issue>) -> Result<Scenario, ScenarioErrors> {
+        let (json, complaints) = check(root, &schema());
+        issues.extend(complaints.iter().map(|c: &Complaint| self.issue(&c.place, &c.key, &c.message)));
+        if !issues.is_empty() {
+            return Err(self.errors(issues));
+        }
+        let mut scenario: Scenario = serde_json::from_value(json)
+            .map_err(|error| self.errors(vec![self.issue(&root.place, "", &error.to_string())]))?;
+        issues.extend(self.resolve(root, &mut scenario));
+        if issues.is_empty() {
+            issues.extend(rules::broken(&scenario).iter().map(|broken| self.blame(root, broken)));
+        }
+        if issues.is_empty() { Ok(scenario) } else { Err(self.errors(issues)) }
+    }
+
+    /// Fills in what follows from other keys: the name, and with offsets the number of drones and no shape.
+    fn resolve(&self, root: &Node, scenario: &mut Scenario) -> Vec<Issue> {
+        if root.find("name").is_none() {
+            scenario.name = name_of(self.source.stem);
+        }
+        let mut issues = Vec::new();
+        let formation = &mut scenario.formation;
+        let Some(offsets) = formation.offsets_m.as_ref().map(Vec::len) else { return issues };
+        match root.find("formation.shape") {
+            None => formation.shape = None,
+            Some(node) => {
+                issues.push(self.issue(
+                    &node.place,
+                    "formation.shape",
+                    "expected either this key or offsets_m, not both",
+                ));
+            }
+        }
+        match root.find("formation.drones") {
+            Some(node) if formation.drones as usize != offsets => {
+                let message = format!("found {}, expected {offsets}: the number of offsets_m", formation.drones);
+                issues.push(self.issue(&node.place, "formation.drones", &message));
+            }
+            // The schema limits the offsets to far less than fits.
+            _ => formation.drones = u32::try_from(offsets).unwrap_or(u32::MAX),
+        }
+        issues
+    }
+
+    /// A broken rule is blamed on the first override among its keys, or else on the first key that is written.
+    fn blame(&self, root: &Node, broken: &Broken) -> Issue {
+        let written: Vec<&Node> = broken.keys.iter().filter_map(|key| root.find(key)).collect();
+        let set = written.iter().find(|node| has_override(node));
+        let node = match (set, written.first(), broken.keys.first()) {
+            (Some(node), _, _) | (None, Some(node), _) => *node,
+            (None, None, Some(key)) => root.nearest(key),
+            (None, None, None) => root,
+        };
+        let place = overridden(node).unwrap_or(&node.place);
+        self.issue(place, broken.keys.first().map_or("", String::as_str), &broken.message)
+    }
+
+    fn issue(&self, place: &Place, key: &str, message: &str) -> Issue {
+        let (place, span) = match place {
+            Place::Set(number) => {
+                let (path, value) = &self.overrides[*number];
+                (format!("--set {path}={value}"), None)
+            }
+            Place::File(span) => {
+                let span = self.clamp(span);
+                let (line, column) = self.lines.line_column(span.start);
+                (format!("{}:{line}:{column}", self.source.name), Some(span))
+            }
+        };
+        Issue { place, key: key.to_owned(), message: message.to_owned(), span }
+    }
+
+    fn clamp(&self, span: &Range<usize>) -> Range<usize> {
+        let end = self.text.len();
+        span.start.min(end)..span.end.min(end)
+    }
+
+    fn errors(&self, issues: Vec<Issue>) -> ScenarioErrors {
+        ScenarioErrors::new(self.source.name, self.text, issues)
+    }
+}
+
+fn has_override(node: &Node) -> bool {
+    overridden(node).is_some()
+}
+
+/// The place of the first override in this node.
+fn overridden(node: &Node) -> Option<&Place> {
+    match (&node.place, &node.data) {
+        (place @ Place::Set(_), _) => Some(place),
+        (_, Data::List(items)) => items.iter().find_map(overridden),
+        (_, Data::Table(entries)) => entries.values().find_map(|entry| overridden(&entry.node)),
+        _ => None,
+    }
+}
+
+/// A file's stem as a scenario's name.
+fn name_of(stem: &str) -> String {
+    let name: String = stem.chars().take(64).map(|c| if rules::is_name_char(c) { c } else { '-' }).collect();
+    let name = name.trim_start_matches(['.', '-']);
+    if name.is_empty() { "scenario".to_owned() } else { name.to_owned() }
+}

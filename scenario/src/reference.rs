@@ -1,0 +1,175 @@
+//! The schema, and the key reference that is made from it.
+
+use crate::check::{kind, present, tag, words};
+use crate::keys::Scenario;
+use crate::node::number;
+use serde_json::Value as Json;
+// Writing to a string cannot fail, so its result is dropped below.
+use std::fmt::Write as _;
+
+/// One key of a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Where it stands, such as `time.dt_s`; keys of the list `obstacle` as `obstacle.rectangle.centre_m`.
+    pub path: String,
+    /// Its unit, from the ending of its name; empty if it has none.
+    pub unit: &'static str,
+    /// The values it takes.
+    pub range: String,
+    /// What holds when it is left out; "required" if it must not be.
+    pub default: String,
+    /// What it means.
+    pub meaning: String,
+}
+
+impl Key {
+    /// The key's own name.
+    pub(crate) fn leaf(&self) -> &str {
+        self.path.rsplit('.').next().unwrap_or_default()
+    }
+}
+
+/// The JSON schema of a scenario (draft 2020-12), made from [`Scenario`]'s types.
+#[must_use]
+pub fn schema() -> Json {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
+    settings.into_generator().into_root_schema_for::<Scenario>().into()
+}
+
+/// Every key of a scenario, in the order of its tables.
+#[must_use]
+pub fn keys() -> Vec<Key> {
+    keys_of(&schema())
+}
+
+pub(crate) fn keys_of(schema: &Json) -> Vec<Key> {
+    let mut keys = Vec::new();
+    collect(schema, "", &mut keys);
+    keys
+}
+
+fn collect(table: &Json, path: &str, keys: &mut Vec<Key>) {
+    let properties = table["properties"].as_object().into_iter().flatten();
+    for (name, schema) in properties {
+        let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        let variants = schema["items"]["oneOf"].as_array().into_iter().flatten();
+        let before = keys.len();
+        variants.filter_map(|v| Some((v, tag(v)?.1))).for_each(|(v, word)| collect(v, &format!("{path}.{word}"), keys));
+        match kind(schema) {
+            _ if keys.len() > before => {}
+            "object" => collect(schema, &path, keys),
+            _ => keys.push(key(path, schema, is_required(table, name))),
+        }
+    }
+}
+
+fn is_required(table: &Json, name: &str) -> bool {
+    table["required"].as_array().is_some_and(|required| required.iter().any(|r| r == name))
+}
+
+fn key(path: String, schema: &Json, required: bool) -> Key {
+    let default = match &schema["default"] {
+        _ if required => "required".to_owned(),
+        Json::Null => "absent".to_owned(),
+        Json::String(text) if text.is_empty() => "the file's name".to_owned(),
+        Json::Number(n) => n.as_f64().map(number).unwrap_or_default(),
+        other => other.to_string(),
+    };
+    let mut meaning = if schema["const"].is_string() { "Which shape it has.".to_owned() } else { text(schema) };
+    for word in present(schema)["oneOf"].as_array().into_iter().flatten() {
+        let _ = write!(meaning, " {}: {}", word["const"], text(word));
+    }
+    Key { unit: unit(&path).unwrap_or_default(), range: values(schema), default, meaning, path }
+}
+
+/// The unit that a key's name ends with; indices behind it are skipped.
+pub(crate) fn unit(path: &str) -> Option<&'static str> {
+    const ENDINGS: [(&str, &str); 6] =
+        [("_mps2", "m/s²"), ("_mps", "m/s"), ("_per_s", "1/s"), ("_rad", "rad"), ("_s", "s"), ("_m", "m")];
+    let name = path.rsplit('.').find(|step| step.parse::<usize>().is_err())?;
+    ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
+}
+
+/// The limits of a number, such as `from 0 to 10`.
+pub(crate) fn range(schema: &Json) -> String {
+    let limit = |name: &str| schema[name].as_f64();
+    let max = schema["maximum"].as_i64().map(|max| max.to_string()).or_else(|| limit("maximum").map(number));
+    match (limit("minimum").map(number), limit("exclusiveMinimum").map(number), max) {
+        (_, Some(min), Some(max)) => format!("above {min}, at most {max}"),
+        (Some(min), _, Some(max)) => format!("from {min} to {max}"),
+        _ => "that is finite".to_owned(),
+    }
+}
+
+/// The values a key takes, in words.
+fn values(schema: &Json) -> String {
+    let schema = present(schema);
+    if let Some(words) = words(schema) {
+        return words.iter().map(|w| format!("`\"{w}\"`")).collect::<Vec<_>>().join(", ");
+    }
+    if let Some(word) = schema["const"].as_str() {
+        return format!("`\"{word}\"`");
+    }
+    match kind(schema) {
+        "boolean" => "`true`, `false`".to_owned(),
+        "integer" | "number" => range(schema),
+        "array" => array_values(schema),
+        _ => "a string".to_owned(),
+    }
+}
+
+fn array_values(schema: &Json) -> String {
+    let (min, max) = (&schema["minItems"], &schema["maxItems"]);
+    let count = if min == max { min.to_string() } else { format!("{min} to {max}") };
+    let items = present(&schema["items"]);
+    match kind(items) {
+        "array" => format!("{count} × [{}]", array_values(items)),
+        _ => format!("{count} numbers {}", range(items)),
+    }
+}
+
+/// The key reference as Markdown, for `docs/scenario.md`.
+#[must_use]
+pub fn markdown() -> String {
+    let schema = schema();
+    let mut page = String::from(HEAD);
+    let mut table = None;
+    for key in keys_of(&schema) {
+        let here = key.path.rsplit_once('.').map_or("", |(table, _)| table).to_owned();
+        if table.as_ref() != Some(&here) {
+            heading(&mut page, &schema, &here);
+            table = Some(here);
+        }
+        let Key { unit, range, default, meaning, .. } = &key;
+        let _ = writeln!(page, "| `{}` | {unit} | {range} | {default} | {meaning} |", key.leaf());
+    }
+    page
+}
+
+const HEAD: &str = "# Scenario files
+
+Generated from the types of the crate `scenario`; a test keeps it up to date. `skein schema scenario` prints the same as
+a JSON schema, `skein check FILE` checks a file without flying it.
+
+A scenario is a TOML file. SI units, angles in radians; world frame x = flight direction, y = left. Only the table
+`[formation]` is required, and it may be empty. Any key can be set from the command line: `--set radio.delay_s=0.2`,
+`--set obstacle.0.centre_m=[150,20]`; the value is TOML, or else a string.
+";
+
+fn heading(page: &mut String, schema: &Json, table: &str) {
+    let (title, about) = match table.split_once('.') {
+        None if table.is_empty() => ("At the top".to_owned(), String::new()),
+        None => (format!("`[{table}]`"), text(&schema["properties"][table])),
+        Some((list, word)) => {
+            let variants = schema["properties"][list]["items"]["oneOf"].as_array().into_iter().flatten();
+            let about = variants.filter(|v| tag(v).is_some_and(|(_, w)| w == word)).map(text).collect();
+            (format!("`[[{list}]]` with shape = \"{word}\""), about)
+        }
+    };
+    let about = if about.is_empty() { about } else { format!("{about}\n\n") };
+    let _ = write!(page, "\n## {title}\n\n{about}| key | unit | values | default | meaning |\n|---|---|---|---|---|\n");
+}
+
+fn text(schema: &Json) -> String {
+    schema["description"].as_str().unwrap_or_default().replace('\n', " ")
+}

@@ -1,0 +1,90 @@
+//! What others build from a checked scenario.
+
+use crate::keys::{FormationShape, Scenario};
+use skein_protocol::Vec2;
+use skein_protocol::formation::Shape;
+use skein_protocol::radio::Radio;
+use skein_protocol::shape::{ConvexShape, ShapeError};
+
+/// Standard gravity as the paper has it, m/s².
+const GRAVITY_MPS2: f64 = 9.81;
+
+impl Scenario {
+    /// The shape of the formation.
+    #[must_use]
+    pub fn formation_shape(&self) -> Shape {
+        match (&self.formation.offsets_m, self.formation.shape) {
+            (Some(offsets), _) => Shape::Offsets(offsets.clone()),
+            (None, Some(FormationShape::NestedV) | None) => Shape::NestedV,
+            (None, Some(FormationShape::V)) => Shape::V,
+            (None, Some(FormationShape::Line)) => Shape::Line,
+            (None, Some(FormationShape::Column)) => Shape::Column,
+            (None, Some(FormationShape::Grid)) => Shape::Grid,
+            (None, Some(FormationShape::Circle)) => Shape::Circle,
+        }
+    }
+
+    /// The slots of the formation relative to its anchor, front slot first, m.
+    #[must_use]
+    pub fn slots(&self) -> Vec<Vec2> {
+        self.formation_shape().slots(self.formation.drones as usize, self.formation.spacing_m)
+    }
+
+    /// Where each drone starts, world frame, m: its slot, moved by the jitter that seed and drone alone decide.
+    #[must_use]
+    pub fn starts(&self) -> Vec<Vec2> {
+        let start = Vec2::from(self.formation.start_m);
+        let jitter = |drone: usize| in_unit_disc(self.seed, drone as u64) * self.formation.start_jitter_m;
+        self.slots().into_iter().enumerate().map(|(drone, slot)| start + slot + jitter(drone)).collect()
+    }
+
+    /// The obstacles' shapes, world frame, m, in their order.
+    ///
+    /// # Errors
+    /// [`ShapeError`], never from a scenario that [`Scenario::parse`] or [`Scenario::from_json`] made.
+    pub fn shapes(&self) -> Result<Vec<ConvexShape>, ShapeError> {
+        self.obstacles.iter().map(crate::Obstacle::shape).collect()
+    }
+
+    /// What the air does to frames, keyed by the scenario's seed.
+    #[must_use]
+    pub fn radio(&self) -> Radio {
+        Radio { seed: self.seed, delay_s: self.radio.delay_s, loss: self.radio.loss, range_m: self.radio.range_m }
+    }
+
+    /// The stopping distance at nominal speed, m: E2 = E4 + E3 = v·t_c + v²/(2 g c_d), where g·c_d is no more than the
+    /// drone's greatest acceleration.
+    #[must_use]
+    pub fn stopping_distance_m(&self) -> f64 {
+        let drone = &self.drone;
+        let braking_mps2 = (GRAVITY_MPS2 * drone.drag_coefficient).min(drone.acceleration_max_mps2);
+        drone.speed_mps * drone.reaction_time_s + drone.speed_mps.powi(2) / (2.0 * braking_mps2)
+    }
+
+    /// The scenario as TOML with every key written out; [`Scenario::parse`] makes an equal one of it.
+    ///
+    /// # Errors
+    /// From the serializer, if a number does not fit TOML; never from a checked scenario.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+}
+
+/// A point drawn uniformly from the unit disc, decided by the two keys alone (SplitMix64; rejection, so that no bit
+/// depends on a platform's sine).
+fn in_unit_disc(seed: u64, drone: u64) -> Vec2 {
+    let mut state = mix(mix(seed) ^ drone);
+    let mut draw = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (mix(state) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let points = std::iter::repeat_with(|| Vec2::new(draw(), draw()));
+    points.take(1000).find(|p| p.norm_squared() <= 1.0).unwrap_or_default()
+}
+
+/// The finalizer of SplitMix64.
+fn mix(value: u64) -> u64 {
+    let value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    value ^ (value >> 31)
+}

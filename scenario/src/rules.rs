@@ -1,0 +1,221 @@
+//! What no single key can say: rules between keys, and the geometry of start, goal and obstacles.
+
+use crate::check::quantity;
+use crate::keys::{End, Scenario};
+use crate::near;
+use crate::node::number;
+use crate::strategy::Strategy;
+use skein_protocol::Vec2;
+use skein_protocol::shape::{ConvexShape, ShapeError};
+
+/// Rounding of slots and shapes, m.
+const ROUNDING_M: f64 = 1e-6;
+
+/// A broken rule: the keys it is about, the blamed one first, and what was found and expected.
+pub(crate) struct Broken {
+    pub keys: Vec<String>,
+    pub message: String,
+}
+
+/// All broken rules of a scenario whose keys are fine one by one.
+pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
+    let mut rules = Rules { scenario, broken: Vec::new() };
+    rules.name();
+    rules.speeds();
+    rules.distances();
+    rules.periods();
+    rules.mission();
+    rules.strategy();
+    rules.spacing();
+    rules.obstacles();
+    rules.broken
+}
+
+struct Rules<'a> {
+    scenario: &'a Scenario,
+    broken: Vec<Broken>,
+}
+
+impl Rules<'_> {
+    fn expect(&mut self, holds: bool, keys: &[&str], message: impl FnOnce() -> String) {
+        if !holds {
+            let keys = keys.iter().map(|k| (*k).to_owned()).collect();
+            self.broken.push(Broken { keys, message: message() });
+        }
+    }
+
+    /// The first key's value must not exceed the second's.
+    fn at_most(&mut self, (low_key, low): (&str, f64), (high_key, high): (&str, f64), unit: &str) {
+        let (found, limit) = (quantity(low, unit), quantity(high, unit));
+        self.expect(low <= high, &[low_key, high_key], || {
+            format!("found {found}, expected at most {high_key} = {limit}")
+        });
+    }
+
+    fn name(&mut self) {
+        let name = &self.scenario.name;
+        let first = name.chars().next();
+        let starts = first.is_some_and(|c| c.is_ascii_alphanumeric() || c == '_');
+        let fits = name.len() <= 64 && name.chars().all(is_name_char);
+        self.expect(starts && fits, &["name"], || {
+            format!("found {name:?}, expected 1 to 64 letters, digits, `.`, `_` or `-`, a letter, digit or `_` first")
+        });
+    }
+
+    fn speeds(&mut self) {
+        let (drone, mission) = (&self.scenario.drone, &self.scenario.mission);
+        let (nominal, top) = (("drone.speed_mps", drone.speed_mps), ("drone.speed_max_mps", drone.speed_max_mps));
+        self.at_most(nominal, top, "m/s");
+        self.at_most(("drone.speed_change_mps", drone.speed_change_mps), nominal, "m/s");
+        self.at_most(("mission.reform_speed_max_mps", mission.reform_speed_max_mps), top, "m/s");
+        let margin_m = self.scenario.avoidance.clearance_m.min(drone.safe_distance_m) / 4.0;
+        let step_m = drone.speed_max_mps * self.scenario.time.dt_s;
+        let keys = ["time.dt_s", "drone.speed_max_mps", "avoidance.clearance_m", "drone.safe_distance_m"];
+        self.expect(step_m <= margin_m, &keys, || {
+            let (dt, longest) = (number(self.scenario.time.dt_s), number(margin_m / drone.speed_max_mps));
+            format!(
+                "found {dt} s, in which a drone moves {} at drone.speed_max_mps, expected at most {longest} s: a quarter \
+                 of the smaller of avoidance.clearance_m and drone.safe_distance_m",
+                quantity(step_m, "m")
+            )
+        });
+    }
+
+    fn distances(&mut self) {
+        let Scenario { avoidance, sensors, .. } = self.scenario;
+        let clearance = ("avoidance.clearance_m", avoidance.clearance_m);
+        self.expect(
+            avoidance.planning_distance_m >= clearance.1,
+            &["avoidance.planning_distance_m", clearance.0],
+            || {
+                let (found, least) = (quantity(avoidance.planning_distance_m, "m"), quantity(clearance.1, "m"));
+                format!("found {found}, expected at least avoidance.clearance_m = {least}")
+            },
+        );
+        let stop_m = self.scenario.stopping_distance_m();
+        let least_m = stop_m + avoidance.clearance_m;
+        let keys = [
+            "sensors.detection_range_m",
+            "drone.speed_mps",
+            "drone.drag_coefficient",
+            "drone.reaction_time_s",
+            "drone.acceleration_max_mps2",
+            "avoidance.clearance_m",
+        ];
+        self.expect(sensors.detection_range_m >= least_m - ROUNDING_M, &keys, || {
+            format!(
+                "found {}, expected at least {}: the stopping distance {} at drone.speed_mps plus avoidance.clearance_m",
+                quantity(sensors.detection_range_m, "m"),
+                quantity(least_m, "m"),
+                quantity(stop_m, "m")
+            )
+        });
+    }
+
+    fn periods(&mut self) {
+        let p = &self.scenario.protocol;
+        let heartbeat = ("protocol.heartbeat_period_s", p.heartbeat_period_s);
+        self.at_most(heartbeat, ("protocol.leader_timeout_s", p.leader_timeout_s), "s");
+        let beacon = ("protocol.beacon_period_s", p.beacon_period_s);
+        self.at_most(beacon, ("protocol.peer_timeout_s", p.peer_timeout_s), "s");
+    }
+
+    fn mission(&mut self) {
+        let mission = &self.scenario.mission;
+        self.expect(mission.end != End::Goal || mission.goal_m.is_some(), &["mission.goal_m", "mission.end"], || {
+            "is missing: mission.end = \"goal\" needs the goal's front slot, [x, y]".to_owned()
+        });
+    }
+
+    fn strategy(&mut self) {
+        let Strategy::Fixed { left, right } = self.scenario.strategy else { return };
+        let (sum, drones) = (u64::from(left) + u64::from(right), self.scenario.formation.drones);
+        self.expect(sum == u64::from(drones), &["strategy", "formation.drones"], || {
+            format!("found fixed:{left}/{right}, {sum} drones, expected a sum of formation.drones = {drones}")
+        });
+        let obstacles = self.scenario.obstacles.len();
+        self.expect(obstacles == 1, &["strategy", "obstacle"], || {
+            format!("found fixed:{left}/{right} with {obstacles} obstacles, expected exactly one [[obstacle]]")
+        });
+    }
+
+    fn spacing(&mut self) {
+        let Scenario { formation, drone, .. } = self.scenario;
+        let before = self.broken.len();
+        if formation.offsets_m.is_some() {
+            self.apart("formation.offsets_m", "slots", &self.scenario.slots());
+        } else {
+            let fits = formation.drones < 2 || formation.spacing_m >= drone.safe_distance_m;
+            self.expect(fits, &["formation.spacing_m", "drone.safe_distance_m"], || {
+                let (found, least) = (quantity(formation.spacing_m, "m"), quantity(drone.safe_distance_m, "m"));
+                format!("found {found}, expected at least drone.safe_distance_m = {least}")
+            });
+        }
+        if self.broken.len() == before && formation.start_jitter_m > 0.0 {
+            self.apart("formation.start_jitter_m", "drones", &self.scenario.starts());
+        }
+    }
+
+    fn apart(&mut self, key: &str, what: &str, points: &[Vec2]) {
+        let safe_m = self.scenario.drone.safe_distance_m;
+        let Some(close) = near::closest_pair(points, safe_m - ROUNDING_M) else { return };
+        let (a, b) = close.pair;
+        let others = if close.pairs > 1 { format!(" ({} such pairs)", close.pairs) } else { String::new() };
+        self.expect(false, &[key, "drone.safe_distance_m", "formation.spacing_m", "seed"], || {
+            format!(
+                "{what} {a} and {b} are {} apart at the start{others}, expected at least drone.safe_distance_m = {}",
+                quantity(close.distance_m, "m"),
+                quantity(safe_m, "m")
+            )
+        });
+    }
+
+    fn obstacles(&mut self) {
+        let starts = self.scenario.starts();
+        let goal = self.scenario.mission.goal_m.filter(|_| self.scenario.mission.end == End::Goal);
+        let goals: Option<Vec<Vec2>> =
+            goal.map(|goal| self.scenario.slots().iter().map(|slot| slot + Vec2::from(goal)).collect());
+        for (i, obstacle) in self.scenario.obstacles.iter().enumerate() {
+            match obstacle.shape() {
+                Ok(shape) => {
+                    self.clear_of(i, &shape, ("start", "formation.start_m"), &starts);
+                    if let Some(goals) = &goals {
+                        self.clear_of(i, &shape, ("goal", "mission.goal_m"), goals);
+                    }
+                }
+                Err(ShapeError::NotConvex) => self.expect(false, &[&format!("obstacle.{i}.vertices_m")], || {
+                    "found corners that are not those of a convex polygon in order, expected every corner to turn the \
+                     same way, none of them straight or repeated"
+                        .to_owned()
+                }),
+                Err(error) => self.expect(false, &[&format!("obstacle.{i}")], || error.to_string()),
+            }
+        }
+    }
+
+    /// Slots of the start or of the goal nearer to obstacle `i` than the clearance.
+    fn clear_of(&mut self, i: usize, shape: &ConvexShape, (end, key): (&str, &str), slots: &[Vec2]) {
+        let clearance_m = self.scenario.avoidance.clearance_m;
+        let Some(close) = near::closest_slot(shape, slots, clearance_m - ROUNDING_M) else { return };
+        let at = slots[close.slot];
+        let place = match close.distance_m {
+            d if d > 0.0 => format!("{} from it", quantity(d, "m")),
+            _ => "inside it".to_owned(),
+        };
+        let others = if close.slots > 1 { format!(" ({} such slots)", close.slots) } else { String::new() };
+        let keys = [&format!("obstacle.{i}"), key, "formation.spacing_m", "formation.drones", "avoidance.clearance_m"];
+        self.expect(false, &keys, || {
+            format!(
+                "{end} slot {} at [{:.3}, {:.3}] m is {place}{others}, expected at least avoidance.clearance_m = {}",
+                close.slot,
+                at.x,
+                at.y,
+                quantity(clearance_m, "m")
+            )
+        });
+    }
+}
+
+pub(crate) fn is_name_char(c: char) -> bool {
+    c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-')
+}

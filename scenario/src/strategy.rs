@@ -1,0 +1,103 @@
+//! How drones are shared out to the routes.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// How drones are shared out to the routes round an obstacle set. Written as one word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Strategy {
+    /// `congestion-aware`: the best few splits rehearsed, the best one flown.
+    #[default]
+    CongestionAware,
+    /// `congestion-aware-paper`: the paper's rule to the letter (A3, C1), no rehearsal.
+    CongestionAwarePaper,
+    /// `shortest-path`: every drone takes its own shortest path.
+    ShortestPath,
+    /// `fixed:L/R`: so many drones to each side of the only obstacle.
+    Fixed {
+        /// Drones to the left of it, seen along the flight.
+        left: u32,
+        /// Drones to the right of it.
+        right: u32,
+    },
+}
+
+/// A word that names no strategy.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{found:?} is no strategy: expected {words} or \"fixed:L/R\" (drones to the left and to the right)", words = quoted_words())]
+pub struct StrategyError {
+    found: String,
+}
+
+impl Strategy {
+    /// The words without numbers in them.
+    pub const WORDS: [(&str, Self); 3] = [
+        ("congestion-aware", Self::CongestionAware),
+        ("congestion-aware-paper", Self::CongestionAwarePaper),
+        ("shortest-path", Self::ShortestPath),
+    ];
+}
+
+fn quoted_words() -> String {
+    Strategy::WORDS.map(|(word, _)| format!("{word:?}")).join(", ")
+}
+
+impl FromStr for Strategy {
+    type Err = StrategyError;
+
+    fn from_str(text: &str) -> Result<Self, StrategyError> {
+        if let Some((_, strategy)) = Self::WORDS.iter().find(|(word, _)| *word == text) {
+            return Ok(*strategy);
+        }
+        let count = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten();
+        text.strip_prefix("fixed:")
+            .and_then(|counts| counts.split_once('/'))
+            .and_then(|(left, right)| Some(Self::Fixed { left: count(left)?, right: count(right)? }))
+            .ok_or_else(|| StrategyError { found: text.to_owned() })
+    }
+}
+
+impl fmt::Display for Strategy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CongestionAware => f.write_str("congestion-aware"),
+            Self::CongestionAwarePaper => f.write_str("congestion-aware-paper"),
+            Self::ShortestPath => f.write_str("shortest-path"),
+            Self::Fixed { left, right } => write!(f, "fixed:{left}/{right}"),
+        }
+    }
+}
+
+impl TryFrom<String> for Strategy {
+    type Error = StrategyError;
+
+    fn try_from(text: String) -> Result<Self, StrategyError> {
+        text.parse()
+    }
+}
+
+impl From<Strategy> for String {
+    fn from(strategy: Strategy) -> Self {
+        strategy.to_string()
+    }
+}
+
+impl JsonSchema for Strategy {
+    fn schema_name() -> Cow<'static, str> {
+        "Strategy".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let words = Self::WORDS.map(|(word, _)| word);
+        json_schema!({
+            "type": "string",
+            "format": "strategy",
+            "anyOf": [{ "enum": words }, { "pattern": "^fixed:[0-9]+/[0-9]+$" }],
+        })
+    }
+}

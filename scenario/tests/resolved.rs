@@ -1,0 +1,156 @@
+//! What a valid scenario becomes.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+use proptest::prelude::*;
+use skein_protocol::Vec2;
+use skein_protocol::formation::Shape;
+use skein_scenario::{Failsafe, Scenario, Source, Strategy, schema};
+
+const SOURCE: Source<'_> = Source { name: "s.toml", stem: "my mission" };
+
+fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
+    let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    Scenario::parse(text, SOURCE, &sets).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+#[test]
+fn the_least_scenario_has_the_papers_defaults() {
+    let s = parse("[formation]", &[]);
+    assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::CongestionAware));
+    assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
+    assert!((s.stopping_distance_m() - 10.0).abs() < 1e-9);
+    assert_eq!(s.starts(), Shape::NestedV.slots(8, 35.0));
+    assert_eq!((s.radio().seed, s.radio().range_m, s.faults.failsafe), (1, None, Failsafe::Hover));
+    assert!(s.shapes().unwrap().is_empty());
+}
+
+#[test]
+fn overrides_are_toml_or_else_words() {
+    let text = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [200, 0]\nradius_m = 5";
+    let sets = [
+        ("strategy", "fixed:5/3"),
+        ("obstacle.0.centre_m", "[300, 20]"),
+        ("obstacle.0.centre_m.1", "21"),
+        ("radio.delay_s", "0.2"),
+        ("radio.range_m", "500"),
+        ("faults.failsafe", "\"land\""),
+        ("seed", "9223372036854775807"),
+    ];
+    let s = parse(text, &sets);
+    assert_eq!(s.strategy, Strategy::Fixed { left: 5, right: 3 });
+    assert_eq!(s.shapes().unwrap()[0].centre(), Vec2::new(300.0, 21.0));
+    assert_eq!((s.radio().delay_s, s.radio().range_m, s.radio().seed), (0.2, Some(500.0), i64::MAX as u64));
+    assert_eq!(s.faults.failsafe, Failsafe::Land);
+    assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
+}
+
+#[test]
+fn jitter_is_uniform_in_its_disc_and_keyed_by_seed_and_drone() {
+    let with = |seed: &str| {
+        parse("[formation]\nshape = \"line\"\ndrones = 4000\nspacing_m = 60\nstart_jitter_m = 10", &[("seed", seed)])
+    };
+    let (one, two) = (with("1"), with("2"));
+    let moved = |s: &Scenario| s.starts().iter().zip(s.slots()).map(|(a, b)| (a - b) / 10.0).collect::<Vec<_>>();
+    let (a, b) = (moved(&one), moved(&two));
+    assert_eq!(a, moved(&one));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).norm() > 1e-9), "another seed is another draw");
+    assert!(a.iter().all(|p| p.norm() <= 1.0 + 1e-9));
+    // Uniform in the disc: a quarter within half the radius, ± five standard deviations; the mean at the centre.
+    let inner = a.iter().filter(|p| p.norm() < 0.5).count() as f64;
+    assert!((inner - 1000.0).abs() < 5.0 * (4000.0f64 * 0.25 * 0.75).sqrt(), "{inner}");
+    let mean = a.iter().sum::<Vec2>() / 4000.0;
+    assert!(mean.norm() < 5.0 * 0.5 / 4000.0f64.sqrt() * 2.0f64.sqrt(), "{mean}");
+}
+
+#[test]
+fn polygons_of_either_orientation_and_ellipses() {
+    let shape = |obstacle: &str| parse(&format!("[formation]\n[[obstacle]]\n{obstacle}"), &[]).shapes().unwrap()[0];
+    let left = shape("shape = \"polygon\"\nvertices_m = [[100, 0], [110, 0], [110, 8]]");
+    let right = shape("shape = \"polygon\"\nvertices_m = [[110, 8], [110, 0], [100, 0]]");
+    assert_eq!(left, right);
+    let ellipse = shape("shape = \"ellipse\"\ncentre_m = [200, 5]\nsemi_axes_m = [30, 10]\nrotation_rad = 0.3");
+    assert_eq!(ellipse.count, 16);
+    let (sin, cos) = 0.3f64.sin_cos();
+    for i in 0..360 {
+        let (s, c) = f64::from(i).to_radians().sin_cos();
+        let on = Vec2::new(200.0 + 30.0 * c * cos - 10.0 * s * sin, 5.0 + 30.0 * c * sin + 10.0 * s * cos);
+        let n = 16;
+        let edge = |k: usize| (ellipse.vertex(k), ellipse.vertex((k + 1) % n));
+        assert!((0..n).map(edge).all(|(a, b)| (b - a).perp(&(on - a)) > -1e-9), "the ellipse sticks out at {i}°");
+    }
+    assert!(ellipse.vertices().all(|v| (v - Vec2::new(200.0, 5.0)).norm() < 30.0 * 1.02));
+}
+
+#[test]
+fn offsets_replace_the_shape() {
+    let s = parse("[formation]\noffsets_m = [[0, 0], [-40, 30], [-40, -30]]\nstart_m = [7, 1]", &[]);
+    assert_eq!((s.formation.shape, s.formation.drones), (None, 3));
+    assert_eq!(s.starts()[1], Vec2::new(-33.0, 31.0));
+    assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
+    let json = serde_json::to_value(&s).unwrap();
+    assert_eq!(Scenario::from_json(&json, SOURCE).unwrap(), s);
+}
+
+#[test]
+fn json_by_hand_is_checked_too() {
+    let mut json = serde_json::to_value(parse("[formation]", &[])).unwrap();
+    json["formation"]["drones"] = 1_000_000_000.into();
+    let error = Scenario::from_json(&json, SOURCE).unwrap_err().to_string();
+    assert!(error.contains("formation.drones: found 1000000000, expected a whole number from 1 to 10000"), "{error}");
+}
+
+#[test]
+fn ten_thousand_drones_are_checked_too() {
+    for shape in ["nested-v", "v", "line", "column", "grid", "circle"] {
+        let s = parse(
+            &format!("[formation]\nshape = \"{shape}\"\ndrones = 10000\nstart_jitter_m = 1\nspacing_m = 40"),
+            &[],
+        );
+        assert_eq!(s.starts().len(), 10_000);
+    }
+}
+
+#[test]
+fn limits_get_into_the_schema() {
+    let schema = schema();
+    let at = |path: &str| schema.pointer(path).unwrap_or_else(|| panic!("no {path}"));
+    assert_eq!(at("/properties/formation/properties/drones/maximum"), 10_000);
+    assert_eq!(at("/properties/time/properties/dt_s/minimum"), 1e-4);
+    assert_eq!(at("/properties/time/properties/timeout_s/exclusiveMinimum"), 0.0);
+    assert_eq!(at("/properties/formation/properties/offsets_m/items/items/maximum"), 1e6);
+    assert_eq!(at("/properties/mission/properties/goal_m/items/minimum"), -1e6);
+    assert_eq!(at("/properties/obstacle/items/oneOf/0/properties/half_size_m/items/minimum"), 1e-3);
+    assert_eq!(at("/properties/obstacle/maxItems"), 1024);
+    assert_eq!(at("/required"), &serde_json::json!(["formation"]));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn any_bytes_are_refused_or_read_but_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
+        let mut text = b"[formation]\n".to_vec();
+        text.extend(bytes);
+        let _ = Scenario::parse_bytes(&text, SOURCE, &[]).map_err(|errors| errors.to_string());
+    }
+
+    #[test]
+    fn any_override_is_refused_or_taken_but_never_panics(key in "[a-z_.0-9]{0,20}", value in "[\\[\\]{}=a-z0-9.,\"\n ]{0,20}") {
+        let sets = [(key, value)];
+        let file = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [200, 0]\nradius_m = 5";
+        let _ = Scenario::parse(file, SOURCE, &sets).map_err(|errors| errors.to_string());
+    }
+
+    #[test]
+    fn json_and_toml_keep_every_bit(speed in 5.0..20.0f64, x in -1e6..1e6f64, seed in 0..i64::MAX) {
+        let set = |key: &str, value: String| (key.to_owned(), value);
+        let sets = [
+            set("drone.speed_mps", format!("{speed:?}")),
+            set("formation.start_m", format!("[{x:?}, 0]")),
+            set("seed", seed.to_string()),
+            set("sensors.detection_range_m", "100".to_owned()),
+        ];
+        let s = Scenario::parse("[formation]", SOURCE, &sets).unwrap();
+        prop_assert_eq!(&serde_json::from_str::<Scenario>(&serde_json::to_string(&s).unwrap()).unwrap(), &s);
+        prop_assert_eq!(&Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), &s);
+    }
+}

@@ -1,0 +1,29 @@
+//! Reading a scenario as the command line names it.
+
+use crate::cli::ScenarioArgs;
+use crate::exit::Failure;
+use skein_scenario::{Scenario, Source};
+
+/// A scenario file is refused beyond this, bytes.
+const FILE_LIMIT: u64 = 16 << 20;
+
+/// The checked scenario.
+pub fn scenario(args: &ScenarioArgs) -> Result<Scenario, Failure> {
+    let path = &args.scenario;
+    let name = path.display().to_string();
+    let expected = "expected a scenario file (TOML)";
+    let about = std::fs::metadata(path).map_err(|error| Failure::usage(format!("{name}: {error}; {expected}")))?;
+    if !about.is_file() {
+        let kind = if about.is_dir() { "a directory" } else { "no regular file" };
+        return Err(Failure::usage(format!("{name}: is {kind}; {expected}")));
+    }
+    if about.len() > FILE_LIMIT {
+        return Err(Failure::usage(format!("{name}: has {} bytes; {expected} of {FILE_LIMIT} at most", about.len())));
+    }
+    let bytes = std::fs::read(path).map_err(|error| Failure::usage(format!("{name}: {error}; {expected}")))?;
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut overrides = args.overrides.clone();
+    overrides.extend(args.strategy.iter().map(|value| ("strategy".to_owned(), format!("{value:?}"))));
+    overrides.extend(args.seed.iter().map(|value| ("seed".to_owned(), value.clone())));
+    Scenario::parse_bytes(&bytes, Source { name: &name, stem: &stem }, &overrides).map_err(Failure::diagnostic)
+}

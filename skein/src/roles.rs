@@ -1,0 +1,23 @@
+//! `skein world` and `skein drone`: the process roles, started by `skein run`.
+
+use crate::cli::{self, DroneArgs, WorldArgs};
+use crate::exit::{Exit, Failure};
+use skein_protocol::DroneId;
+use skein_runtime::drone_process::{self, ChildArgs};
+use skein_runtime::world_process;
+
+/// Runs the world.
+pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
+    let run = world_process::run(&child(&args.child), args.clock);
+    run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("world: {error}")))
+}
+
+/// Runs one drone.
+pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
+    let run = drone_process::run(&child(&args.child), DroneId(args.id), args.incarnation, args.first_tick);
+    run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
+}
+
+fn child(args: &cli::ChildArgs) -> ChildArgs {
+    ChildArgs { domain: args.domain.clone(), control: args.control, parent: args.parent, pin: args.pin.into() }
+}

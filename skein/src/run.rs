@@ -1,0 +1,138 @@
+//! `skein run`: flies one mission.
+
+use crate::cli::{RunArgs, RuntimeChoice};
+use crate::exit::{Exit, Failure};
+use crate::facts::facts;
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::progress::Progress;
+use skein_protocol::record::{Outcome, RecordSink};
+use skein_report::{Ending, Manifest, ProcessEntry, Recorder, Role, RunFacts, RunFolder, Summary, plot, text};
+use skein_runtime::supervisor::{self, Launch, ProcessInfo};
+use skein_runtime::{RunEnd, RuntimeError, inline};
+use skein_scenario::Scenario;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::time::Instant;
+
+/// Flies the mission, writes its folder, prints its summary.
+pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
+    let started = Instant::now();
+    let scenario = input::scenario(&args.scenario)?;
+    let runtime = match args.runtime {
+        RuntimeChoice::Processes => "processes",
+        RuntimeChoice::Inline => "inline",
+    };
+    let facts = facts(&scenario, runtime, &args.clock.to_string())?;
+    let interrupt = Interrupt::watch()?;
+    let folder = open_folder(args, &scenario)?;
+    write_manifest(&folder, &facts, &scenario)?;
+    let recorder = match args.no_record {
+        true => Recorder::in_memory(facts.clone()),
+        false => Recorder::in_folder(facts.clone(), &folder).map_err(Failure::environment)?,
+    };
+    let ticks = (scenario.time.timeout_s / scenario.time.dt_s).ceil() as u64;
+    let mut sink = Progress::new(recorder, args.quiet || args.json, ticks);
+    let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
+    let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
+    let ending = Ending { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
+    let (mut summary, recorded) = sink.finish().finish(&ending);
+    let reporting = Instant::now();
+    if !args.no_record {
+        plot::write(&folder, &facts).map_err(Failure::environment)?;
+    }
+    summary.report_s = Some(reporting.elapsed().as_secs_f64());
+    folder.write_summary(&summary).map_err(Failure::environment)?;
+    print(args, &summary, &folder);
+    let trouble = end.failure.clone().or(end.sink_error.clone()).or(recorded.err().map(|error| error.to_string()));
+    if let Some(trouble) = &trouble {
+        eprintln!("skein: {trouble}");
+    }
+    Ok(exit(&end, trouble.is_some(), &summary))
+}
+
+fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure> {
+    use skein_report::ReportError::{Exists, NotARun};
+    let folder = match &args.out {
+        Some(path) => RunFolder::at(path, args.force),
+        None => RunFolder::numbered(Path::new("runs"), &scenario.name),
+    };
+    folder.map_err(|error| match error {
+        Exists(_) | NotARun(_) => Failure::usage(error),
+        other => Failure::environment(other),
+    })
+}
+
+fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<(), Failure> {
+    let resolved = serde_json::to_value(scenario).map_err(Failure::environment)?;
+    let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
+    let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
+    folder.write_manifest(&manifest).map_err(Failure::environment)
+}
+
+fn fly(
+    args: &RunArgs,
+    scenario: &Scenario,
+    folder: &RunFolder,
+    interrupt: &Interrupt,
+    sink: &mut dyn RecordSink,
+) -> Result<RunEnd, RuntimeError> {
+    let launcher = ProcessInfo { role: "launcher", id: None, pid: std::process::id() };
+    let mut on_ready = |processes: &[ProcessInfo]| {
+        let entries: Vec<ProcessEntry> = processes.iter().map(entry).collect();
+        folder.write_processes(&entries).map_err(|error| error.to_string())
+    };
+    match args.runtime {
+        RuntimeChoice::Inline => {
+            on_ready(&[launcher]).map_err(RuntimeError::Process)?;
+            inline::run(scenario, sink, || interrupt.signal())
+        }
+        RuntimeChoice::Processes => {
+            skein_bus::clean()?;
+            let executable = std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?;
+            let launch = Launch {
+                scenario,
+                clock: args.clock,
+                pin: args.pin.into(),
+                wait: args.wait.into(),
+                executable,
+                on_ready: &mut on_ready,
+                interrupted: &mut || interrupt.signal(),
+            };
+            supervisor::run(launch, sink)
+        }
+    }
+}
+
+fn entry(process: &ProcessInfo) -> ProcessEntry {
+    let role = match process.role {
+        "world" => Role::World,
+        "drone" => Role::Drone,
+        _ => Role::Launcher,
+    };
+    ProcessEntry { role, id: process.id, pid: process.pid }
+}
+
+fn print(args: &RunArgs, summary: &Summary, folder: &RunFolder) {
+    let mut out = std::io::stdout().lock();
+    // A closed pipe is the reader's choice.
+    let _ = if args.json {
+        serde_json::to_string(summary).map_err(std::io::Error::from).and_then(|json| writeln!(out, "{json}"))
+    } else if args.quiet {
+        Ok(())
+    } else {
+        let colour = out.is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        writeln!(out, "{}\nfolder  {}", text::summary(summary, colour), folder.path().display())
+    };
+}
+
+fn exit(end: &RunEnd, trouble: bool, summary: &Summary) -> Exit {
+    match (end.signal, summary.outcome) {
+        (Some(signal), _) => Exit::Interrupted(signal),
+        _ if trouble => Exit::Environment,
+        (None, Outcome::Aborted) => Exit::Environment,
+        (None, Outcome::Unsafe) => Exit::Unsafe,
+        (None, Outcome::Timeout) => Exit::NotReached,
+        (None, Outcome::Reached) => Exit::Reached,
+    }
+}

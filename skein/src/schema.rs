@@ -1,0 +1,36 @@
+//! `skein schema`, `skein completions`, `skein man`.
+
+use crate::cli::{Cli, SchemaOf};
+use crate::exit::{Exit, Failure};
+use clap::CommandFactory;
+use std::io::Write;
+
+/// Prints a JSON schema.
+pub fn schema(of: SchemaOf) -> Result<Exit, Failure> {
+    let schema = match of {
+        SchemaOf::Summary => skein_report::schema_summary(),
+        SchemaOf::Scenario => skein_scenario::schema(),
+    };
+    let text = serde_json::to_string_pretty(&schema).map_err(Failure::environment)?;
+    print(format!("{text}\n").as_bytes())
+}
+
+/// Prints completions for a shell.
+pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "skein", &mut text);
+    print(&text)
+}
+
+/// Prints the manual page.
+pub fn man() -> Result<Exit, Failure> {
+    let mut text = Vec::new();
+    clap_mangen::Man::new(Cli::command()).render(&mut text).map_err(Failure::environment)?;
+    print(&text)
+}
+
+fn print(text: &[u8]) -> Result<Exit, Failure> {
+    // A closed pipe is the reader's choice.
+    let _ = std::io::stdout().write_all(text);
+    Ok(Exit::Reached)
+}

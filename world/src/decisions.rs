@@ -1,0 +1,224 @@
+//! Who leads and what leaders decided, told when it is first seen.
+
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_AVOID, PHASE_CRUISE, Plan};
+use skein_protocol::record::Happening;
+use skein_protocol::slot::{SLOT_LEADS, Slot};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
+use std::collections::BTreeSet;
+
+use crate::log::Log;
+
+/// What has been told of one drone as a leader: of its latest plan alone, since plans are superseded, not revived.
+#[derive(Clone, Debug, Default)]
+struct Told {
+    leading: Option<(GroupId, Ballot)>,
+    plan: PlanStamp,
+    grouping: bool,
+    assigned: BTreeSet<DroneId>,
+}
+
+impl Told {
+    /// Whether `plan` is the latest one or later; a later one takes its place.
+    fn is_current(&mut self, plan: PlanStamp) -> bool {
+        if plan > self.plan {
+            self.plan = plan;
+            self.grouping = false;
+            self.assigned.clear();
+        }
+        plan == self.plan
+    }
+}
+
+/// What has been told of every drone as a leader.
+#[derive(Clone, Debug)]
+pub(crate) struct Decisions(Vec<Told>);
+
+impl Decisions {
+    /// For so many drones.
+    pub fn new(drones: usize) -> Self {
+        Self(vec![Told::default(); drones])
+    }
+
+    /// Forgets a drone whose process is gone: what the next one says is new. That it leads no more is not told, the
+    /// fault is.
+    pub fn forget(&mut self, drone: DroneId) {
+        self.0[drone.index()] = Told::default();
+    }
+
+    /// Tells that a drone takes up or lays down leading.
+    pub fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut Log) {
+        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.group, slot.obeyed.ballot));
+        let before = std::mem::replace(&mut self.0[drone.index()].leading, leads);
+        if before == leads {
+            return;
+        }
+        for (term, leads) in [(before, false), (leads, true)] {
+            if let Some((group, ballot)) = term {
+                log.push(at, Happening::Leader { group: group.to_string(), ballot, leader: drone, leads });
+            }
+        }
+    }
+
+    /// Tells a plan or an assignment that is on the air for the first time.
+    pub fn follow_frame(&mut self, sent: &AirFrame, at: SimTime, log: &mut Log) {
+        if ![Topic::Plan as u16, Topic::Assignment as u16].contains(&sent.frame.kind) {
+            return;
+        }
+        match Message::decode(&sent.frame) {
+            Ok(Message::Plan(plan)) => self.follow_plan(&plan, at, log),
+            Ok(Message::Assignment(part)) => self.follow_assignment(&part, at, log),
+            _ => {} // Malformed: its receivers count it.
+        }
+    }
+
+    fn follow_plan(&mut self, plan: &Plan, at: SimTime, log: &mut Log) {
+        let Some(told) = self.0.get_mut(plan.id.ballot.claimant.index()) else { return };
+        if told.is_current(plan.id) && !std::mem::replace(&mut told.grouping, true) {
+            log.push(at, grouping(plan));
+        }
+    }
+
+    fn follow_assignment(&mut self, part: &Assignment, at: SimTime, log: &mut Log) {
+        let drones = self.0.len();
+        let Some(told) = self.0.get_mut(part.id.ballot.claimant.index()) else { return };
+        if part.drone.index() < drones && told.is_current(part.id) && told.assigned.insert(part.drone) {
+            log.push(at, assigned(part));
+        }
+    }
+}
+
+fn grouping(plan: &Plan) -> Happening {
+    let phase = match plan.phase {
+        PHASE_CRUISE => "cruise",
+        PHASE_AVOID => "avoid",
+        _ => "reform",
+    };
+    Happening::Grouping {
+        plan: plan.id,
+        group: plan.group.to_string(),
+        phase: phase.to_owned(),
+        members: plan.members,
+        routes: plan.routes,
+        obstacles: plan.set.iter().take(plan.set_count as usize).copied().collect(),
+        predicted_s: plan.predicted_s.is_finite().then_some(plan.predicted_s),
+    }
+}
+
+fn assigned(part: &Assignment) -> Happening {
+    Happening::Assigned {
+        plan: part.id,
+        drone: part.drone,
+        group: part.group.to_string(),
+        leader: part.leader,
+        route: (part.route != NO_ROUTE).then_some(part.route),
+        rank: part.rank,
+        slot_m: part.slot_m,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::tests::read;
+    use crate::testing::happenings;
+    use skein_protocol::ObstacleId;
+    use skein_protocol::payload::{MAX_SET, PHASE_REFORM};
+
+    fn stamp(round: u32, epoch: u32) -> PlanStamp {
+        PlanStamp { ballot: Ballot { round, incarnation: 1, claimant: DroneId(2) }, epoch }
+    }
+
+    fn on_air(message: Message) -> AirFrame {
+        AirFrame { tick: 0, source: DroneId(2), sequence: 0, position_m: [0.0; 2], frame: message.encode() }
+    }
+
+    fn plan(id: PlanStamp, phase: u32) -> AirFrame {
+        let mut set = [ObstacleId(0); MAX_SET];
+        set[0] = ObstacleId(4);
+        on_air(Message::Plan(Plan {
+            stamp: SimTime::ZERO,
+            id,
+            group: GroupId::ALL,
+            phase,
+            members: 8,
+            anchor_m: [0.0; 2],
+            anchor_mps: [10.0, 0.0],
+            anchor_stop_x_m: f64::INFINITY,
+            predicted_s: if phase == PHASE_AVOID { 28.5 } else { f64::NAN },
+            candidates: 0,
+            routes: 2,
+            set_count: 1,
+            set,
+            reserved: 0,
+        }))
+    }
+
+    fn assignment(id: PlanStamp, drone: u32, route: u16) -> AirFrame {
+        on_air(Message::Assignment(Assignment {
+            id,
+            group: GroupId::ALL.child(1),
+            drone: DroneId(drone),
+            leader: DroneId(2),
+            slot_m: [1.0, 2.0],
+            arrival_s: 0.0,
+            route,
+            rank: 3,
+            reserved: 0,
+        }))
+    }
+
+    fn told(frames: &[AirFrame]) -> Vec<Happening> {
+        let (mut decisions, mut log) = (Decisions::new(8), Log::default());
+        frames.iter().for_each(|frame| decisions.follow_frame(frame, SimTime::ZERO, &mut log));
+        happenings(read(&mut log))
+    }
+
+    #[test]
+    fn repeated_plans_and_assignments_are_told_once() {
+        let (first, second) = (stamp(1, 1), stamp(1, 2));
+        let events = told(&[
+            assignment(first, 5, 1),
+            plan(first, PHASE_AVOID),
+            plan(first, PHASE_AVOID),
+            assignment(first, 5, 1),
+            plan(second, PHASE_REFORM),
+            plan(first, PHASE_AVOID),
+            assignment(second, 5, NO_ROUTE),
+        ]);
+        assert_eq!(events.len(), 4);
+        let Happening::Assigned { route: Some(1), rank: 3, group, .. } = &events[0] else { panic!("{:?}", events[0]) };
+        assert_eq!(group, "N1");
+        let Happening::Grouping { phase, obstacles, predicted_s, .. } = &events[1] else { panic!("{:?}", events[1]) };
+        assert_eq!((phase.as_str(), &obstacles[..], *predicted_s), ("avoid", &[ObstacleId(4)][..], Some(28.5)));
+        assert!(matches!(&events[2], Happening::Grouping { phase, predicted_s: None, .. } if phase == "reform"));
+        assert!(matches!(events[3], Happening::Assigned { route: None, .. }));
+    }
+
+    #[test]
+    fn rubbish_is_no_decision() {
+        let mut cut = plan(stamp(1, 1), PHASE_AVOID);
+        cut.frame.len = 3;
+        let stranger = PlanStamp { ballot: Ballot { claimant: DroneId(99), ..stamp(1, 1).ballot }, epoch: 1 };
+        assert_eq!(told(&[cut, plan(stranger, PHASE_AVOID), assignment(stamp(1, 1), 99, 0)]), []);
+    }
+
+    #[test]
+    fn leading_is_told_when_it_begins_changes_and_ends() {
+        let (mut decisions, mut log) = (Decisions::new(8), Log::default());
+        let leads = Slot { flags: SLOT_LEADS, obeyed: stamp(1, 1), ..Slot::default() };
+        let next_plan = Slot { obeyed: stamp(1, 2), ..leads };
+        let next_term = Slot { obeyed: stamp(2, 1), ..leads };
+        for slot in [leads, next_plan, next_term, Slot::default()] {
+            decisions.follow_slot(DroneId(2), &slot, SimTime::ZERO, &mut log);
+        }
+        let event = |round, leads| Happening::Leader {
+            group: "N".into(),
+            ballot: stamp(round, 1).ballot,
+            leader: DroneId(2),
+            leads,
+        };
+        assert_eq!(happenings(read(&mut log)), [event(1, true), event(1, false), event(2, true), event(2, false)]);
+    }
+}

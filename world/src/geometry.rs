@@ -1,0 +1,165 @@
+//! Distance to an obstacle: the one module that speaks parry.
+
+use parry2d_f64::math::Vector;
+use parry2d_f64::query::PointQuery;
+use parry2d_f64::shape::Segment;
+use skein_protocol::Vec2;
+use skein_protocol::shape::ConvexShape;
+
+/// An obstacle's outline, prepared for distance queries.
+#[derive(Clone, Debug)]
+pub(crate) struct Outline {
+    /// Edges of the core polygon, counter-clockwise; a single one, without length, around a lone vertex.
+    edges: Vec<Segment>,
+    radius_m: f64,
+    /// Least corner of the box around it, m.
+    pub low: Vec2,
+    /// Greatest corner of the box around it, m.
+    pub high: Vec2,
+}
+
+/// The point of an obstacle's surface that is nearest to a query point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Nearest {
+    /// World frame, m.
+    pub point: Vec2,
+    /// m; negative if the query point is inside.
+    pub distance_m: f64,
+}
+
+impl Outline {
+    /// Prepares a shape that has been checked.
+    pub fn new(shape: &ConvexShape) -> Self {
+        let corners: Vec<Vector> = shape.vertices().map(|v| Vector::new(v.x, v.y)).collect();
+        let count = corners.len();
+        let edges = if count > 2 { count } else { 1 };
+        let (low, high) = shape.bounds();
+        Self {
+            edges: (0..edges).map(|i| Segment::new(corners[i], corners[(i + 1) % count])).collect(),
+            radius_m: shape.radius_m,
+            low,
+            high,
+        }
+    }
+
+    /// Square of the distance to the box around the outline, m²: never more than that to the outline itself.
+    pub fn box_distance_squared(&self, point: Vec2) -> f64 {
+        (point - point.sup(&self.low).inf(&self.high)).norm_squared()
+    }
+
+    /// The nearest point of the surface, exact up to rounding.
+    pub fn nearest(&self, point: Vec2) -> Nearest {
+        let query = Vector::new(point.x, point.y);
+        let (mut best, mut inside) = ((f64::INFINITY, Vec2::zeros(), Vec2::zeros()), self.edges.len() > 2);
+        for edge in &self.edges {
+            let along = edge.b - edge.a;
+            inside &= along.perp_dot(query - edge.a) >= 0.0;
+            let foot = edge.project_local_point(query, true).point;
+            let square = (query - foot).length_squared();
+            if square < best.0 {
+                best = (square, Vec2::new(foot.x, foot.y), Vec2::new(along.y, -along.x));
+            }
+        }
+        let (square, foot, normal) = best;
+        let distance = square.sqrt();
+        let side = if inside { -1.0 } else { 1.0 };
+        let outward = if distance > 0.0 { (point - foot) * (side / distance) } else { face(normal) };
+        Nearest { point: foot + outward * self.radius_m, distance_m: side * distance - self.radius_m }
+    }
+}
+
+/// The outward direction at a point of the core itself: the edge's normal; towards the comers for a lone vertex.
+fn face(normal: Vec2) -> Vec2 {
+    normal.try_normalize(0.0).unwrap_or(Vec2::new(-1.0, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::rectangle;
+    use proptest::prelude::*;
+
+    fn nearest(shape: &ConvexShape, x: f64, y: f64) -> Nearest {
+        Outline::new(shape).nearest(Vec2::new(x, y))
+    }
+
+    fn rounded_square() -> ConvexShape {
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]].map(Vec2::from);
+        ConvexShape::new(&corners, 1.0).unwrap()
+    }
+
+    #[test]
+    fn a_rectangle_is_signed() {
+        let shape = rectangle(0.0, 0.0, 10.0, 75.0);
+        assert_eq!(nearest(&shape, -30.0, 5.0), Nearest { point: Vec2::new(-10.0, 5.0), distance_m: 20.0 });
+        assert_eq!(nearest(&shape, 8.0, 5.0), Nearest { point: Vec2::new(10.0, 5.0), distance_m: -2.0 });
+        assert_eq!(nearest(&shape, 13.0, 79.0), Nearest { point: Vec2::new(10.0, 75.0), distance_m: 5.0 });
+        assert_eq!(nearest(&shape, 10.0, 0.0).distance_m, 0.0);
+    }
+
+    #[test]
+    fn rounding_grows_the_shape_on_every_side() {
+        assert_eq!(nearest(&rounded_square(), 5.0, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: 2.0 });
+        assert_eq!(nearest(&rounded_square(), 2.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -0.5 });
+        assert_eq!(nearest(&rounded_square(), 1.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -1.5 });
+        assert_eq!(nearest(&rounded_square(), 2.0, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -1.0 });
+    }
+
+    #[test]
+    fn discs_and_capsules_are_shapes_too() {
+        let disc = ConvexShape::circle(Vec2::new(3.0, 4.0), 2.0).unwrap();
+        assert_eq!(nearest(&disc, 0.0, 0.0).distance_m, 3.0);
+        assert_eq!(nearest(&disc, 3.0, 4.0), Nearest { point: Vec2::new(1.0, 4.0), distance_m: -2.0 });
+        let capsule = ConvexShape::new(&[Vec2::zeros(), Vec2::new(10.0, 0.0)], 1.0).unwrap();
+        assert_eq!(nearest(&capsule, 5.0, -3.0), Nearest { point: Vec2::new(5.0, -1.0), distance_m: 2.0 });
+        assert_eq!(nearest(&capsule, 5.0, 0.0).distance_m, -1.0);
+        assert_eq!(nearest(&capsule, 13.0, 4.0).distance_m, 4.0);
+    }
+
+    /// Points of the surface, densely: along the edges moved outward, and around the corners.
+    fn surface(shape: &ConvexShape) -> Vec<Vec2> {
+        let corners: Vec<Vec2> = shape.vertices().collect();
+        let mut points = Vec::new();
+        for (i, &a) in corners.iter().enumerate() {
+            let along = corners[(i + 1) % corners.len()] - a;
+            let out = Vec2::new(along.y, -along.x).normalize() * shape.radius_m;
+            points.extend((0..=2000).map(|k| a + along * (f64::from(k) / 2000.0) + out));
+            let arc = (0..=360).map(|k| f64::from(k).to_radians());
+            points.extend(arc.map(|t| a + Vec2::new(t.cos(), t.sin()) * shape.radius_m));
+        }
+        points
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn distances_agree_with_dense_sampling(
+            x in -60f64..60.0, y in -60f64..60.0, hx in 2f64..20.0, hy in 2f64..20.0,
+            turn in 0f64..3.0, radius in 0f64..5.0,
+        ) {
+            let core = ConvexShape::rectangle(Vec2::new(3.0, -2.0), Vec2::new(hx, hy), turn).unwrap();
+            let shape = ConvexShape { radius_m: radius, ..core };
+            let (point, outline) = (Vec2::new(x, y), Outline::new(&shape));
+            let found = outline.nearest(point);
+            // Arcs also sample the inside of the rounded outline, which may only be farther from an outer point.
+            let sampled = surface(&shape).iter().map(|s| (s - point).norm()).fold(f64::INFINITY, f64::min);
+            if found.distance_m > 0.0 {
+                prop_assert!((found.distance_m - sampled).abs() < 0.05, "{found:?}, sampled {sampled}");
+            }
+            prop_assert!(((found.point - point).norm() - found.distance_m.abs()).abs() < 1e-9);
+            prop_assert!(outline.nearest(found.point).distance_m.abs() < 1e-9);
+            prop_assert!(outline.box_distance_squared(point).sqrt() <= found.distance_m.max(0.0) + 1e-9);
+        }
+
+        #[test]
+        fn depth_is_that_of_the_nearest_face(u in -1f64..1.0, v in -1f64..1.0, turn in 0f64..3.0, radius in 0f64..5.0) {
+            let (half, centre) = (Vec2::new(12.0, 5.0), Vec2::new(3.0, -2.0));
+            let core = ConvexShape::rectangle(centre, half, turn).unwrap();
+            let local = Vec2::new(u * half.x, v * half.y);
+            let point = centre + nalgebra::Rotation2::new(turn) * local;
+            let depth = (half.x - local.x.abs()).min(half.y - local.y.abs()) + radius;
+            let found = nearest(&ConvexShape { radius_m: radius, ..core }, point.x, point.y);
+            prop_assert!((found.distance_m + depth).abs() < 1e-9, "{found:?}, depth {depth}");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! A drone's process, as far as the world sees it: its answers.
+
+use crate::body::Body;
+use crate::invariants::Obedience;
+use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_LATE, ROW_LEADS, ROW_QUEUED};
+use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
+
+/// How a drone has answered in the current tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    Awaited,
+    Given,
+    Late,
+}
+
+/// One drone's process.
+#[derive(Clone, Debug)]
+pub(crate) struct Process {
+    /// Its last answer; without the tally while it is held.
+    pub slot: Slot,
+    pub answer: Answer,
+    pub incarnation: u32,
+    pub obedience: Obedience,
+    sequence: u32,
+}
+
+impl Default for Process {
+    fn default() -> Self {
+        Self {
+            slot: Slot::default(),
+            answer: Answer::Awaited,
+            incarnation: 1,
+            obedience: Obedience::default(),
+            sequence: 0,
+        }
+    }
+}
+
+impl Process {
+    /// Its last command goes on; it heard nothing in this tick.
+    pub fn hold(&mut self) {
+        self.answer = Answer::Late;
+        self.slot = Slot { heard: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
+    }
+
+    /// The number of the next frame, from 0; it goes on over restarts.
+    pub fn next_sequence(&mut self) -> u32 {
+        let sequence = self.sequence;
+        self.sequence = sequence.wrapping_add(1);
+        sequence
+    }
+
+    /// The drone at the end of a tick. Of a dead one's answers only what it obeyed is left.
+    pub fn row(&self, body: &Body) -> DroneRow {
+        let (slot, alive) = (&self.slot, u32::from(body.alive));
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        let flags = flag(slot.flags & SLOT_LEADS != 0, ROW_LEADS)
+            | flag(slot.flags & SLOT_QUEUED != 0, ROW_QUEUED)
+            | flag(self.answer == Answer::Late, ROW_LATE)
+            | ROW_ALIVE;
+        DroneRow {
+            position_m: body.position.into(),
+            velocity_mps: body.velocity.into(),
+            energy_j: body.energy_j,
+            obeyed: slot.obeyed,
+            group: slot.group,
+            flags: alive * flags,
+            phase: slot.phase,
+            heard: alive * slot.heard,
+            step_ns: alive * slot.step_ns,
+            route: slot.route,
+            rank: slot.rank,
+            reserved: 0,
+        }
+    }
+}

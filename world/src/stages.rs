@@ -1,0 +1,169 @@
+//! Obstacle sets on the way, by the world's truth: when each is first sensed and when all are past it.
+
+use crate::body::Body;
+use crate::geometry::Outline;
+use crate::log::Log;
+use crate::senses::Contact;
+use skein_protocol::record::Happening;
+use skein_protocol::{DroneId, ObstacleId, SimTime};
+
+/// Obstacles that overlap in flight direction, or nearly.
+#[derive(Clone, Debug)]
+struct Stage {
+    /// Mean abscissa of the centres of the obstacles' boxes, m.
+    centre_x_m: f64,
+    detected: bool,
+    passed: bool,
+}
+
+/// The sets, in flight order.
+#[derive(Clone, Debug)]
+pub(crate) struct Stages {
+    stages: Vec<Stage>,
+    /// The set of each obstacle.
+    set_of: Vec<usize>,
+    /// Abscissa behind which every obstacle lies, m.
+    pub rear_x_m: f64,
+}
+
+impl Stages {
+    /// Obstacles whose extents along x are closer than `gap_m` are one set.
+    pub fn new(outlines: &[Outline], gap_m: f64) -> Self {
+        let mut order: Vec<usize> = (0..outlines.len()).collect();
+        order.sort_by(|&a, &b| outlines[a].low.x.total_cmp(&outlines[b].low.x));
+        let mut made = Self { stages: Vec::new(), set_of: vec![0; outlines.len()], rear_x_m: f64::NEG_INFINITY };
+        let mut centres: Vec<f64> = Vec::new();
+        for obstacle in order {
+            let outline = &outlines[obstacle];
+            if !centres.is_empty() && outline.low.x - made.rear_x_m >= gap_m {
+                made.close(&centres);
+                centres.clear();
+            }
+            made.set_of[obstacle] = made.stages.len();
+            made.rear_x_m = made.rear_x_m.max(outline.high.x);
+            centres.push((outline.low.x + outline.high.x) / 2.0);
+        }
+        if !centres.is_empty() {
+            made.close(&centres);
+        }
+        made
+    }
+
+    fn close(&mut self, centres: &[f64]) {
+        let centre_x_m = centres.iter().sum::<f64>() / centres.len() as f64;
+        self.stages.push(Stage { centre_x_m, detected: false, passed: false });
+    }
+
+    /// Whether all sets are passed.
+    pub fn all_passed(&self) -> bool {
+        self.stages.iter().all(|stage| stage.passed)
+    }
+
+    /// Tells the sets that are sensed for the first time, at the time the tick opens.
+    pub fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut Log) {
+        for contact in contacts {
+            let number = self.set_of[contact.obstacle as usize];
+            if !std::mem::replace(&mut self.stages[number].detected, true) {
+                let what = Happening::Detected {
+                    stage: number as u32,
+                    drone: DroneId(contact.drone),
+                    obstacle: ObstacleId(contact.obstacle),
+                    distance_m: contact.nearest.distance_m,
+                };
+                log.push(opening, what);
+            }
+        }
+    }
+
+    /// Tells the sets that the last living drone has passed, at the time the tick ends.
+    pub fn pass(&mut self, bodies: &[Body], end: SimTime, log: &mut Log) {
+        let living = bodies.iter().filter(|body| body.alive).map(|body| body.position.x);
+        let Some(last) = living.reduce(f64::min) else { return };
+        for (number, stage) in self.stages.iter_mut().enumerate() {
+            if !stage.passed && last >= stage.centre_x_m {
+                stage.passed = true;
+                log.push(end, Happening::Passed { stage: number as u32 });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Nearest;
+    use crate::log::tests::read;
+    use crate::testing::{bodies, happenings, rectangle};
+    use skein_protocol::Vec2;
+
+    /// The forest of the paper, its second set listed first.
+    fn forest() -> Stages {
+        let shapes = [
+            rectangle(640.0, 45.0, 10.0, 15.0),
+            rectangle(640.0, -45.0, 10.0, 15.0),
+            rectangle(320.0, 0.0, 10.0, 110.0),
+        ];
+        Stages::new(&shapes.each_ref().map(Outline::new), 40.0)
+    }
+
+    fn contact(drone: u32, obstacle: u32) -> Contact {
+        Contact { drone, obstacle, nearest: Nearest { point: Vec2::zeros(), distance_m: 60.0 } }
+    }
+
+    #[test]
+    fn sets_are_in_flight_order() {
+        assert_eq!((forest().set_of, forest().rear_x_m), (vec![1, 1, 0], 650.0));
+        assert_eq!(forest().stages.iter().map(|s| s.centre_x_m).collect::<Vec<_>>(), [320.0, 640.0]);
+    }
+
+    #[test]
+    fn extents_closer_than_the_gap_are_one_set() {
+        let sets = |x| {
+            Stages::new(
+                &[rectangle(0.0, 0.0, 10.0, 5.0), rectangle(x, 90.0, 10.0, 5.0)].map(|s| Outline::new(&s)),
+                40.0,
+            )
+        };
+        assert_eq!(sets(59.9).stages.len(), 1);
+        assert_eq!(sets(60.0).stages.len(), 2);
+        assert_eq!(sets(59.0).stages[0].centre_x_m, 29.5);
+    }
+
+    #[test]
+    fn detection_is_told_once_a_set() {
+        let (mut stages, mut log) = (forest(), Log::default());
+        stages.detect(&[contact(3, 0), contact(4, 1)], SimTime(5), &mut log);
+        stages.detect(&[contact(0, 1), contact(0, 2)], SimTime(6), &mut log);
+        let detected = |stage, drone, obstacle| Happening::Detected {
+            stage,
+            drone: DroneId(drone),
+            obstacle: ObstacleId(obstacle),
+            distance_m: 60.0,
+        };
+        assert_eq!(happenings(read(&mut log)), [detected(1, 3, 0), detected(0, 0, 2)]);
+    }
+
+    #[test]
+    fn a_set_is_passed_when_the_last_living_drone_is_past_its_centre() {
+        let (mut stages, mut log) = (forest(), Log::default());
+        let mut all = bodies(&[[400.0, 0.0], [319.9, 0.0]]);
+        stages.pass(&all, SimTime(1), &mut log);
+        assert_eq!(read(&mut log), []);
+        all[1].alive = false;
+        stages.pass(&all, SimTime(2), &mut log);
+        stages.pass(&all, SimTime(3), &mut log);
+        assert_eq!(happenings(read(&mut log)), [Happening::Passed { stage: 0 }]);
+        assert!(!stages.all_passed());
+        all[0].alive = false;
+        all[0].position.x = 700.0;
+        stages.pass(&all, SimTime(4), &mut log);
+        assert_eq!(read(&mut log), [], "with nobody alive nothing is passed");
+    }
+
+    #[test]
+    fn without_obstacles_nothing_is_in_the_way() {
+        let stages = Stages::new(&[], 40.0);
+        assert!(stages.all_passed());
+        assert_eq!(stages.rear_x_m, f64::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,66 @@
+//! Fixtures of this crate's tests.
+
+use crate::body::Body;
+use crate::params::{End, Failsafe, WorldParams};
+use crate::world::World;
+use skein_protocol::formation::Shape;
+use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::slot::Slot;
+use skein_protocol::{DroneId, Vec2};
+
+/// The paper's first scene: spacing 35 m, safe distance 33 m, 20 ms a tick.
+pub(crate) fn params() -> WorldParams {
+    WorldParams {
+        dt_ns: 20_000_000,
+        timeout_s: 10.0,
+        speed_max_mps: 20.0,
+        acceleration_max_mps2: 5.0,
+        safe_distance_m: 33.0,
+        clearance_m: 15.0,
+        planning_distance_m: 20.0,
+        detection_range_m: 115.0,
+        ranging_m: Some(66.0),
+        failsafe: Failsafe::Hover,
+        end: End::Hold { stop_x_m: 1e9 },
+        arrival_error_m: 0.8,
+        shape: Shape::NestedV,
+        spacing_m: 35.0,
+    }
+}
+
+/// A nested V of `count` drones with its front at the origin, flying at 10 m/s.
+pub(crate) fn starts(count: usize) -> Vec<(Vec2, Vec2)> {
+    Shape::NestedV.slots(count, 35.0).into_iter().map(|slot| (slot, Vec2::new(10.0, 0.0))).collect()
+}
+
+pub(crate) fn rectangle(x: f64, y: f64, half_x: f64, half_y: f64) -> ConvexShape {
+    ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(half_x, half_y), 0.0).unwrap()
+}
+
+pub(crate) fn bodies(positions: &[[f64; 2]]) -> Vec<Body> {
+    positions.iter().map(|&p| Body::new(Vec2::from(p), Vec2::zeros())).collect()
+}
+
+/// Lets every drone answer `slot` and advances one tick; the events told in it.
+pub(crate) fn tick(world: &mut World, slot: &Slot) -> Vec<RunEvent> {
+    let drones = world.downlink().drones.len() as u32;
+    (0..drones).for_each(|id| world.take_slot(DroneId(id), slot));
+    world.advance();
+    events(world)
+}
+
+/// The events of the last record.
+pub(crate) fn events(world: &World) -> Vec<RunEvent> {
+    world.record().parse_events(|line| serde_json::from_slice(line)).unwrap()
+}
+
+/// The events themselves, without their times.
+pub(crate) fn happenings(events: Vec<RunEvent>) -> Vec<Happening> {
+    events.into_iter().map(|event| event.what).collect()
+}
+
+/// A slot that commands an acceleration.
+pub(crate) fn command(x: f64, y: f64) -> Slot {
+    Slot { acceleration_mps2: [x, y], ..Slot::default() }
+}

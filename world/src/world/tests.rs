@@ -1,0 +1,275 @@
+//! Whole missions of a world, flown by hand.
+
+use super::*;
+use crate::params::{End, Failsafe};
+use crate::testing::{command, events, happenings, params, rectangle, starts, tick};
+use skein_protocol::record::{ROW_ALIVE, ROW_LATE, RunEvent, ViolationKind};
+use skein_protocol::shape::ShapeError;
+use skein_protocol::slot::SLOT_LEADS;
+use skein_protocol::{Ballot, Message, ObstacleId, PlanStamp};
+
+const CRUISE: [f64; 2] = [10.0, 0.0];
+
+fn eight(params: WorldParams, obstacles: &[ConvexShape]) -> World {
+    World::new(params, &starts(8), obstacles).unwrap()
+}
+
+/// Flies straight on until the end; all events.
+fn fly(world: &mut World, slot: &Slot) -> Vec<RunEvent> {
+    let mut told = Vec::new();
+    while world.ended().is_none() {
+        told.extend(tick(world, slot));
+    }
+    told
+}
+
+fn frame() -> Frame {
+    let passed =
+        skein_protocol::payload::Passed { stamp: SimTime::ZERO, set_count: 0, set: [ObstacleId(0); 32], reserved: 0 };
+    Message::Passed(passed).encode()
+}
+
+#[test]
+fn eight_drones_past_nothing_run_out_of_time() {
+    let mut world = eight(params(), &[]);
+    assert_eq!(fly(&mut world, &Slot::default()), []);
+    assert_eq!((world.ended(), world.tick()), (Some(Outcome::Timeout), 500));
+    let record = world.record();
+    assert_eq!((record.head.tick, record.head.now, record.rows.len()), (499, SimTime::from_secs(10.0), 8));
+    assert!((record.rows[0].position_m[0] - 100.0).abs() < 1e-9);
+    assert_eq!(record.rows[0].velocity_mps, CRUISE);
+    assert!((record.rows[7].energy_j - 1260.3).abs() < 0.1, "ten seconds at 126.03 W");
+    assert!((world.min_separation_m() - 35.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_a_world_is_named() {
+    let error = |starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]| {
+        World::new(params(), starts, obstacles).map(|_| ()).unwrap_err()
+    };
+    assert_eq!(error(&[(Vec2::new(f64::NAN, 0.0), Vec2::zeros())], &[]), WorldError::Start(0));
+    let hollow = ConvexShape { count: 0, ..rectangle(0.0, 0.0, 1.0, 1.0) };
+    let wrong = error(&[], &[rectangle(0.0, 0.0, 1.0, 1.0), hollow]);
+    assert_eq!(wrong, WorldError::Obstacle { index: 1, error: ShapeError::Count(0) });
+    assert!(World::new(WorldParams { dt_ns: -1, ..params() }, &[], &[]).is_err());
+}
+
+#[test]
+fn detection_is_told_at_the_opening_and_passing_at_the_end_of_a_tick() {
+    // From x = 0 at 10 m/s: in range (115 m of the front at x = 130) as the front reaches 15 m.
+    let obstacle = rectangle(140.0, 0.0, 10.0, 5.0);
+    let mut world = eight(WorldParams { timeout_s: 30.0, ..params() }, &[obstacle]);
+    let told = fly(&mut world, &Slot::default());
+    let Some(RunEvent { t_s, what: Happening::Detected { stage: 0, drone, distance_m, .. } }) = told.first() else {
+        panic!("{told:?}");
+    };
+    assert_eq!(*drone, DroneId(0));
+    assert!((1.5..=1.521).contains(t_s) && (114.79..=115.0).contains(distance_m), "{t_s} s, {distance_m} m");
+    let passed = told.iter().find(|event| event.what == Happening::Passed { stage: 0 }).unwrap();
+    // The last drone starts 3·35/√2 behind.
+    let wanted = (140.0 + 3.0 * 35.0 / 2f64.sqrt()) / 10.0;
+    assert!((0.0..=0.021).contains(&(passed.t_s - wanted)), "{} s", passed.t_s);
+    assert!(told.is_sorted_by(|a, b| a.t_s <= b.t_s));
+    assert_eq!(world.ended(), Some(Outcome::Unsafe), "the front flew through it");
+    assert!(world.min_clearance_m() < 0.0);
+}
+
+#[test]
+fn bad_commands_are_counted_and_huge_ones_clipped() {
+    let mut world = eight(params(), &[]);
+    world.take_slot(DroneId(0), &command(f64::NAN, 0.0));
+    world.take_slot(DroneId(1), &command(0.0, 1e200));
+    (2..8).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+    world.take_slot(DroneId(99), &command(1.0, 0.0));
+    world.advance();
+    assert_eq!(world.record().rows[0].velocity_mps, CRUISE);
+    assert_eq!(world.record().rows[1].velocity_mps, [10.0, 0.1]);
+    assert_eq!(totals_of(&mut world).rejected_commands, 1);
+}
+
+/// Ends the mission; what its end event counts.
+fn totals_of(world: &mut World) -> Totals {
+    world.finish(&LinkStats::default(), 2.5);
+    match happenings(events(world)).pop() {
+        Some(Happening::End { totals, .. }) => *totals,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_late_drone_holds_its_last_command_and_hears_nothing() {
+    let mut world = eight(params(), &[]);
+    tick(&mut world, &Slot { heard: 3, step_ns: 9, ..command(1.0, 0.0) });
+    (1..8).for_each(|id| world.take_slot(DroneId(id), &command(1.0, 0.0)));
+    world.hold(DroneId(0));
+    world.advance();
+    let rows = world.record().rows;
+    assert_eq!(rows[0].velocity_mps, rows[1].velocity_mps);
+    assert_eq!((rows[0].flags, rows[0].heard, rows[0].step_ns), (ROW_ALIVE | ROW_LATE, 0, 0));
+    world.advance();
+    assert_eq!(world.record().rows[7].flags, ROW_ALIVE | ROW_LATE, "no answer at all is a late one");
+    let totals = totals_of(&mut world);
+    assert_eq!((totals.deadline_misses, totals.delivered), (9, 24));
+}
+
+#[test]
+fn frames_are_stamped_and_heard_in_the_next_tick() {
+    let mut world = eight(params(), &[]);
+    world.take_frames(DroneId(3), &[frame()]);
+    world.take_frames(DroneId(1), &[frame(), frame()]);
+    tick(&mut world, &Slot::default());
+    assert_eq!(world.record().frames.len(), 3);
+    world.take_frames(DroneId(1), &[frame()]);
+    let heads = |frames: &[AirFrame]| frames.iter().map(|f| (f.tick, f.source.0, f.sequence)).collect::<Vec<_>>();
+    assert_eq!(heads(&world.downlink().frames), [(0, 1, 0), (0, 1, 1), (0, 3, 0)]);
+    assert_eq!(world.downlink().frames[0].position(), starts(8)[1].0, "where it was when it sent");
+    assert_eq!(world.downlink().head.frames, 3);
+    world.advance();
+    assert_eq!(heads(&world.downlink().frames), [(1, 1, 2)]);
+    assert_eq!(totals_of(&mut world).sent, 4);
+}
+
+#[test]
+fn a_dead_drone_brakes_stays_and_says_nothing() {
+    let mut world = eight(WorldParams { timeout_s: 20.0, ..params() }, &[]);
+    tick(&mut world, &Slot { flags: SLOT_LEADS, ..Slot::default() });
+    world.mark_dead(DroneId(7), FaultKind::Kill, true, "SIGKILL");
+    world.mark_dead(DroneId(7), FaultKind::Kill, true, "again");
+    world.take_frames(DroneId(7), &[frame()]);
+    world.take_slot(DroneId(7), &command(5.0, 0.0));
+    world.advance();
+    let fault =
+        Happening::Fault { kind: FaultKind::Kill, target: DroneId(7), scheduled: true, detail: "SIGKILL".into() };
+    assert_eq!(events(&world), [RunEvent { t_s: 0.02, what: fault }]);
+    let row = world.record().rows[7];
+    assert_eq!((row.flags, world.record().frames.len(), world.is_alive(DroneId(7))), (0, 0, false));
+    assert_eq!(row.velocity_mps, [9.9, 0.0]);
+    let energy = row.energy_j;
+    fly(&mut world, &Slot::default());
+    let row = world.record().rows[7];
+    assert_eq!((row.velocity_mps, row.energy_j), ([0.0, 0.0], energy));
+    assert_eq!(world.downlink().drones[7].alive, 0);
+}
+
+#[test]
+fn dead_bodies_still_count_for_separation_until_they_have_landed() {
+    let pair = [(Vec2::zeros(), Vec2::zeros()), (Vec2::new(-200.0, 0.0), Vec2::new(10.0, 0.0))];
+    let outcome = |failsafe| {
+        let mut world = World::new(WorldParams { failsafe, timeout_s: 30.0, ..params() }, &pair, &[]).unwrap();
+        world.mark_dead(DroneId(0), FaultKind::Hung, false, "no answer");
+        fly(&mut world, &Slot::default());
+        (world.ended(), world.violations())
+    };
+    assert_eq!(outcome(Failsafe::Hover), (Some(Outcome::Unsafe), 1));
+    assert_eq!(outcome(Failsafe::Land), (Some(Outcome::Timeout), 0));
+}
+
+#[test]
+fn with_nobody_alive_the_mission_is_over() {
+    let mut world = eight(params(), &[]);
+    (0..8).for_each(|id| world.mark_dead(DroneId(id), FaultKind::Kill, false, "exit 1"));
+    world.advance();
+    assert_eq!(world.ended(), Some(Outcome::Timeout));
+    world.finish(&LinkStats::default(), 0.0);
+    let Some(Happening::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    assert_eq!(reason, "no drone is left alive");
+}
+
+#[test]
+fn a_held_formation_is_reached_and_told_in_a_last_record() {
+    let end = End::Hold { stop_x_m: 15.0 };
+    let mut world = eight(WorldParams { end, ..params() }, &[]);
+    for _ in 0..50 {
+        tick(&mut world, &Slot::default());
+    }
+    // Each tick of braking takes 0.099 m/s: the 91st leaves less than 1 m/s.
+    while world.ended().is_none() {
+        tick(&mut world, &command(-4.95, 0.0));
+    }
+    assert_eq!((world.ended(), world.tick()), (Some(Outcome::Reached), 141));
+    let digest = world.digest();
+    world.finish(&LinkStats::default(), 2.5);
+    let record = world.record();
+    assert_eq!((record.rows.len(), record.frames.len(), record.head.tick, record.head.digest), (0, 0, 140, digest));
+    let told = events(&world);
+    assert!((told[0].t_s - 2.82).abs() < 1e-9, "{told:?}");
+    let Happening::End { outcome: Outcome::Reached, totals, .. } = &told[0].what else { panic!("{told:?}") };
+    assert_eq!(totals.wall_s, 2.5);
+}
+
+#[test]
+fn a_mission_can_be_stopped_once() {
+    let mut world = eight(params(), &[]);
+    world.abort("SIGINT");
+    world.abort("SIGTERM");
+    assert_eq!(world.ended(), Some(Outcome::Aborted));
+    world.finish(&LinkStats::default(), 0.0);
+    let Some(Happening::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    assert_eq!(reason, "SIGINT");
+}
+
+#[test]
+fn obeying_backwards_is_unsafe_except_after_a_restart() {
+    let obeys = |epoch| {
+        let obeyed = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch };
+        Slot { obeyed, part_hash: 1, ..Slot::default() }
+    };
+    let told = |restarted: bool| {
+        let mut world = eight(params(), &[]);
+        tick(&mut world, &obeys(2));
+        if restarted {
+            (0..8).for_each(|id| world.set_incarnation(DroneId(id), 2));
+        }
+        let told = happenings(tick(&mut world, &obeys(1)));
+        assert_eq!(world.downlink().drones[0].incarnation, if restarted { 2 } else { 1 });
+        fly(&mut world, &obeys(1));
+        (told, world.ended())
+    };
+    assert_eq!(told(true), (vec![], Some(Outcome::Timeout)));
+    let (events, outcome) = told(false);
+    let back = |drone| Happening::Violation {
+        kind: ViolationKind::BallotWentBack,
+        drones: vec![DroneId(drone)],
+        value_m: 0.0,
+    };
+    assert_eq!((events, outcome), ((0..8).map(back).collect(), Some(Outcome::Unsafe)));
+}
+
+/// The digest after a second of flight, in which one slot of the tenth tick is changed.
+fn digest_with(change: impl Fn(&mut Slot)) -> u64 {
+    let mut world = eight(params(), &[rectangle(140.0, 0.0, 10.0, 5.0)]);
+    for k in 0..50 {
+        let slot = Slot { heard: 2, heard_hash: k, ..command(0.1, -0.2) };
+        let mut changed = slot;
+        if k == 10 {
+            change(&mut changed);
+        }
+        world.downlink();
+        // Against the order of ids, which must not matter.
+        (0..8).rev().for_each(|id| world.take_slot(DroneId(id), if id == 5 { &changed } else { &slot }));
+        world.advance();
+    }
+    world.digest()
+}
+
+#[test]
+fn equal_runs_have_equal_digests_and_one_bit_makes_another() {
+    let plain = digest_with(|_| {});
+    assert_eq!(plain, digest_with(|_| {}));
+    assert_eq!(plain, digest_with(|slot| slot.step_ns = 77), "wall time is no part of it");
+    assert_ne!(plain, digest_with(|slot| slot.heard_hash ^= 1));
+    assert_ne!(plain, digest_with(|slot| slot.heard += 1));
+    assert_ne!(plain, digest_with(|slot| slot.dropped[4] += 1));
+    assert_ne!(plain, digest_with(|slot| slot.acceleration_mps2[1] = f64::from_bits((-0.2f64).to_bits() ^ 1 << 20)));
+}
+
+#[test]
+fn a_swarm_of_a_thousand_is_sensed_and_kept_apart_by_the_grid() {
+    let mut world = World::new(params(), &starts(1000), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap();
+    tick(&mut world, &Slot::default());
+    let front = world.downlink().drones[0];
+    // In a nested V of 35 m: two arms' next at 35 m, the next chevron's tip at 49.5 m, within 66 m.
+    assert_eq!(front.neighbour_count, 3);
+    assert!((world.min_separation_m() - 35.0).abs() < 1e-6);
+    assert_eq!(world.violations(), 0);
+}
