@@ -5,7 +5,7 @@
 //! distance). That bounds the acceleration along the line of sight: a half-plane each, for [`Program`].
 
 use crate::program::{HalfPlane, Program};
-use skein_protocol::Vec2;
+use skein_protocol::{DroneId, Vec2};
 
 /// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,12 +22,16 @@ pub struct SafetyParams {
     pub margin: f64,
     /// t_c, s.
     pub reaction_time_s: f64,
+    /// Between two calls of the filter, s.
+    pub dt_s: f64,
 }
 
 /// Obstacles farther than this beyond the clearance are left out, m.
 const OBSTACLE_REACH_M: f64 = 60.0;
 /// Added to the obstacle clearance against the length of a tick, and for [`TANGENT_M`], m.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
+/// The speed limit behind another drone is not taken lower than this, m/s: it would be arbitrarily steep.
+const LEAST_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration counted upon for braking before an obstacle; the rest turns.
 const OBSTACLE_BRAKING: f64 = 0.7;
 /// Closer to the border than this, √x is continued by its tangent, m: it would be arbitrarily steep, and beyond the
@@ -46,6 +50,8 @@ pub struct NearObstacle {
 /// A neighbour, sensed or known from its beacon.
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbour {
+    /// Who.
+    pub id: DroneId,
     /// Its position relative to the drone, m.
     pub position_m: Vec2,
     /// Its velocity relative to the drone, m/s.
@@ -56,19 +62,33 @@ pub struct Neighbour {
     pub share: f64,
 }
 
+/// What a sensed neighbour was counted upon for in the tick before.
+#[derive(Clone, Copy, Debug)]
+struct Trust {
+    id: DroneId,
+    /// Its velocity then, m/s.
+    velocity: Vec2,
+    /// From it to this drone.
+    normal: Vec2,
+    /// Its share of the acceleration away from this drone, m/s².
+    owed: f64,
+}
+
 /// The filter and its memory.
 #[derive(Clone, Debug)]
 pub struct Safety {
     params: SafetyParams,
     planes: Vec<HalfPlane>,
     program: Program,
+    trusted: Vec<Trust>,
+    trusting: Vec<Trust>,
 }
 
 impl Safety {
     /// A filter with these constants.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        Self { params, planes: Vec::new(), program: Program::default() }
+        Self { params, planes: Vec::new(), program: Program::default(), trusted: Vec::new(), trusting: Vec::new() }
     }
 
     /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles come first.
@@ -83,9 +103,47 @@ impl Safety {
         self.planes.clear();
         self.planes.extend(obstacles.filter_map(|obstacle| params.obstacle_plane(&obstacle, velocity)));
         let hard = self.planes.len();
-        self.planes.extend(neighbours.map(|neighbour| params.neighbour_plane(&neighbour)));
+        self.trusting.clear();
+        for neighbour in neighbours {
+            let barrier = params.neighbour_barrier(&neighbour);
+            let before = self.trusted.iter().find(|trust| trust.id == neighbour.id && neighbour.age_s == 0.0);
+            let missing = before.map_or(0.0, |trust| trust.missing(velocity + neighbour.velocity_mps, params.dt_s));
+            let braking = before.map_or_else(Vec2::zeros, |trust| {
+                (velocity + neighbour.velocity_mps - trust.velocity) / params.dt_s
+            });
+            self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking));
+            self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
+            self.trusting.push(Trust {
+                id: neighbour.id,
+                velocity: velocity + neighbour.velocity_mps,
+                normal: barrier.normal,
+                owed: (barrier.share - 1.0) * barrier.slack,
+            });
+        }
+        std::mem::swap(&mut self.trusted, &mut self.trusting);
         self.program.solve(&self.planes, hard, params.acceleration_max_mps2, wanted)
     }
+}
+
+impl Trust {
+    /// What the neighbour, whose velocity is known again `dt_s` later, did less than its share, m/s²: this drone makes up
+    /// for it, whether the other is dead, brakes, or cannot evade. Sensed, not told.
+    fn missing(&self, velocity: Vec2, dt_s: f64) -> f64 {
+        let done = (self.velocity - velocity).dot(&self.normal) / dt_s;
+        (self.owed - done).max(0.0)
+    }
+}
+
+/// The barrier between this drone and a neighbour.
+struct Barrier {
+    /// From the neighbour to this drone.
+    normal: Vec2,
+    /// How fast the two may accelerate towards each other, m/s²; negative: how fast they must part.
+    slack: f64,
+    /// This drone's share of it.
+    share: f64,
+    /// Distance beyond the one to keep, m.
+    beyond_m: f64,
 }
 
 impl SafetyParams {
@@ -103,7 +161,7 @@ impl SafetyParams {
         Some(HalfPlane { normal, bound: -(self.gain_per_s * (root + speed) + slope * speed) })
     }
 
-    fn neighbour_plane(&self, neighbour: &Neighbour) -> HalfPlane {
+    fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
         let distance = neighbour.position_m.norm().max(1e-6);
         let normal = -neighbour.position_m / distance;
         let velocity = -neighbour.velocity_mps;
@@ -111,13 +169,31 @@ impl SafetyParams {
         let late_s = neighbour.age_s + self.reaction_time_s;
         let keep = self.safe_distance_m * (1.0 + self.margin) + late_s * (1.0 + self.acceleration_max_mps2 * late_s);
         let alpha = self.acceleration_max_mps2;
-        let (root, slope) = root(alpha, distance - keep);
+        let beyond_m = distance - keep;
+        let (root, slope) = root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
         let turning = (velocity.norm_squared() - speed * speed) / distance;
         let slack = self.gain_per_s * (root + speed) + turning + slope * speed;
         // Room that is left is halved, an evasion is divided by precedence.
         let share = if slack < 0.0 { neighbour.share } else { neighbour.share.min(0.5) };
-        HalfPlane { normal, bound: -share * slack }
+        Barrier { normal, slack, share, beyond_m }
+    }
+
+    /// Behind a drone that flies away a drone keeps room to stop, should the other stop dead: v ≤ √(u² + 2 a x), with v
+    /// and u the speeds of both along the line between them. `braking` is the other's acceleration, as sensed.
+    fn following_plane(&self, other: &Neighbour, barrier: &Barrier, own: Vec2, braking: Vec2) -> Option<HalfPlane> {
+        let (normal, theirs) = (barrier.normal, own + other.velocity_mps);
+        let (approach, flight) = (-own.dot(&normal), -theirs.dot(&normal));
+        if flight <= 0.0 || approach <= 0.0 {
+            return None;
+        }
+        let stop = self.acceleration_max_mps2;
+        let limit = (flight * flight + 2.0 * stop * barrier.beyond_m).max(LEAST_LIMIT_MPS * LEAST_LIMIT_MPS).sqrt();
+        let apart = -other.velocity_mps;
+        let turn = (apart - normal * apart.dot(&normal)) / other.position_m.norm().max(1e-6);
+        let slowing = flight * (-braking.dot(&normal) - theirs.dot(&turn)) + stop * apart.dot(&normal);
+        let bound = -self.gain_per_s * (limit - approach) - own.dot(&turn) - slowing / limit;
+        Some(HalfPlane { normal, bound })
     }
 }
 
@@ -144,6 +220,7 @@ mod tests {
         gain_per_s: 1.5,
         margin: 0.02,
         reaction_time_s: 0.0,
+        dt_s: DT,
     };
     const DT: f64 = 0.02;
 
@@ -156,7 +233,8 @@ mod tests {
             let accelerations = [0, 1].map(|i| {
                 let other = 1 - i;
                 let (position_m, velocity_mps) = (p[other] - p[i], v[other] - v[i]);
-                let neighbour = Neighbour { position_m, velocity_mps, age_s: 0.0, share: shares[i] };
+                let id = DroneId(other as u32);
+                let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, share: shares[i] };
                 let want = (wanted[i] - v[i]) * 2.0;
                 filters[i].filter(want, v[i], std::iter::empty(), std::iter::once(neighbour))
             });
@@ -187,6 +265,30 @@ mod tests {
     fn one_that_takes_all_is_safe_from_one_that_takes_nothing() {
         let least = fly_pair([Vec2::zeros(), Vec2::new(90.0, 5.0)], [Vec2::new(10.0, 0.0), Vec2::zeros()], [1.0, 0.0]);
         assert!(least >= PARAMS.safe_distance_m, "{least}");
+    }
+
+    #[test]
+    fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
+        for share in [0.1, 0.5, 0.9] {
+            let (mut ahead, mut behind) = ((31.0, 10.0), (0.0, 10.0));
+            let mut filter = Safety::new(PARAMS);
+            for _ in 0..1500 {
+                let neighbour = Neighbour {
+                    id: DroneId(0),
+                    position_m: Vec2::new(ahead.0 - behind.0, 0.0),
+                    velocity_mps: Vec2::new(ahead.1 - behind.1, 0.0),
+                    age_s: 0.0,
+                    share,
+                };
+                let (velocity, wanted) = (Vec2::new(behind.1, 0.0), Vec2::new((10.0 - behind.1) * 2.0, 0.0));
+                let a = filter.filter(wanted, velocity, std::iter::empty(), std::iter::once(neighbour));
+                let brake = -f64::min(PARAMS.acceleration_max_mps2, ahead.1 / DT);
+                for (body, a) in [(&mut ahead, brake), (&mut behind, a.x)] {
+                    *body = (body.0 + body.1 * DT + a * DT * DT / 2.0, body.1 + a * DT);
+                }
+                assert!(ahead.0 - behind.0 >= PARAMS.safe_distance_m, "{} with share {share}", ahead.0 - behind.0);
+            }
+        }
     }
 
     #[test]

@@ -235,6 +235,7 @@ impl SwarmPilot {
         self.neighbours.clear();
         for sensed in senses.neighbours {
             self.neighbours.push(Neighbour {
+                id: sensed.drone,
                 position_m: sensed.position_m.into(),
                 velocity_mps: sensed.velocity_mps.into(),
                 age_s: 0.0,
@@ -249,7 +250,7 @@ impl SwarmPilot {
             }
             let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
             let (age_s, share) = (senses.now.since(pose.stamp), self.share(senses.now, id, places));
-            self.neighbours.push(Neighbour { position_m, velocity_mps, age_s, share });
+            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, share });
         }
     }
 

@@ -198,7 +198,6 @@ impl Planner {
         let plan = Plan {
             predicted_s,
             routes: routes.count() as u32,
-            candidates: 1,
             ..self.plan(s, PHASE_AVOID, set, Vec2::new(f64::INFINITY, 0.0))
         };
         let part = |(i, m): (usize, &Member)| {

@@ -34,10 +34,10 @@ impl Shape {
             }
             Self::V => (0..count).map(|i| chevron_slot(i, step)).collect(),
             Self::Line => (0..count).map(|i| Vec2::new(0.0, side(i) * spacing_m)).collect(),
-            Self::Column => (0..count).map(|i| Vec2::new(-(i as f64) * spacing_m, 0.0)).collect(),
+            Self::Column => (0..count).map(|i| Vec2::new(0.0 - i as f64 * spacing_m, 0.0)).collect(),
             Self::Grid => {
                 let width = (count as f64).sqrt().ceil().max(1.0) as usize;
-                (0..count).map(|i| Vec2::new(-((i / width) as f64), side(i % width)) * spacing_m).collect()
+                (0..count).map(|i| Vec2::new(0.0 - (i / width) as f64, side(i % width)) * spacing_m).collect()
             }
             Self::Circle => circle(count, spacing_m),
             Self::Offsets(offsets) => offsets.iter().take(count).map(|&o| Vec2::from(o)).collect(),
@@ -48,13 +48,13 @@ impl Shape {
 /// Tip, then left and right in turn along the arms.
 fn chevron_slot(i: usize, step: f64) -> Vec2 {
     let along = i.div_ceil(2) as f64;
-    Vec2::new(-along, side(i)) * step
+    Vec2::new(0.0 - along, side(i)) * step
 }
 
 /// 0, 1, −1, 2, −2, …
 fn side(i: usize) -> f64 {
     let distance = i.div_ceil(2) as f64;
-    if i % 2 == 1 { distance } else { -distance }
+    if i % 2 == 1 { distance } else { 0.0 - distance }
 }
 
 fn circle(count: usize, spacing_m: f64) -> Vec<Vec2> {

@@ -27,13 +27,13 @@ impl SimTime {
     /// Seconds since the start of the mission.
     #[must_use]
     pub fn secs(self) -> f64 {
-        self.0 as f64 * 1e-9
+        self.0 as f64 / 1e9
     }
 
     /// Seconds from `earlier` to `self`; negative if `self` is the earlier one.
     #[must_use]
     pub fn since(self, earlier: Self) -> f64 {
-        self.0.saturating_sub(earlier.0) as f64 * 1e-9
+        self.0.saturating_sub(earlier.0) as f64 / 1e9
     }
 
     /// `self` plus a span of seconds, saturating.

@@ -94,6 +94,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             gain_per_s: scenario.guidance.filter_gain_per_s,
             margin: scenario.guidance.filter_margin,
             reaction_time_s: drone.reaction_time_s,
+            dt_s: scenario.time.dt_s,
         },
         braking: Braking { drag_coefficient: drone.drag_coefficient, reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
