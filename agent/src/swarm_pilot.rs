@@ -141,8 +141,13 @@ impl SwarmPilot {
     fn plan(&mut self, senses: &Senses<'_>) {
         let now = senses.now;
         self.members.clear();
-        self.members.push(Member { id: self.params.me, position: senses.position });
-        let peers = self.peers.living(now).map(|(id, pose)| Member { id, position: extrapolated(pose, now) });
+        let speed_mps = senses.velocity.norm();
+        self.members.push(Member { id: self.params.me, position: senses.position, speed_mps });
+        let peers = self.peers.living(now).map(|(id, pose)| Member {
+            id,
+            position: extrapolated(pose, now),
+            speed_mps: Vec2::from(pose.velocity_mps).norm(),
+        });
         self.members.extend(peers);
         self.members.sort_by_key(|member| member.id);
         for set in self.ledger.sets() {

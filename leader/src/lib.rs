@@ -1,5 +1,6 @@
 //! Who leads, and who goes where: membership, election, routes, exact grouping, formation. Pure.
 
+mod avoid;
 pub mod cost;
 pub mod election;
 mod exchange;
@@ -8,6 +9,7 @@ pub mod ledger;
 pub mod membership;
 pub mod obstacles;
 pub mod planner;
+mod reform;
 pub mod routes;
 pub mod slots;
 pub mod split;

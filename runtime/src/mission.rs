@@ -124,6 +124,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         routes: RouteParams { clearance_m: avoidance.clearance_m, planning_distance_m: avoidance.planning_distance_m },
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
+        arrival_error_m: scenario.mission.arrival_error_m,
         safe_distance_m: drone.safe_distance_m,
         course_y_m: scenario.formation.start_m[1],
         destination: destination(scenario),

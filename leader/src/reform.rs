@@ -1,0 +1,119 @@
+//! Who takes which slot (paper, Algorithm 5).
+
+use crate::ledger::Orders;
+use crate::planner::{Destination, Member, Planner, Situation, front};
+use crate::slots;
+use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
+use skein_protocol::{GroupId, SimTime, Vec2};
+
+/// Slots within the safe distance of a dead drone: the anchor moves on in such steps, m.
+const ANCHOR_STEP_M: f64 = 5.0;
+/// A formation in which somebody cannot reach a slot opens its ranks by this, as a factor.
+const OPEN_RANKS: f64 = 1.6;
+/// Nobody moves faster than this, m/s, …
+const STALLED_MPS: f64 = 0.5;
+/// … for so long, s: somebody is stuck.
+const STALLED_S: f64 = 3.0;
+
+/// What a leader remembers while the formation closes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Reform {
+    /// Since when the members are others than those planned for.
+    changed: Option<SimTime>,
+    /// Since when nobody has moved although somebody is not in its slot.
+    stalled: Option<SimTime>,
+    /// Whether the ranks are open.
+    open: bool,
+}
+
+impl Planner {
+    /// Orders to fly in formation: once all are past everything, whenever the members change, and when they are stuck.
+    pub(crate) fn formation(&mut self, s: &Situation<'_>) -> Option<Orders> {
+        let obeyed = s.ledger.obeyed().filter(|orders| orders.plan.id.ballot == s.ballot);
+        let passed = !s.ledger.sets().is_empty();
+        let same = obeyed.is_some_and(|orders| orders.parts.keys().eq(s.members.iter().map(|m| &m.id)));
+        if !passed && same {
+            self.reform.changed = None;
+            return obeyed.filter(|orders| self.stuck(s, orders)).and_then(|orders| {
+                self.reform = Reform { open: !self.reform.open, ..Reform::default() };
+                self.slots(s, orders.plan.phase)
+            });
+        }
+        let changed = *self.reform.changed.get_or_insert(s.now);
+        if !passed && obeyed.is_some() && s.now.since(changed) < self.params.debounce_s {
+            return None;
+        }
+        self.reform = Reform::default();
+        let avoided = s.ledger.obeyed().is_some_and(|orders| orders.plan.phase != PHASE_CRUISE);
+        self.slots(s, if passed || avoided { PHASE_REFORM } else { PHASE_CRUISE })
+    }
+
+    /// Whether nobody has moved for a while although somebody is not in its slot; also once open ranks are taken.
+    fn stuck(&mut self, s: &Situation<'_>, orders: &Orders) -> bool {
+        let anchor = Vec2::from(orders.plan.anchor_m);
+        let error = |m: &Member| match orders.parts.get(&m.id) {
+            Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
+            None => 0.0,
+        };
+        let worst = s.members.iter().map(error).fold(0.0, f64::max);
+        let still = s.members.iter().all(|m| m.speed_mps < STALLED_MPS);
+        if !still || orders.plan.phase != PHASE_REFORM || (worst <= self.params.arrival_error_m && !self.reform.open) {
+            self.reform.stalled = None;
+            return false;
+        }
+        let since = *self.reform.stalled.get_or_insert(s.now);
+        s.now.since(since) >= STALLED_S
+    }
+
+    fn slots(&self, s: &Situation<'_>, phase: u32) -> Option<Orders> {
+        let close = self.params.shape.slots(s.members.len(), self.params.spacing_m);
+        let anchor = self.anchor(s, &close, phase);
+        let shape = if self.reform.open { opened(&close) } else { close };
+        let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
+        let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
+        let taken = slots::assign(&positions, &places).ok()?;
+        let plan = self.plan(s, phase, &[], anchor);
+        let group = |id| s.ledger.obeyed().and_then(|o| o.parts.get(&id)).map_or(GroupId::ALL, |part| part.group);
+        let groups: Vec<GroupId> = s.members.iter().map(|m| group(m.id)).collect();
+        let part = |(i, m): (usize, &Member)| {
+            let assignment = Assignment {
+                id: plan.id,
+                group: groups[i],
+                drone: m.id,
+                leader: front(s.members, &groups, groups[i]),
+                slot_m: shape[taken[i]].into(),
+                arrival_s: 0.0,
+                route: NO_ROUTE,
+                rank: 0,
+                reserved: 0,
+            };
+            (m.id, assignment)
+        };
+        Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
+    }
+
+    /// Where the front slot goes: the goal, or where the members are on average, clear of the dead.
+    fn anchor(&self, s: &Situation<'_>, shape: &[Vec2], phase: u32) -> Vec2 {
+        if let (Destination::Goal { front_m }, PHASE_REFORM) = (self.params.destination, phase) {
+            return front_m;
+        }
+        let count = s.members.len().max(1) as f64;
+        let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
+        let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
+        let mut anchor = Vec2::new(x, self.params.course_y_m);
+        let keep_m = 1.05 * self.params.safe_distance_m;
+        let blocked =
+            |anchor: Vec2| s.silent.iter().any(|dead| shape.iter().any(|slot| (slot + anchor - dead).norm() < keep_m));
+        while phase == PHASE_REFORM && blocked(anchor) {
+            anchor.x += ANCHOR_STEP_M;
+        }
+        anchor
+    }
+}
+
+/// The shape with wider gaps, about its own centre: whoever is shut out finds a way in, and when the ranks close again
+/// all move in proportion.
+fn opened(shape: &[Vec2]) -> Vec<Vec2> {
+    let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
+    shape.iter().map(|slot| centre + (slot - centre) * OPEN_RANKS).collect()
+}
