@@ -8,7 +8,7 @@ use crate::queue::{Ahead, ahead_of, queue_speed};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::talk::Talk;
 use crate::way::{OwnWay, Way};
-use skein_leader::cost::{Flight, arrival_s};
+use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::election::{Election, Input};
 use skein_leader::ledger::Ledger;
 use skein_leader::membership::{Peers, extrapolated};
@@ -201,9 +201,8 @@ impl SwarmPilot {
             return;
         }
         let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: self.params.planner.course_y_m };
-        let length = |r: &usize| arrival_s(&[], &routes, *r, senses.position, &flight);
-        let nearest = (0..routes.count()).min_by(|a, b| length(a).total_cmp(&length(b)));
-        self.way.own = nearest.map(|route| OwnWay { tag, routes, route });
+        let route = shortest(&trips(&[], &routes, senses.position, &flight));
+        self.way.own = Some(OwnWay { tag, routes, route });
     }
 
     /// The velocity it wants, were nobody in the way, m/s.

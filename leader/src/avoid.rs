@@ -1,6 +1,6 @@
 //! Who flies which way past an obstacle set (paper, Algorithm 3).
 
-use crate::cost::{Flight, arrival_s};
+use crate::cost::{Flight, Trip, shortest, trips};
 use crate::ledger::{Ledger, Orders, PlannedSet};
 use crate::planner::{Member, Planner, Situation, Strategy, front};
 use crate::routes::Routes;
@@ -15,17 +15,12 @@ impl Planner {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &self.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
         let flight = Flight { speed_mps: self.params.speed_mps, course_y_m: self.params.course_y_m };
-        let arrivals: Vec<Vec<f64>> = s
-            .members
-            .iter()
-            .map(|m| {
-                let earlier = earlier_legs(s.ledger, m, &routes);
-                (0..routes.count()).map(|r| arrival_s(&earlier, &routes, r, m.position, &flight)).collect()
-            })
-            .collect();
+        let ways = |m: &Member| trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight);
+        let ways: Vec<Vec<Trip>> = s.members.iter().map(ways).collect();
+        let arrivals: Vec<Vec<f64>> = ways.iter().map(|row| row.iter().map(|way| way.arrival_s).collect()).collect();
         let kept: Vec<Option<&Assignment>> =
             s.members.iter().map(|m| before.and_then(|p| p.parts.get(&m.id))).collect();
-        let chosen = self.choose(s.members, &routes, &arrivals, &kept)?;
+        let chosen = self.choose(s.members, &routes, &ways, &kept)?;
         let ranks = ranks(&chosen, &arrivals, &kept);
         let groups = groups(s, &chosen, &kept, &overlapping(s.ledger, set));
         let predicted_s = self.table(&arrivals, routes.count())?.assigned(&chosen).ok()?.makespan_s;
@@ -56,18 +51,18 @@ impl Planner {
         &self,
         members: &[Member],
         routes: &Routes,
-        arrivals: &[Vec<f64>],
+        ways: &[Vec<Trip>],
         kept: &[Option<&Assignment>],
     ) -> Option<Vec<usize>> {
         let settled = |i: usize| match kept[i] {
             Some(part) if usize::from(part.route) < routes.count() => Some(usize::from(part.route)),
-            _ if members[i].position.x >= routes.gate_x_m() => Some(nearest(&arrivals[i])),
+            _ if members[i].position.x >= routes.gate_x_m() => Some(shortest(&ways[i])),
             // Whoever joins a queue that is already flying takes its own shortest way.
-            _ if kept.iter().any(Option::is_some) => Some(nearest(&arrivals[i])),
+            _ if kept.iter().any(Option::is_some) => Some(shortest(&ways[i])),
             _ => None,
         };
         let free: Vec<usize> = (0..members.len()).filter(|&i| settled(i).is_none()).collect();
-        let rows: Vec<Vec<f64>> = free.iter().map(|&i| arrivals[i].clone()).collect();
+        let rows: Vec<Vec<f64>> = free.iter().map(|&i| ways[i].iter().map(|way| way.arrival_s).collect()).collect();
         let table = self.table(&rows, routes.count())?;
         let split = match self.params.strategy {
             Strategy::CongestionAware => table.split(),
@@ -85,11 +80,6 @@ impl Planner {
     fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
         Table::new(arrivals, &vec![self.params.headway_s; routes]).ok()
     }
-}
-
-fn nearest(arrivals: &[f64]) -> usize {
-    let least = |a: &usize, b: &usize| arrivals[*a].total_cmp(&arrivals[*b]).then(a.cmp(b));
-    (0..arrivals.len()).min_by(least).unwrap_or(0)
 }
 
 /// The sets before `routes` that a member has still to leave, with its route past each.

@@ -117,6 +117,8 @@ pub struct Routes {
     routes: Vec<Route>,
     gate_x_m: f64,
     exit_x_m: f64,
+    /// From right to left, what each route's bodies are made of: obstacles inflated by r_obs.
+    blocks: Vec<Vec<Block>>,
 }
 
 impl Routes {
@@ -126,7 +128,7 @@ impl Routes {
     pub fn new(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
         let masses = ordered(merged(obstacles, params), params);
         if masses.is_empty() {
-            return Self { routes: vec![Route::default()], gate_x_m: 0.0, exit_x_m: 0.0 };
+            return Self { routes: vec![Route::default()], gate_x_m: 0.0, exit_x_m: 0.0, blocks: Vec::new() };
         }
         let routes = (0..=masses.len()).map(|route| Route::new(walls(&masses, route, params))).collect();
         let centres = masses.iter().map(|mass| (mass.low.x + mass.high.x) / 2.0);
@@ -135,7 +137,18 @@ impl Routes {
             routes,
             gate_x_m: centres.sum::<f64>() / masses.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
+            blocks: masses.iter().map(|mass| mass.blocks.clone()).collect(),
         }
+    }
+
+    /// Whether a drone at `position` can still take a route: whether no obstacle lies abreast between it and the side on
+    /// which the route passes.
+    #[must_use]
+    pub fn is_open(&self, route: usize, position: Vec2) -> bool {
+        let (right, left) = self.blocks.split_at(route.min(self.blocks.len()));
+        let above = |block: &Block| block.extent(position.x).is_some_and(|(low, _)| position.y < low);
+        let below = |block: &Block| block.extent(position.x).is_some_and(|(_, high)| position.y > high);
+        !right.iter().flatten().any(above) && !left.iter().flatten().any(below)
     }
 
     /// Number of routes: obstacles, those enveloped as one counting once, plus one (paper, E5).
@@ -172,6 +185,32 @@ struct Mass {
     radius_m: f64,
     low: Vec2,
     high: Vec2,
+    blocks: Vec<Block>,
+}
+
+/// An obstacle inflated by r_obs, by its sides to the right and to the left, along x.
+#[derive(Clone, Debug, PartialEq)]
+struct Block {
+    lower: Vec<Vec2>,
+    upper: Vec<Vec2>,
+}
+
+impl Block {
+    fn new(outline: &[Vec2]) -> Self {
+        Self { lower: lower_chain(outline), upper: upper_chain(outline) }
+    }
+
+    /// From where to where it reaches across the flight at an abscissa, m.
+    fn extent(&self, x_m: f64) -> Option<(f64, f64)> {
+        Some((height(&self.lower, x_m)?, height(&self.upper, x_m)?))
+    }
+}
+
+/// Ordinate of a chain at an abscissa; `None` beyond its ends.
+fn height(chain: &[Vec2], x_m: f64) -> Option<f64> {
+    let legs = chain.iter().zip(chain.iter().skip(1));
+    let (a, b) = legs.clone().find(|(a, b)| (a.x..=b.x).contains(&x_m))?;
+    Some(a.y + (b.y - a.y) * (x_m - a.x) / (b.x - a.x))
 }
 
 impl Mass {
@@ -179,7 +218,7 @@ impl Mass {
         let margin = Vec2::repeat(radius_m);
         let low = core.iter().fold(Vec2::repeat(f64::INFINITY), |low, p| low.inf(p)) - margin;
         let high = core.iter().fold(Vec2::repeat(f64::NEG_INFINITY), |high, p| high.sup(p)) + margin;
-        Self { id, core, radius_m, low, high }
+        Self { id, core, radius_m, low, high, blocks: Vec::new() }
     }
 
     /// Shortest vector between the cores, and what is left of its length without the roundings, m.
@@ -199,15 +238,20 @@ impl Mass {
         let radius_m = self.radius_m.min(other.radius_m);
         let mut points = inflate(&self.core, self.radius_m - radius_m);
         points.extend(inflate(&other.core, other.radius_m - radius_m));
-        Self::new(self.id.min(other.id), hull(&points), radius_m)
+        let blocks = self.blocks.iter().chain(&other.blocks).cloned().collect();
+        Self { blocks, ..Self::new(self.id.min(other.id), hull(&points), radius_m) }
     }
 }
 
 /// Envelopes whatever has no passable gap between it, until all gaps that are left are passable.
 fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<Mass> {
     let valid = obstacles.iter().filter(|(_, shape)| shape.check().is_ok());
-    let mut masses: Vec<Mass> =
-        valid.map(|(id, shape)| Mass::new(*id, hull(&shape.vertices().collect::<Vec<_>>()), shape.radius_m)).collect();
+    let mass = |(id, shape): &(ObstacleId, ConvexShape)| {
+        let core = hull(&shape.vertices().collect::<Vec<_>>());
+        let block = Block::new(&inflate(&core, shape.radius_m + params.clearance_m));
+        Mass { blocks: vec![block], ..Mass::new(*id, core, shape.radius_m) }
+    };
+    let mut masses: Vec<Mass> = valid.map(mass).collect();
     masses.sort_by_key(|mass| mass.id);
     let least_m = 2.0 * params.clearance_m;
     let closed = |a: &Mass, b: &Mass| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
