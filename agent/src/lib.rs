@@ -6,10 +6,12 @@
 //! | [`swarm_pilot`] | the paper's drone: detect, obey, avoid, queue, re-form |
 //! | [`danger`] | detection distances (equations 1–4) |
 //! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
+//! | [`escape`] | out of a corner |
 //! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
 //! | [`talk`] | what is said, and when |
 
 pub mod danger;
+pub mod escape;
 pub mod guidance;
 pub mod params;
 pub mod pilot;

@@ -91,28 +91,33 @@ impl Safety {
         Self { params, planes: Vec::new(), program: Program::default(), trusted: Vec::new(), trusting: Vec::new() }
     }
 
-    /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles come first.
+    /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles and
+    /// neighbours that cannot evade come first.
     pub fn filter(
         &mut self,
         wanted: Vec2,
         velocity: Vec2,
         obstacles: impl Iterator<Item = NearObstacle>,
-        neighbours: impl Iterator<Item = Neighbour>,
+        neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> Vec2 {
         let params = self.params;
         self.planes.clear();
         self.planes.extend(obstacles.filter_map(|obstacle| params.obstacle_plane(&obstacle, velocity)));
-        let hard = self.planes.len();
         self.trusting.clear();
-        for neighbour in neighbours {
+        // Whoever cannot evade is kept clear of like an obstacle: first, and whatever the others do.
+        let (helpless, others) = (neighbours.clone().filter(|n| n.share >= 1.0), neighbours.filter(|n| n.share < 1.0));
+        let mut hard = self.planes.len();
+        for neighbour in helpless.chain(others) {
             let barrier = params.neighbour_barrier(&neighbour);
             let before = self.trusted.iter().find(|trust| trust.id == neighbour.id && neighbour.age_s == 0.0);
             let missing = before.map_or(0.0, |trust| trust.missing(velocity + neighbour.velocity_mps, params.dt_s));
-            let braking = before.map_or_else(Vec2::zeros, |trust| {
-                (velocity + neighbour.velocity_mps - trust.velocity) / params.dt_s
-            });
+            let braking = before
+                .map_or_else(Vec2::zeros, |trust| (velocity + neighbour.velocity_mps - trust.velocity) / params.dt_s);
             self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking));
             self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
+            if neighbour.share >= 1.0 {
+                hard = self.planes.len();
+            }
             self.trusting.push(Trust {
                 id: neighbour.id,
                 velocity: velocity + neighbour.velocity_mps,

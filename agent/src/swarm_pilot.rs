@@ -1,6 +1,7 @@
 //! The paper's drone: detect, obey, avoid, queue, re-form; plan for all while it leads. Paper, Algorithm 1.
 
 use crate::danger::Braking;
+use crate::escape::Escape;
 use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
@@ -29,6 +30,10 @@ const GAIN_BY_REACTION: f64 = 0.4;
 /// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
 const DEAD_BERTH: f64 = 1.1;
 
+/// A drone that does not get on waits so long before it gives way, s; in formation the leader opens ranks before.
+const PATIENCE_ON_THE_WAY_S: f64 = 3.0;
+const PATIENCE_IN_FORMATION_S: f64 = 8.0;
+
 /// One drone's mind, and what it remembers.
 #[derive(Clone, Debug)]
 pub struct SwarmPilot {
@@ -42,6 +47,7 @@ pub struct SwarmPilot {
     talk: Talk,
     safety: Safety,
     delayed: VecDeque<Vec2>,
+    escape: Escape,
     members: Vec<Member>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
@@ -63,6 +69,7 @@ impl SwarmPilot {
             talk: Talk::new(&params),
             safety: Safety::new(params.safety),
             delayed: VecDeque::from(vec![Vec2::zeros(); reaction_ticks]),
+            escape: Escape::default(),
             members: Vec::new(),
             silent: Vec::new(),
             ahead: Vec::new(),
@@ -329,6 +336,9 @@ impl Pilot for SwarmPilot {
         }
         let places = self.way.places(senses.position);
         let wanted = self.wanted_velocity(senses, &places);
+        let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
+        let patience_s = if self.way.is_open() { PATIENCE_ON_THE_WAY_S } else { PATIENCE_IN_FORMATION_S };
+        let wanted = self.escape.steer(senses.now, senses.velocity, wanted, patience_s, slow_mps);
         self.find_neighbours(senses, &places);
         let safe = self.accelerate(wanted, senses);
         self.delayed.push_back(safe);

@@ -1,5 +1,6 @@
 //! A drone's way past the obstacle sets ahead: its routes, the taut string through them, its places in queues.
 
+use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::ledger::Ledger;
 use skein_leader::ledger::PlannedSet;
 use skein_leader::routes::{Body, Routes};
@@ -41,6 +42,8 @@ pub struct Way {
     legs: Vec<Leg>,
     lane: Option<Lane>,
     drawn: Option<(PlanStamp, bool, usize)>,
+    /// Routes taken instead of those assigned, by set: an obstacle abreast shut the other one off.
+    detours: Vec<(u32, usize)>,
     bodies: Vec<Vec2>,
     /// Taken when an obstacle is dangerously near and no leader said anything.
     pub own: Option<OwnWay>,
@@ -50,7 +53,16 @@ impl Way {
     /// A free way.
     #[must_use]
     pub fn new(me: DroneId, course_y_m: f64) -> Self {
-        Self { me, course_y_m, legs: Vec::new(), lane: None, drawn: None, bodies: Vec::new(), own: None }
+        Self {
+            me,
+            course_y_m,
+            legs: Vec::new(),
+            lane: None,
+            drawn: None,
+            detours: Vec::new(),
+            bodies: Vec::new(),
+            own: None,
+        }
     }
 
     /// Follows the ledger: takes up new parts, closes legs that are left, evades `bodies` (drones that hang dead in the
@@ -65,7 +77,11 @@ impl Way {
             || self.bodies.iter().zip(bodies).any(|(old, new)| (old - new).norm() > DRIFT_M);
         let left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
         let key = (ledger.stamp(), self.own.is_some(), left);
-        if self.drawn == Some(key) && !moved {
+        if self.drawn.is_none_or(|drawn| drawn.0 != key.0) {
+            self.detours.clear();
+        }
+        let detoured = self.detour(ledger, position);
+        if self.drawn == Some(key) && !moved && !detoured {
             return;
         }
         self.bodies.clear();
@@ -75,14 +91,38 @@ impl Way {
         self.drawn = Some((ledger.stamp(), self.own.is_some(), left));
     }
 
+    /// The route it flies past a set, and its place in the queue.
+    fn place(&self, set: &PlannedSet) -> Option<QueuePlace> {
+        let part = set.parts.get(&self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
+        let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
+        Some(match self.detours.iter().find(|(tag, _)| *tag == set.tag) {
+            Some((_, route)) => QueuePlace { route: *route as u16, rank: NO_RANK, ..place },
+            None => place,
+        })
+    }
+
+    /// A drone that was driven to the wrong side of an obstacle takes the shortest of the routes still open to it.
+    fn detour(&mut self, ledger: &Ledger, position: Vec2) -> bool {
+        let flight = Flight { speed_mps: 1.0, course_y_m: self.course_y_m };
+        let mut detoured = false;
+        for set in ledger.sets().iter().filter(|set| position.x < set.routes.exit_x_m()) {
+            let Some(route) = self.place(set).map(|place| usize::from(place.route)) else { continue };
+            if set.routes.is_open(route, position) {
+                continue;
+            }
+            let open = shortest(&trips(&[], &set.routes, position, &flight));
+            if open != route && set.routes.is_open(open, position) {
+                self.detours.retain(|(tag, _)| *tag != set.tag);
+                self.detours.push((set.tag, open));
+                detoured = true;
+            }
+        }
+        detoured
+    }
+
     fn draw(&mut self, ledger: &Ledger, position: Vec2, body_radius_m: f64) {
-        let mine = |set: &PlannedSet| {
-            let part = set.parts.get(&self.me)?;
-            let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
-            (usize::from(part.route) < set.routes.count()).then_some(place)
-        };
         let mut legs: Vec<(QueuePlace, &Routes)> =
-            ledger.sets().iter().filter_map(|set| mine(set).map(|place| (place, &set.routes))).collect();
+            ledger.sets().iter().filter_map(|set| self.place(set).map(|place| (place, &set.routes))).collect();
         if let Some(own) = &self.own {
             let route = own.route as u16;
             legs.push((QueuePlace { remaining_m: 0.0, set: own.tag, route, rank: NO_RANK }, &own.routes));
@@ -138,6 +178,12 @@ impl Way {
             Some(lane) if position.x < leg.gate_x_m => lane.pull(position, leg.gate_x_m).to_gate_m,
             _ => leg.gate_x_m - position.x,
         }
+    }
+
+    /// Whether a set is still to be left.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.lane.is_some()
     }
 
     /// Whether the set of this place is still to be left.

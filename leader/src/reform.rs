@@ -1,12 +1,15 @@
 //! Who takes which slot (paper, Algorithm 5).
 
+use crate::geometry::nearest;
 use crate::ledger::Orders;
 use crate::planner::{Destination, Member, Planner, Situation, front};
 use crate::slots;
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
 use skein_protocol::{GroupId, SimTime, Vec2};
 
-/// Slots within the safe distance of a dead drone: the anchor moves on in such steps, m.
+/// Slots keep this many safe distances from drones that hang dead in the air.
+const DEAD_BERTH: f64 = 1.05;
+/// While a slot is too near to one, or to an obstacle, the anchor moves on in such steps, m.
 const ANCHOR_STEP_M: f64 = 5.0;
 /// A formation in which somebody cannot reach a slot opens its ranks by this, as a factor.
 const OPEN_RANKS: f64 = 1.6;
@@ -92,7 +95,7 @@ impl Planner {
         Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
     }
 
-    /// Where the front slot goes: the goal, or where the members are on average, clear of the dead.
+    /// Where the front slot goes: the goal, or where the members are on average, clear of obstacles and of the dead.
     fn anchor(&self, s: &Situation<'_>, shape: &[Vec2], phase: u32) -> Vec2 {
         if let (Destination::Goal { front_m }, PHASE_REFORM) = (self.params.destination, phase) {
             return front_m;
@@ -101,9 +104,15 @@ impl Planner {
         let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
         let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
         let mut anchor = Vec2::new(x, self.params.course_y_m);
-        let keep_m = 1.05 * self.params.safe_distance_m;
-        let blocked =
-            |anchor: Vec2| s.silent.iter().any(|dead| shape.iter().any(|slot| (slot + anchor - dead).norm() < keep_m));
+        let keep_m = DEAD_BERTH * self.params.safe_distance_m;
+        let clear_m = self.params.routes.planning_distance_m;
+        let shapes: Vec<(Vec<Vec2>, f64)> =
+            s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
+        let shut = |slot: Vec2| {
+            s.silent.iter().any(|dead| (slot - dead).norm() < keep_m)
+                || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
+        };
+        let blocked = |anchor: Vec2| shape.iter().any(|slot| shut(slot + anchor));
         while phase == PHASE_REFORM && blocked(anchor) {
             anchor.x += ANCHOR_STEP_M;
         }

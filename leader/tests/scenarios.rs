@@ -71,7 +71,8 @@ impl Scene {
     fn table(&self) -> Table {
         let shape = ConvexShape::rectangle(self.centre_m, self.half_m, 0.0).unwrap();
         let routes = Routes::new(&[(ObstacleId(0), shape)], &PARAMS);
-        let row = |&p: &Vec2| (0..routes.count()).map(|route| trip(&[], &routes, route, p, &FLIGHT).arrival_s).collect();
+        let row =
+            |&p: &Vec2| (0..routes.count()).map(|route| trip(&[], &routes, route, p, &FLIGHT).arrival_s).collect();
         let rows: Vec<Vec<f64>> = self.detection().iter().map(row).collect();
         Table::new(&rows, &[1.1 * self.d_safe_m / FLIGHT.speed_mps; 2]).unwrap()
     }

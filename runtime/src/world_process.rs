@@ -7,7 +7,7 @@ use skein_bus::{
     SHARD_DRONES, Services, UplinkSubscriber, WorldState, pin_to_core, raise_file_limit, shards,
 };
 use skein_protocol::DroneId;
-use skein_protocol::record::FaultKind;
+use skein_protocol::record::{FaultKind, RecordHead, RecordView};
 use skein_protocol::slot::LinkStats;
 use skein_world::World;
 use std::sync::Arc;
@@ -49,6 +49,9 @@ pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
         answers: vec![Answer::Pending; drones],
         taken: vec![0; drones],
         due: vec![0; drones],
+        lost: 0,
+        untold: Vec::new(),
+        wall_clock: clock != Clock::Lockstep,
     };
     air.control.set_world_state(WorldState::Ready);
     if air.control.wait_go(|| true) {
@@ -75,6 +78,11 @@ struct Air {
     /// Frames taken from each drone so far, and frames it has announced.
     taken: Vec<u64>,
     due: Vec<u64>,
+    /// Records dropped since the last one that got through, and their events.
+    lost: u32,
+    untold: Vec<u8>,
+    /// Then a drone may have found its buffer full, and announced frames that never come.
+    wall_clock: bool,
 }
 
 impl Air {
@@ -103,7 +111,7 @@ impl Air {
         let mut stats = LinkStats::default();
         (0..self.answers.len()).for_each(|drone| stats.merge(&self.control.stats(drone)));
         self.world.finish(&stats, wall_s);
-        self.tell()?;
+        self.tell_last()?;
         self.control.close();
         Ok(())
     }
@@ -144,14 +152,19 @@ impl Air {
         Ok(())
     }
 
-    /// Drains each shard of just what its drones have announced: every further call would look through all of them.
+    /// Drains each shard of just what its drones have announced: every further call would look through all of them. Of
+    /// a late drone, whatever is there: its buffer must not fill up.
     fn take_frames(&mut self) -> Result<(), RuntimeError> {
+        let late = self.answers.contains(&Answer::Late);
         for (shard, port) in self.up.iter().enumerate() {
             let first = shard * SHARD_DRONES;
             let drones = first..(first + SHARD_DRONES).min(self.due.len());
             let mut missing = drones.clone().any(|drone| self.taken[drone] < self.due[drone]);
-            while missing {
+            while missing || late {
                 let Some(sample) = port.receive()? else {
+                    if self.wall_clock {
+                        break;
+                    }
                     return Err(RuntimeError::Process(format!("frames announced on uplink {shard} did not arrive")));
                 };
                 let source = DroneId(sample.header().source);
@@ -165,9 +178,35 @@ impl Air {
         Ok(())
     }
 
-    fn tell(&self) -> Result<(), RuntimeError> {
+    /// Sends the record of the tick that ended. One that a full recorder drops (wall clock only) is counted in the next
+    /// that gets through, and its events go along with that.
+    fn tell(&mut self) -> Result<(), RuntimeError> {
+        self.untold.extend_from_slice(self.world.record().events);
+        if self.send_record()? {
+            self.lost = 0;
+            self.untold.clear();
+        } else {
+            self.lost += 1;
+        }
+        Ok(())
+    }
+
+    /// Whether the recorder took it.
+    fn send_record(&self) -> Result<bool, RuntimeError> {
         let record = self.world.record();
-        self.record.send(record.head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
+        let head = RecordHead { events_len: self.untold.len() as u32, lost: self.lost, ..*record.head };
+        let record = RecordView { head: &head, events: &self.untold, ..record };
+        let dropped = self.record.dropped();
+        self.record.send(head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
+        Ok(self.record.dropped() == dropped)
+    }
+
+    /// Sends the last record, which must get through. The launcher ends this process if it does not want it.
+    fn tell_last(&mut self) -> Result<(), RuntimeError> {
+        self.untold.extend_from_slice(self.world.record().events);
+        while !self.send_record()? {
+            std::thread::sleep(DISMISSAL_LOOK);
+        }
         Ok(())
     }
 }

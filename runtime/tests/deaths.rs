@@ -25,9 +25,8 @@ fn scenario(name: &str, overrides: &[(&str, &str)]) -> Scenario {
 /// Flies with one drone's process gone from tick `at` on.
 fn fly(scenario: &Scenario, dead: DroneId, at: u64) -> Fate {
     let mut world = mission::world(scenario).unwrap();
-    let mut cockpits: Vec<_> = (0..scenario.formation.drones)
-        .map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO))
-        .collect();
+    let mut cockpits: Vec<_> =
+        (0..scenario.formation.drones).map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
     let mut stats = LinkStats::default();
     while world.ended().is_none() {
         let tick = world.tick();
@@ -59,7 +58,7 @@ fn all_get_there(name: &str, overrides: &[(&str, &str)]) {
     let scenario = scenario(name, overrides);
     let mut failed = Vec::new();
     for drone in 0..8 {
-        for at in (40..2600).step_by(160) {
+        for at in (40..2600).step_by(100) {
             let fate = fly(&scenario, DroneId(drone), at);
             if fate.outcome != Outcome::Reached {
                 failed.push(format!("{name}, drone {drone} dead at tick {at}: {fate:?}"));

@@ -32,6 +32,10 @@ pub enum Command {
     Run(RunArgs),
     /// Check a scenario and print what would be started; starts nothing
     Check(CheckArgs),
+    /// Fly a grid of missions side by side, resumable: CSV, JSON and plots with 95 % intervals
+    Sweep(crate::sweep::SweepArgs),
+    /// Print the TOML of a random scene
+    Scene(crate::sweep::SceneArgs),
     /// Draw the plots of a recorded run and print its summary
     Report(ReportArgs),
     /// Remove what dead runs left behind
@@ -234,7 +238,8 @@ pub struct DroneArgs {
     pub first_tick: u64,
 }
 
-fn key_value(text: &str) -> Result<(String, String), String> {
+/// `KEY.PATH=VALUE`, of `--set`.
+pub fn key_value(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err("expected key.path=value".to_owned()),

@@ -12,6 +12,7 @@ mod report;
 mod roles;
 mod run;
 mod schema;
+mod sweep;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -40,6 +41,8 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
     match command {
         Command::Run(args) => run::run(&args),
         Command::Check(args) => check::check(&args),
+        Command::Sweep(args) => sweep::sweep(&args),
+        Command::Scene(args) => sweep::scene(&args),
         Command::Report(args) => report::report(&args),
         Command::Clean => housekeeping::clean(),
         Command::Schema { of } => schema::schema(of),

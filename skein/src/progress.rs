@@ -34,7 +34,7 @@ impl<S: RecordSink> Progress<S> {
 
 impl<S: RecordSink> RecordSink for Progress<S> {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
-        if record.head.tick % STRIDE == 0 {
+        if record.head.tick.is_multiple_of(STRIDE) {
             self.bar.set_position(record.head.tick);
             self.bar.set_message(format!("t = {:.1} s", record.head.now.secs()));
         }

@@ -37,6 +37,9 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
     let ending = Ending { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
     let (mut summary, recorded) = sink.finish().finish(&ending);
+    if let (None, Some(signal)) = (&summary.reason, end.signal) {
+        summary.reason = Some(format!("interrupted by signal {signal}"));
+    }
     let reporting = Instant::now();
     if !args.no_record {
         plot::write(&folder, &facts).map_err(Failure::environment)?;

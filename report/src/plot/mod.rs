@@ -4,6 +4,7 @@
 mod curves;
 mod samples;
 mod style;
+pub mod sweep;
 mod tracks;
 
 use crate::error::ReportError;

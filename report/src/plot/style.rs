@@ -47,11 +47,11 @@ pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>
 pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// What the two axes show.
-pub(super) struct Axes {
+pub(super) struct Axes<'a> {
     /// What stands below, and from where to where it goes.
-    pub x: (&'static str, Range<f64>),
+    pub x: (&'a str, Range<f64>),
     /// The same for what stands left.
-    pub y: (&'static str, Range<f64>),
+    pub y: (&'a str, Range<f64>),
     /// Height of the plotting area.
     pub height: u32,
 }
@@ -59,7 +59,7 @@ pub(super) struct Axes {
 /// A plot: heading, axes, and whatever `content` draws. The SVG.
 pub(super) fn plot(
     heading: &Heading,
-    axes: Axes,
+    axes: Axes<'_>,
     content: impl FnOnce(&Canvas, &mut Chart) -> Result<(), String>,
 ) -> Result<String, String> {
     let size = (WIDTH, heading.height + axes.height + BOTTOM);

@@ -1,0 +1,87 @@
+//! Out of a corner: a drone that wants to move and cannot backs off, then tries the sides.
+
+use skein_protocol::{SimTime, Vec2};
+
+/// It does not move if it is slower than this, m/s, …
+const STILL_MPS: f64 = 0.3;
+/// … although it wants to fly faster than this, m/s.
+const EAGER_MPS: f64 = 3.0;
+/// An escape lasts so long, s, and longer with each attempt.
+const FIRST_S: f64 = 6.0;
+const LONGER_S: f64 = 2.0;
+const LONGEST_S: f64 = 16.0;
+/// Without being stuck for so long the attempts are forgotten, s.
+const FREE_S: f64 = 20.0;
+/// Directions of the attempts, from the one that is blocked, rad.
+const TURNS: [f64; 5] = [
+    std::f64::consts::PI,
+    std::f64::consts::FRAC_PI_2,
+    -std::f64::consts::FRAC_PI_2,
+    std::f64::consts::FRAC_PI_4 * 3.0,
+    -std::f64::consts::FRAC_PI_4 * 3.0,
+];
+
+/// What a drone remembers of being stuck.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Escape {
+    still_since: Option<SimTime>,
+    until: Option<SimTime>,
+    direction: Vec2,
+    attempts: usize,
+}
+
+impl Escape {
+    /// The velocity to fly instead of `wanted`, m/s: the same unless the drone has not moved for `patience_s`; then
+    /// away from there at `speed_mps` for some seconds.
+    pub fn steer(&mut self, now: SimTime, velocity: Vec2, wanted: Vec2, patience_s: f64, speed_mps: f64) -> Vec2 {
+        if self.until.is_some_and(|until| now < until) {
+            return self.direction * speed_mps;
+        }
+        if self.until.is_some_and(|until| now.since(until) > FREE_S) {
+            *self = Self::default();
+        }
+        if velocity.norm() >= STILL_MPS || wanted.norm() <= EAGER_MPS {
+            self.still_since = None;
+            return wanted;
+        }
+        let since = *self.still_since.get_or_insert(now);
+        if now.since(since) < patience_s {
+            return wanted;
+        }
+        let turn = nalgebra::Rotation2::new(TURNS[self.attempts % TURNS.len()]);
+        self.direction = turn * wanted.normalize();
+        self.until = Some(now.after((FIRST_S + LONGER_S * self.attempts as f64).min(LONGEST_S)));
+        self.attempts += 1;
+        self.still_since = None;
+        self.direction * speed_mps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WANTED: Vec2 = Vec2::new(10.0, 0.0);
+
+    #[test]
+    fn a_drone_that_moves_or_rests_is_left_alone() {
+        let mut escape = Escape::default();
+        for second in 0..100 {
+            let now = SimTime::from_secs(f64::from(second));
+            assert_eq!(escape.steer(now, WANTED, WANTED, 3.0, 5.0), WANTED);
+            assert_eq!(escape.steer(now, Vec2::zeros(), Vec2::zeros(), 3.0, 5.0), Vec2::zeros());
+        }
+    }
+
+    #[test]
+    fn a_stuck_drone_backs_off_and_then_tries_the_sides() {
+        let mut escape = Escape::default();
+        let tried: Vec<Vec2> = (0..60)
+            .map(|second| escape.steer(SimTime::from_secs(f64::from(second)), Vec2::zeros(), WANTED, 3.0, 5.0))
+            .collect();
+        assert_eq!(tried[2], WANTED);
+        assert!((tried[3] - Vec2::new(-5.0, 0.0)).norm() < 1e-9 && (tried[8] - tried[3]).norm() < 1e-9);
+        assert_eq!(tried[9], WANTED);
+        assert!(tried.iter().any(|v| v.y > 4.9) && tried.iter().any(|v| v.y < -4.9), "{tried:?}");
+    }
+}

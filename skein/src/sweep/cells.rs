@@ -1,0 +1,132 @@
+//! What came of each combination: rates, means and their intervals over the seeds.
+
+use super::grid::Grid;
+use super::metrics::{METRICS, SUCCESS};
+use super::row::Row;
+use super::statistics::{Estimate, mean, rate};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// A combination and what came of it.
+pub struct Cell {
+    /// The scenario's name.
+    pub scenario: String,
+    /// As flown.
+    pub strategy: String,
+    /// A value for each key of the grid, as TOML.
+    pub values: Vec<String>,
+    /// Number of runs by outcome.
+    pub outcomes: BTreeMap<String, usize>,
+    /// Share of runs that reached their goal with every invariant kept.
+    pub success: Option<Estimate>,
+    /// One for each of [`METRICS`].
+    pub metrics: Vec<Option<Estimate>>,
+}
+
+impl Cell {
+    /// The estimate of this name.
+    pub fn estimate(&self, name: &str) -> Option<Estimate> {
+        match METRICS.iter().position(|metric| metric.name == name) {
+            Some(i) => self.metrics[i],
+            None if name == SUCCESS => self.success,
+            None => None,
+        }
+    }
+
+    /// As in summary.json.
+    pub fn json(&self, keys: &[&str]) -> Value {
+        let grid: Map<String, Value> =
+            keys.iter().zip(&self.values).map(|(key, v)| ((*key).to_owned(), toml_json(v))).collect();
+        let metrics: Map<String, Value> =
+            METRICS.iter().zip(&self.metrics).map(|(metric, found)| (metric.name.to_owned(), json!(found))).collect();
+        json!({
+            "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
+            "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
+            "success": self.success, "metrics": metrics,
+        })
+    }
+}
+
+/// A TOML value as JSON; what is none stays text.
+fn toml_json(value: &str) -> Value {
+    let table: Result<toml::Table, _> = toml::from_str(&format!("value = {value}"));
+    let found = table.ok().and_then(|mut table| table.remove("value"));
+    found.and_then(|value| serde_json::to_value(value).ok()).unwrap_or_else(|| json!(value))
+}
+
+/// A cell for each combination that has rows, in the grid's order. Rows are in the order of their jobs.
+pub fn cells(grid: &Grid<'_>, rows: &[Row]) -> Vec<Cell> {
+    let of = |row: &Row| std::ptr::from_ref(grid.job(row.job).0);
+    rows.chunk_by(|a, b| of(a) == of(b)).map(|rows| cell(grid, rows)).collect()
+}
+
+fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
+    let combination = grid.job(rows[0].job).0;
+    let mut outcomes = BTreeMap::new();
+    rows.iter().for_each(|row| *outcomes.entry(row.outcome.clone()).or_insert(0) += 1);
+    let reached = rows.iter().filter(|row| row.reached()).count();
+    let flown = rows.iter().map(|row| &row.strategy).find(|strategy| !strategy.is_empty());
+    let estimate = |i: usize| {
+        let counts = |row: &&Row| row.reached() || !METRICS[i].reached_only;
+        let values = rows.iter().filter(counts).filter_map(|row| row.metrics.get(i).copied().flatten());
+        mean(&values.collect::<Vec<f64>>())
+    };
+    Cell {
+        scenario: grid.scenario_name(combination),
+        strategy: flown.or(combination.strategy.as_ref()).cloned().unwrap_or_default(),
+        values: combination.values.clone(),
+        outcomes,
+        success: rate(reached, rows.len()),
+        metrics: (0..METRICS.len()).map(estimate).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::experiment::{Axis, Experiment, Mission};
+    use super::super::random::Bounds;
+    use super::*;
+
+    #[test]
+    fn times_count_runs_that_reached_and_distances_all() {
+        let experiment = Experiment {
+            name: "e".to_owned(),
+            scenarios: vec![Mission::Random],
+            strategies: vec![],
+            seeds: vec![1, 2, 3],
+            grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
+            processes: false,
+            metrics: vec![],
+            bounds: Bounds::default(),
+        };
+        let grid = Grid::new(&experiment, &[]);
+        let row = |job: usize, outcome: &str, time_s: f64, separation_m: f64| Row {
+            metrics: METRICS
+                .iter()
+                .map(|metric| match metric.name {
+                    "mission_s" => Some(time_s),
+                    "min_separation_m" => Some(separation_m),
+                    _ => None,
+                })
+                .collect(),
+            strategy: "shortest-path".to_owned(),
+            ..Row::unflown(job, outcome, "")
+        };
+        let rows = [
+            row(0, "reached", 50.0, 40.0),
+            row(1, "timeout", 600.0, 30.0),
+            row(2, "reached", 60.0, 35.0),
+            Row::unflown(3, "failed", "no"),
+        ];
+        let cells = cells(&grid, &rows);
+        assert_eq!(cells.len(), 2);
+        let time = cells[0].estimate("mission_s").unwrap();
+        assert_eq!((time.n, time.mean), (2, 55.0));
+        assert_eq!(cells[0].estimate("min_separation_m").unwrap().min, 30.0);
+        let success = cells[0].estimate(SUCCESS).unwrap();
+        assert_eq!((success.n, success.mean), (3, 2.0 / 3.0));
+        let json = cells[1].json(&["radio.loss"]);
+        assert_eq!((&json["grid"]["radio.loss"], &json["outcomes"]["failed"]), (&json!(0.5), &json!(1)));
+        assert_eq!(json["metrics"]["mission_s"], Value::Null);
+    }
+}

@@ -1,0 +1,395 @@
+//! An experiment file: TOML to a checked [`Experiment`].
+
+use super::metrics::{DEFAULT, METRICS, SUCCESS, metric};
+use super::random::Bounds;
+use serde::Deserialize;
+use std::ops::Range;
+use std::path::{Component, Path, PathBuf};
+use toml::de::DeTable;
+
+/// What an experiment flies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Its name, also of its folder.
+    pub name: String,
+    /// Which missions.
+    pub scenarios: Vec<Mission>,
+    /// How drones are grouped; empty: as the scenario says.
+    pub strategies: Vec<String>,
+    /// Seeds, in their order.
+    pub seeds: Vec<u64>,
+    /// Scenario keys and the values each takes, as TOML.
+    pub grid: Vec<Axis>,
+    /// Whether each run is a swarm of processes.
+    pub processes: bool,
+    /// What is plotted and tabled.
+    pub metrics: Vec<&'static str>,
+    /// Of random scenes.
+    pub bounds: Bounds,
+}
+
+/// A mission to fly.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Mission {
+    /// A scenario file, and its text.
+    File { path: PathBuf, text: String },
+    /// A random scene a seed.
+    Random,
+}
+
+/// A scenario key and its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// The key's path.
+    pub key: String,
+    /// Values, as TOML.
+    pub values: Vec<String>,
+}
+
+/// As it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    name: Option<String>,
+    scenario: OneOrMany,
+    #[serde(default)]
+    strategies: Vec<String>,
+    seeds: Seeds,
+    #[serde(default)]
+    runtime: Runtime,
+    metrics: Option<Vec<String>>,
+    #[serde(default)]
+    grid: toml::Table,
+    #[serde(default)]
+    random: RawBounds,
+}
+
+const KEYS: [&str; 8] = ["name", "scenario", "strategies", "seeds", "runtime", "metrics", "grid", "random"];
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a scenario file, a list of them, or \"random\"")]
+enum OneOrMany {
+    One(String),
+    Many(Vec<String>),
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a number of seeds, a list of seeds, or { from, count }")]
+enum Seeds {
+    Count(u64),
+    List(Vec<u64>),
+    From(SeedRange),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SeedRange {
+    from: u64,
+    count: u64,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Runtime {
+    #[default]
+    Inline,
+    Processes,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct RawBounds {
+    drones: Option<[u32; 2]>,
+    obstacles: Option<[u32; 2]>,
+}
+
+/// No experiment has more seeds, or more values of a key.
+const MOST: u64 = 1_000_000;
+
+impl Experiment {
+    /// From the file at `path`; scenario files are found relative to it.
+    ///
+    /// # Errors
+    /// What is wrong, with its place.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let name = path.display();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| format!("{name}: {error}; expected an experiment file (TOML)"))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        Self::parse(&text, &stem, folder).map_err(|fault| fault.at(&name.to_string(), &text))
+    }
+
+    fn parse(text: &str, stem: &str, folder: &Path) -> Result<Self, Fault> {
+        let table = DeTable::parse(text).map_err(Fault::toml)?;
+        known_keys(table.get_ref())?;
+        let raw: Raw = toml::from_str(text).map_err(Fault::toml)?;
+        let place = |key: &str| table.get_ref().get(key).map(|value| value.span());
+        let fault = |key: &str| {
+            let span = place(key);
+            move |message: String| Fault { span, message }
+        };
+        let name = raw.name.unwrap_or_else(|| stem.to_owned());
+        let experiment = Self {
+            name: checked_name(name).map_err(fault("name"))?,
+            scenarios: scenarios(raw.scenario, folder).map_err(fault("scenario"))?,
+            strategies: checked_strategies(raw.strategies).map_err(fault("strategies"))?,
+            seeds: seeds(raw.seeds).map_err(fault("seeds"))?,
+            grid: axes(&raw.grid).map_err(fault("grid"))?,
+            processes: matches!(raw.runtime, Runtime::Processes),
+            metrics: metrics(raw.metrics).map_err(fault("metrics"))?,
+            bounds: bounds(&raw.random).map_err(fault("random"))?,
+        };
+        Ok(experiment)
+    }
+}
+
+/// What is wrong, and where in the text.
+#[derive(Debug)]
+struct Fault {
+    span: Option<Range<usize>>,
+    message: String,
+}
+
+impl Fault {
+    fn toml(error: toml::de::Error) -> Self {
+        Self { span: error.span(), message: error.message().to_owned() }
+    }
+
+    fn at(&self, name: &str, text: &str) -> String {
+        let Some(span) = &self.span else { return format!("{name}: {}", self.message) };
+        let before = text.get(..span.start).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
+        format!("{name}:{line}:{column}: {}", self.message)
+    }
+}
+
+fn known_keys(table: &DeTable<'_>) -> Result<(), Fault> {
+    for key in table.keys() {
+        let found: &str = key.get_ref();
+        if !KEYS.contains(&found) {
+            let message = format!("unknown key {found:?}{}; expected one of {}", meant(found, &KEYS), KEYS.join(", "));
+            return Err(Fault { span: Some(key.span()), message });
+        }
+    }
+    Ok(())
+}
+
+/// The known word that is most like this one, as a question.
+fn meant(found: &str, known: &[&str]) -> String {
+    let best = known.iter().map(|word| (strsim::damerau_levenshtein(found, word), word)).min();
+    match best {
+        Some((edits, word)) if edits <= 1 + found.len() / 4 => format!(" (did you mean {word:?}?)"),
+        _ => String::new(),
+    }
+}
+
+fn checked_name(name: String) -> Result<String, String> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
+    match name.len() {
+        1..=64 if name.chars().all(fits) && !name.starts_with(['.', '-']) => Ok(name),
+        _ => Err(format!("name: found {name:?}, expected 1 to 64 letters, digits, `.`, `_` or `-`")),
+    }
+}
+
+fn scenarios(written: OneOrMany, folder: &Path) -> Result<Vec<Mission>, String> {
+    let names = match written {
+        OneOrMany::One(name) => vec![name],
+        OneOrMany::Many(names) => names,
+    };
+    if names.is_empty() {
+        return Err("scenario: found an empty list, expected a scenario file or \"random\"".to_owned());
+    }
+    let mission = |name: &String| match name.as_str() {
+        "random" => Ok(Mission::Random),
+        _ => {
+            let path = tidy(&folder.join(name));
+            let text =
+                std::fs::read_to_string(&path).map_err(|error| format!("scenario: {}: {error}", path.display()))?;
+            Ok(Mission::File { path, text })
+        }
+    };
+    names.iter().map(mission).collect()
+}
+
+/// Without `folder/..`, so that commands can be read.
+fn tidy(path: &Path) -> PathBuf {
+    let mut tidy = PathBuf::new();
+    for part in path.components() {
+        let in_folder = matches!(tidy.components().next_back(), Some(Component::Normal(_)));
+        match part {
+            Component::ParentDir if in_folder && !tidy.is_symlink() => {
+                tidy.pop();
+            }
+            part => tidy.push(part),
+        }
+    }
+    tidy
+}
+
+fn checked_strategies(strategies: Vec<String>) -> Result<Vec<String>, String> {
+    for word in &strategies {
+        word.parse::<skein_scenario::Strategy>().map_err(|error| format!("strategies: {error}"))?;
+    }
+    unique("strategies", &strategies)?;
+    Ok(strategies)
+}
+
+fn unique<T: PartialEq + std::fmt::Debug>(key: &str, items: &[T]) -> Result<(), String> {
+    match (1..items.len()).find(|&i| items[..i].contains(&items[i])) {
+        Some(i) => Err(format!("{key}: {:?} is there twice", items[i])),
+        None => Ok(()),
+    }
+}
+
+fn seeds(written: Seeds) -> Result<Vec<u64>, String> {
+    let range = match written {
+        Seeds::List(seeds) => {
+            // A scenario's seed is a TOML integer, which the reader has seen to.
+            let mut sorted = seeds.clone();
+            sorted.sort_unstable();
+            return match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+                Some(pair) => Err(format!("seeds: {} is there twice", pair[0])),
+                None if seeds.is_empty() => Err("seeds: found an empty list, expected at least one".to_owned()),
+                None => Ok(seeds),
+            };
+        }
+        Seeds::Count(count) => SeedRange { from: 1, count },
+        Seeds::From(range) => range,
+    };
+    if !(1..=MOST).contains(&range.count) {
+        return Err(format!("seeds: found a count of {}, expected 1 to {MOST}", range.count));
+    }
+    Ok((range.from..range.from.saturating_add(range.count)).collect())
+}
+
+/// The grid's keys; nested tables are keys with dots.
+fn axes(table: &toml::Table) -> Result<Vec<Axis>, String> {
+    let mut axes = Vec::new();
+    collect(table, "", &mut axes)?;
+    axes.sort_by(|a, b| a.key.cmp(&b.key));
+    let keys: Vec<&String> = axes.iter().map(|axis| &axis.key).collect();
+    unique("grid", &keys)?;
+    match axes.iter().find(|axis| matches!(axis.key.as_str(), "seed" | "strategy" | "name")) {
+        Some(axis) => Err(format!("grid: {} is no key of the grid: it has a key of its own", axis.key)),
+        None => Ok(axes),
+    }
+}
+
+fn collect(table: &toml::Table, path: &str, axes: &mut Vec<Axis>) -> Result<(), String> {
+    for (name, value) in table {
+        let key = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        match value {
+            toml::Value::Table(range) if range.contains_key("steps") || range.contains_key("from") => {
+                axes.push(Axis { values: steps(&key, range)?, key });
+            }
+            toml::Value::Table(inner) => collect(inner, &key, axes)?,
+            toml::Value::Array(values) if values.is_empty() => {
+                return Err(format!("grid: {key}: found an empty list, expected at least one value"));
+            }
+            toml::Value::Array(values) => {
+                let values: Vec<String> = values.iter().map(ToString::to_string).collect();
+                unique(&format!("grid: {key}"), &values)?;
+                axes.push(Axis { key, values });
+            }
+            one => axes.push(Axis { key, values: vec![one.to_string()] }),
+        }
+    }
+    Ok(())
+}
+
+/// `{ from, to, steps }`: so many values, both ends among them.
+fn steps(key: &str, range: &toml::Table) -> Result<Vec<String>, String> {
+    let wanted = || format!("grid: {key}: expected {{ from = NUMBER, to = NUMBER, steps = 2 or more }}");
+    let number = |name: &str| {
+        let value = range.get(name)?;
+        value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64)).filter(|v| v.is_finite())
+    };
+    let count = range.get("steps").and_then(toml::Value::as_integer).unwrap_or(0);
+    match (number("from"), number("to")) {
+        (Some(from), Some(to)) if range.len() == 3 && (2..=MOST as i64).contains(&count) && from != to => {
+            // Rounded at the twelfth digit: 0.3, not 0.30000000000000004.
+            let at = |i: i64| from + (to - from) * i as f64 / (count - 1) as f64;
+            Ok((0..count).map(|i| ((at(i) * 1e12).round() / 1e12).to_string()).collect())
+        }
+        _ => Err(wanted()),
+    }
+}
+
+fn metrics(written: Option<Vec<String>>) -> Result<Vec<&'static str>, String> {
+    let Some(written) = written else { return Ok(DEFAULT.to_vec()) };
+    unique("metrics", &written)?;
+    let known: Vec<&str> = std::iter::once(SUCCESS).chain(METRICS.iter().map(|metric| metric.name)).collect();
+    let find = |name: &String| match metric(name) {
+        Some(metric) => Ok(metric.name),
+        None if name == SUCCESS => Ok(SUCCESS),
+        None => Err(format!("metrics: unknown {name:?}{}; expected some of {}", meant(name, &known), known.join(", "))),
+    };
+    written.iter().map(find).collect()
+}
+
+fn bounds(written: &RawBounds) -> Result<Bounds, String> {
+    let default = Bounds::default();
+    let bounds = Bounds {
+        drones: written.drones.unwrap_or(default.drones),
+        obstacles: written.obstacles.unwrap_or(default.obstacles),
+    };
+    bounds.checked().map_err(|message| format!("random: {message}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Experiment, String> {
+        Experiment::parse(text, "stem", Path::new("")).map_err(|fault| fault.at("e.toml", text))
+    }
+
+    #[test]
+    fn lists_ranges_and_tables_make_a_grid() {
+        let text = "scenario = \"random\"\nseeds = { from = 5, count = 3 }\n[grid]\n\"radio.delay_s\" = [0, 0.5]\n\
+                    radio.loss = { from = 0, to = 0.7, steps = 8 }\nformation.shape = \"v\"\n";
+        let experiment = parse(text).unwrap();
+        assert_eq!(experiment.name, "stem");
+        assert_eq!(experiment.seeds, [5, 6, 7]);
+        let axes: Vec<(&str, String)> =
+            experiment.grid.iter().map(|axis| (axis.key.as_str(), axis.values.join(" "))).collect();
+        let wanted =
+            [("formation.shape", "\"v\""), ("radio.delay_s", "0 0.5"), ("radio.loss", "0 0.1 0.2 0.3 0.4 0.5 0.6 0.7")];
+        assert_eq!(axes, wanted.map(|(key, values)| (key, values.to_owned())));
+    }
+
+    #[test]
+    fn errors_name_place_and_expectation() {
+        let head = "scenario = \"random\"\nseeds = 3\n";
+        for (rest, wanted) in [
+            ("sedes = 3", "e.toml:3:1: unknown key \"sedes\" (did you mean \"seeds\"?)"),
+            ("metrics = [\"mision_s\"]", "e.toml:3:11: metrics: unknown \"mision_s\" (did you mean \"mission_s\"?)"),
+            ("strategies = [\"shortest\"]", "e.toml:3:14: strategies: \"shortest\" is no strategy"),
+            ("strategies = [\"fixed:1/2\", \"fixed:1/2\"]", "is there twice"),
+            ("[grid]\nradio.loss = []", "grid: radio.loss: found an empty list"),
+            ("[grid]\nradio.loss = { from = 0, to = 1 }", "grid: radio.loss: expected { from = NUMBER"),
+            ("[grid]\nseed = [1, 2]", "seed is no key of the grid"),
+            ("[random]\ndrones = [9, 5]", "random: drones: found 9 to 5"),
+            ("[random]\ndrone = [5, 9]", "unknown field `drone`"),
+            ("runtime = \"outline\"", "unknown variant `outline`"),
+            ("name = \"../x\"", "name: found \"../x\""),
+        ] {
+            let error = parse(&format!("{head}{rest}")).unwrap_err();
+            assert!(error.contains(wanted), "{rest}: {error}");
+        }
+        let missing = parse("seeds = 1").unwrap_err();
+        assert!(missing.contains("scenario"), "{missing}");
+        let absent = parse("scenario = \"no/such.toml\"\nseeds = 1").unwrap_err();
+        assert!(absent.contains("e.toml:1:12: scenario: no/such.toml"), "{absent}");
+        assert!(parse("scenario = \"random\"\nseeds = 0").unwrap_err().contains("expected 1 to"));
+        assert!(parse("scenario = \"random\"\nseeds = [1, 1]").unwrap_err().contains("twice"));
+    }
+
+    #[test]
+    fn paths_lose_what_leads_back() {
+        assert_eq!(tidy(Path::new("experiments/../scenarios/a.toml")), Path::new("scenarios/a.toml"));
+        assert_eq!(tidy(Path::new("../x/./a.toml")), Path::new("../x/a.toml"));
+    }
+}

@@ -1,0 +1,23 @@
+//! `skein sweep`: flies a grid of missions, jobs side by side, and says what came of them. `skein scene`: one random scene.
+//!
+//! A sweep's folder holds `experiment.json` (whose sweep it is), `rows.jsonl` (a finished run a line, what a sweep is
+//! resumed from), and once all runs are done `runs.csv`, `summary.json` and `plots/*.svg`.
+
+mod args;
+mod cells;
+mod command;
+mod draw;
+mod experiment;
+mod fly;
+mod grid;
+mod metrics;
+mod plots;
+mod pool;
+mod random;
+mod row;
+mod statistics;
+mod store;
+mod table;
+
+pub use args::{SceneArgs, SweepArgs};
+pub use command::{scene, sweep};

@@ -1,0 +1,325 @@
+//! Bad input is refused with 2, in words that say where and what was expected, and nothing is started; good input gives
+//! the files and outputs that scripts rely on.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod support;
+
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use support::{Done, Place, json as read_json, names, paper};
+
+/// A mission of two seconds in simulated time, to be flown without obstacle.
+const SHORT: &str = "[formation]\nshape = \"v\"\ndrones = 3\nspacing_m = 60\n[time]\ntimeout_s = 2\n";
+const BOX: &str = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\n";
+
+/// Neither help nor a panic: a message for people, on stderr alone, and no process, domain or folder.
+fn assert_refused(place: &Place, done: &Done, wanted: &[&str]) {
+    assert_eq!(done.code, Some(2), "{done:?}");
+    assert_eq!(done.stdout, "", "{done:?}");
+    assert!(!done.stderr.contains("panicked") && !done.stderr.contains('\u{1b}'), "{done:?}");
+    for part in wanted {
+        assert!(done.stderr.contains(part), "no {part:?} in {done:?}");
+    }
+    place.assert_untouched(done);
+}
+
+/// `run` and `check` refuse the same files in the same words.
+fn refused(content: &[u8], wanted: &[&str]) {
+    let place = Place::new();
+    std::fs::write(place.join("bad.toml"), content).unwrap();
+    for command in ["run", "check"] {
+        assert_refused(&place, &place.run(&[command, "bad.toml"]), wanted);
+    }
+}
+
+#[test]
+fn files_that_are_no_scenario() {
+    refused(b"", &["bad.toml:1:1: formation: ", "required"]);
+    refused(b"\x7fELF\x02\x01\x00\xff\xfe\x00\x80", &["bad.toml:1:", "expected UTF-8 text"]);
+    refused(b"[formation\n", &["bad.toml:1:"]);
+    refused(b"[formation]\ndrones = 8\ndrones = 9\n", &["bad.toml:3:1: ", "duplicate"]);
+    let place = Place::new();
+    std::fs::create_dir(place.join("folder.toml")).unwrap();
+    assert_refused(&place, &place.run(&["run", "folder.toml"]), &["folder.toml", "directory", "expected"]);
+    assert_refused(&place, &place.run(&["run", "missing.toml"]), &["missing.toml: No such file", "expected"]);
+    assert_refused(&place, &place.run(&["run", "/dev/zero"]), &["/dev/zero", "expected"]);
+}
+
+#[test]
+fn keys_and_values_are_named_with_their_place() {
+    let cases: [(&str, &[&str]); 10] = [
+        ("[formation]\ndronse = 8\n", &["bad.toml:2:1: formation.dronse: unknown key", "did you mean `drones`?"]),
+        ("[formation]\n[dron]\n", &["bad.toml:2:2: dron: unknown table", "did you mean `drone`?"]),
+        ("[formation]\ndrones = \"eight\"\n", &["bad.toml:2:10: formation.drones: ", "expected a whole number"]),
+        ("[formation]\nspacing_m = -3\n", &["bad.toml:2:13: formation.spacing_m: found -3", "above 0"]),
+        ("[formation]\nspacing_m = nan\n", &["bad.toml:2:13: formation.spacing_m: found NaN", "expected"]),
+        ("[formation]\nstart_m = [inf, 0]\n", &["bad.toml:2:12: formation.start_m.0: found inf", "expected"]),
+        ("[formation]\ndrones = 0\n", &["bad.toml:2:10: formation.drones: found 0", "from 1"]),
+        ("[formation]\ndrones = 1_000_000_000\n", &["bad.toml:2:10: formation.drones: found 1000000000", "expected"]),
+        ("[formation]\nspacing_m = 20\n", &["bad.toml:2:13: formation.spacing_m: found 20 m", "safe_distance_m"]),
+        ("[formation]\noffsets_m = [[0,0],[0,0]]\n", &["bad.toml:2:13: formation.offsets_m: slots 0 and 1", "apart"]),
+    ];
+    for (content, wanted) in cases {
+        refused(content.as_bytes(), wanted);
+    }
+}
+
+#[test]
+fn obstacles_must_have_a_size_and_keep_clear_of_slots() {
+    let negative = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [99, 0]\nradius_m = -1\n";
+    refused(negative.as_bytes(), &["bad.toml:5:12: obstacle.0.radius_m: found -1", "expected a number from 0.001"]);
+    let around_start = format!("[formation]\n{BOX}centre_m = [0, 0]\n");
+    refused(around_start.as_bytes(), &["bad.toml:2:1: obstacle.0: start slot 0 at", "inside"]);
+    let at_goal = format!("[formation]\n[mission]\nend = \"goal\"\ngoal_m = [150, 0]\n{BOX}centre_m = [150, 0]\n");
+    refused(at_goal.as_bytes(), &["bad.toml:5:1: obstacle.0: goal slot 0 at", "inside"]);
+}
+
+#[test]
+fn arguments_that_make_no_sense() {
+    let cases: [(&[&str], &[&str]); 14] = [
+        (&["--set", "drone"], &["--set", "expected key.path=value"]),
+        (&["--set", "drone.speed=3"], &["drone.speed: unknown key", "`speed_mps`"]),
+        (&["--set", "time.dt_s=soon"], &["--set time.dt_s=soon", "expected a number"]),
+        (&["--set", "formation.drones=1000000000"], &["formation.drones: found 1000000000"]),
+        (&["--set", "obstacle.0.half_size_m=[-5, 80]"], &["obstacle.0.half_size_m.0: found -5"]),
+        (&["--strategy", "shortest"], &["\"shortest\" is no strategy", "`shortest-path`"]),
+        (&["--strategy", "fixed:5/5"], &["fixed:5/5, 10 drones", "8"]),
+        (&["--strategy", "fixed:4"], &["fixed:4", "fixed:L/R"]),
+        (&["--clock", "fast"], &["`fast` is no clock", "`realtime:SPEED`"]),
+        (&["--clock", "realtime:-1"], &["--clock", "SPEED > 0"]),
+        (&["--seed", "many"], &["seed", "expected"]),
+        (&["--runtime", "threads"], &["threads", "inline"]),
+        (&["--force"], &["--out"]),
+        (&["--frobnicate"], &["--frobnicate"]),
+    ];
+    let place = Place::new();
+    for (args, wanted) in cases {
+        assert_refused(&place, &place.run(&[&["run", &paper("s2-right")], args].concat()), wanted);
+    }
+    let two = "[formation]\n[[obstacle]]\nshape=\"circle\"\ncentre_m=[200,0]\nradius_m=5\n";
+    let two = format!("strategy = \"fixed:4/4\"\n{two}[[obstacle]]\nshape=\"circle\"\ncentre_m=[400,0]\nradius_m=5\n");
+    refused(two.as_bytes(), &["fixed:4/4 with 2 obstacles", "expected exactly one"]);
+    for args in [&["fly"][..], &["run"], &[], &["schema", "moon"], &["completions", "abacus"]] {
+        let done = place.run(args);
+        assert_eq!(done.code, Some(2), "{done:?}");
+        place.assert_untouched(&done);
+    }
+}
+
+#[test]
+fn an_existing_folder_is_refused_unless_forced() {
+    let place = Place::new();
+    std::fs::write(place.join("short.toml"), SHORT).unwrap();
+    let args = ["run", "short.toml", "--out", "out", "--json"];
+    let first = place.run(&args).summary();
+    std::fs::write(place.join("out/notes.txt"), "mine").unwrap();
+    let before = std::fs::read(place.join("out/summary.json")).unwrap();
+    let again = place.run(&args);
+    assert_eq!(again.code, Some(2), "{again:?}");
+    assert!(again.stderr.contains("out") && again.stderr.contains("--force"), "{again:?}");
+    assert_eq!(std::fs::read(place.join("out/summary.json")).unwrap(), before);
+    let forced = place.run(&[&args[..], &["--force", "--seed", "9"]].concat()).summary();
+    assert_eq!((first["seed"].as_u64(), forced["seed"].as_u64()), (Some(1), Some(9)));
+    assert_eq!(read_json(place.join("out/summary.json"))["seed"], 9);
+    assert_eq!(std::fs::read(place.join("out/notes.txt")).unwrap(), b"mine", "files of others are left alone");
+    std::fs::create_dir(place.join("mine")).unwrap();
+    std::fs::write(place.join("mine/summary.json"), "mine").unwrap();
+    let done = place.run(&["run", "short.toml", "--out", "mine", "--force"]);
+    assert_eq!(done.code, Some(2), "{done:?}");
+    assert_eq!(std::fs::read(place.join("mine/summary.json")).unwrap(), b"mine");
+}
+
+#[test]
+fn a_goal_that_is_not_reached_in_time_gives_1() {
+    let place = Place::new();
+    std::fs::write(place.join("short.toml"), SHORT).unwrap();
+    for runtime in ["processes", "inline"] {
+        let done = place.run(&["run", "short.toml", "--json", "--runtime", runtime]);
+        assert_eq!(done.code, Some(1), "{done:?}");
+        assert_eq!(done.summary()["outcome"], "timeout");
+        assert_eq!(done.summary()["sim_s"], 2.0);
+    }
+}
+
+#[test]
+fn check_prints_the_plan_and_starts_nothing() {
+    let place = Place::new();
+    let done = place.run(&["check", &paper("s2-right")]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    for part in ["s2-right", "launcher, world, 8 drones", "skein/uplink/0", "2 routes"] {
+        assert!(done.stdout.contains(part), "no {part:?} in {done:?}");
+    }
+    place.assert_untouched(&done);
+    let plan = place.run(&["check", &paper("s2-right"), "--json", "--set", "formation.drones=8"]).summary();
+    assert_eq!(plan["processes"], 10);
+    assert_eq!(plan["sets"][0]["routes"], 2);
+    place.assert_untouched(&done);
+}
+
+#[test]
+fn help_version_schemas_completions_and_manual_go_to_stdout() {
+    let place = Place::new();
+    let version = format!("skein {}", env!("CARGO_PKG_VERSION"));
+    let cases: [(&[&str], &str); 8] = [
+        (&["--help"], "Exit codes:"),
+        (&["run", "--help"], "skein run scenarios/paper/s2-right.toml"),
+        (&["check", "--help"], "Example"),
+        (&["--version"], &version),
+        (&["completions", "bash"], "complete -F _skein"),
+        (&["completions", "zsh"], "#compdef skein"),
+        (&["man"], ".TH skein 1"),
+        (&["schema", "scenario"], "spacing_m"),
+    ];
+    for (args, wanted) in cases {
+        let done = place.run(args);
+        assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{done:?}");
+        assert!(done.stdout.contains(wanted), "no {wanted:?} in {done:?}");
+        place.assert_untouched(&done);
+    }
+}
+
+/// Each required key is there and of a type that the schema allows; no key is there that it does not know.
+fn assert_valid(value: &Value, schema: &Value, root: &Value, at: &str) {
+    let name = schema["$ref"].as_str();
+    if let Some(pointer) = name.and_then(|name| name.strip_prefix('#')) {
+        return assert_valid(value, root.pointer(pointer).unwrap(), root, at);
+    }
+    if let Some(any) = schema["anyOf"].as_array() {
+        let kinds: Vec<_> = any.iter().filter(|kind| (kind["type"] == "null") == value.is_null()).collect();
+        return assert_valid(value, kinds.first().unwrap_or_else(|| panic!("{at}: {value}")), root, at);
+    }
+    let kind = match value {
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+        Value::Number(number) if number.is_f64() => "number",
+        Value::Number(_) => "integer",
+        Value::String(_) => "string",
+        Value::Array(_) => "array",
+        Value::Object(_) => "object",
+    };
+    let allowed = |word: &Value| word == kind || (kind == "integer" && word == "number");
+    let fits = schema["type"].as_array().map_or_else(|| allowed(&schema["type"]), |types| types.iter().any(allowed));
+    assert!(fits, "{at}: {value} is no {}", schema["type"]);
+    if let Some(words) = schema["enum"].as_array() {
+        assert!(words.contains(value), "{at}: {value} is none of {words:?}");
+    }
+    for (number, item) in value.as_array().into_iter().flatten().enumerate() {
+        assert_valid(item, &schema["items"], root, &format!("{at}/{number}"));
+    }
+    let Some(object) = value.as_object() else { return };
+    let known = schema["properties"].as_object().unwrap_or_else(|| panic!("{at}: {schema}"));
+    for key in schema["required"].as_array().into_iter().flatten() {
+        assert!(object.contains_key(key.as_str().unwrap()), "{at}: {key} is missing");
+    }
+    for (key, item) in object {
+        let schema = known.get(key).unwrap_or_else(|| panic!("{at}: {key} is not in the schema"));
+        assert_valid(item, schema, root, &format!("{at}/{key}"));
+    }
+}
+
+#[test]
+fn the_summary_follows_its_schema_and_its_contract() {
+    let place = Place::new();
+    let schema: Value = serde_json::from_str(&place.run(&["schema", "summary"]).stdout).unwrap();
+    let flown = place.run(&["run", &paper("s1-right"), "--json"]).summary();
+    std::fs::write(place.join("short.toml"), SHORT).unwrap();
+    let timeout = place.run(&["run", "short.toml", "--json", "--no-record"]).summary();
+    for summary in [&flown, &timeout] {
+        assert_valid(summary, &schema, &schema, "");
+    }
+    let contract = "schema scenario strategy seed runtime clock drones dt_s ticks sim_s realtime_factor \
+        agent_steps_per_s wall_s startup_s report_s outcome stages mission_s reform_start_s reform_end_s \
+        formation_error_m formation_rmse_m mean_distance_error_m energy_j min_separation_m min_clearance_m violations \
+        metrics elections leaders split_brain_s failover_s messages faults deadline_misses step_us digest";
+    let required: BTreeSet<&str> = schema["required"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    for key in contract.split_whitespace() {
+        assert!(required.contains(key), "{key} is not required by the schema");
+    }
+    let stage = &flown["stages"][0];
+    for key in ["detected_s", "passed_s", "pass_time_s", "routes", "split", "split_left_right", "predicted_s", "groups"]
+    {
+        assert!(!stage[key].is_null(), "{key}: {stage}");
+    }
+    assert_eq!(timeout["stages"], json!([]));
+    assert_eq!(timeout["reform_end_s"], Value::Null);
+}
+
+#[test]
+fn quiet_is_quiet_and_colour_is_for_terminals() {
+    let place = Place::new();
+    let scenario = paper("s1-centred");
+    let quiet = place.run(&["run", &scenario, "--quiet", "--runtime", "inline"]);
+    assert_eq!((quiet.code, quiet.stdout.as_str(), quiet.stderr.as_str()), (Some(0), "", ""));
+    let spoken = place.run(&["run", &scenario, "--runtime", "inline"]);
+    assert_eq!(spoken.stderr, "", "no progress bar without a terminal");
+    for part in ["reached", "runs/s1-centred-2"] {
+        assert!(spoken.stdout.contains(part), "no {part:?} in {spoken:?}");
+    }
+    assert!(!spoken.stdout.contains('\u{1b}'), "{spoken:?}");
+}
+
+#[test]
+fn no_color_is_honoured_on_a_terminal() {
+    // util-linux's `script` gives the command a terminal.
+    let terminal = |no_colour: bool| {
+        let place = Place::new();
+        let line = format!("{} run {} --runtime inline", env!("CARGO_BIN_EXE_skein"), paper("s1-centred"));
+        let mut command = std::process::Command::new("script");
+        command.args(["-qec", &line, "/dev/null"]).current_dir(place.join("")).env("TERM", "xterm");
+        command.env("XDG_RUNTIME_DIR", place.join("x")).env_remove("NO_COLOR").stdin(std::process::Stdio::null());
+        if no_colour {
+            command.env("NO_COLOR", "1");
+        }
+        command.output().ok().map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (Some(with), Some(without)) = (terminal(false), terminal(true)) else {
+        return eprintln!("no `script` here: colours were not looked at");
+    };
+    // Moving the cursor is no colour: those sequences end in `m`.
+    let coloured = |text: &str| {
+        let mut sequences = text.split("\u{1b}[").skip(1);
+        sequences.any(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';').starts_with('m'))
+    };
+    assert!(with.contains("reached") && coloured(&with), "{with:?}");
+    assert!(without.contains("reached") && !coloured(&without), "{without:?}");
+}
+
+#[test]
+fn a_runs_folder_holds_what_was_promised() {
+    let place = Place::new();
+    let done = place.run(&["run", &paper("s2-right"), "--json"]);
+    let (summary, folder) = (done.summary(), place.join("runs/s2-right-1"));
+    let found = names(&folder);
+    for file in ["events.jsonl", "manifest.json", "plots", "processes.json", "summary.json", "trace.csv"] {
+        assert!(found.iter().any(|name| name == file), "no {file} in {found:?}");
+    }
+    assert!(names(folder.join("plots")).iter().any(|name| name.ends_with(".svg")));
+    let manifest = read_json(folder.join("manifest.json"));
+    assert_eq!(manifest["scenario"]["formation"]["spacing_m"], 65.0);
+    for key in ["seed", "strategy", "version", "commit", "platform"] {
+        assert!(manifest.get(key).is_some(), "no {key} in {manifest}");
+    }
+    let trace = std::fs::read_to_string(folder.join("trace.csv")).unwrap();
+    let mut lines = trace.lines();
+    assert_eq!(lines.next(), Some("t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == 9));
+    assert_eq!(rows.len() as u64, 8 * summary["ticks"].as_u64().unwrap(), "a row a drone and tick");
+    let last: f64 = rows[rows.len() - 1][0].parse().unwrap();
+    assert_eq!(json!(last), summary["sim_s"]);
+    let events = std::fs::read_to_string(folder.join("events.jsonl")).unwrap();
+    let events: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(events.iter().all(|event| event["t_s"].is_f64()), "each with its time");
+    assert!(events.windows(2).all(|two| two[0]["t_s"].as_f64() <= two[1]["t_s"].as_f64()), "in order");
+    for kind in ["leader", "detected", "grouping", "assigned", "passed", "end"] {
+        assert!(events.iter().any(|event| event["event"] == kind), "no event {kind:?}");
+    }
+}
+
+#[test]
+fn without_a_record_there_is_a_summary_alone() {
+    let place = Place::new();
+    std::fs::write(place.join("short.toml"), SHORT).unwrap();
+    place.run(&["run", "short.toml", "--no-record", "--quiet", "--out", "out"]);
+    assert_eq!(names(place.join("out")), ["manifest.json", "processes.json", "summary.json"]);
+}

@@ -1,0 +1,270 @@
+//! Life and death: interruptions end cleanly, killed launchers and worlds leave no process behind, and a mission flies
+//! on without a drone that was killed.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod support;
+
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use support::process::{Role, is_alive, pid_of, shared_files, signal, state};
+use support::{Done, Flight, Place, eventually, faults, number};
+
+/// Wall clock, fast, for what must happen in flight: S2 takes some three seconds.
+const REALTIME: [&str; 2] = ["--clock", "realtime:20"];
+/// Lockstep with short ticks, so that the flight takes some seconds too.
+const LOCKSTEP: [&str; 4] = ["--clock", "lockstep", "--set", "time.dt_s=0.0005"];
+/// Processes of a launcher that was killed may live for so long.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
+fn take_off(place: &Place, args: &[&str]) -> (Flight, Vec<Role>) {
+    let mut flight = place.take_off("s2-right", args);
+    let processes = flight.processes();
+    (flight, processes)
+}
+
+fn summary_file(place: &Place) -> Value {
+    support::json(place.join("out/summary.json"))
+}
+
+/// Ended by a signal that the launcher took: code, summary, nothing left.
+fn assert_aborted(place: &Place, done: &Done, code: i32) {
+    assert_eq!(done.code, Some(code), "{done:?}");
+    assert_eq!(summary_file(place)["outcome"], "aborted", "{done:?}");
+    assert_eq!(done.summary()["outcome"], "aborted");
+    assert_eq!(place.runs_in_domain(), Vec::<String>::new(), "{done:?}");
+}
+
+#[test]
+fn signals_in_flight_end_the_run_cleanly() {
+    for clock in [&LOCKSTEP[..], &REALTIME[..]] {
+        for (name, code) in [("INT", 130), ("TERM", 143)] {
+            let place = Place::new();
+            let (mut flight, _) = take_off(&place, clock);
+            flight.wait_until(1.0);
+            signal(name, flight.pid());
+            let done = flight.finish();
+            assert_aborted(&place, &done, code);
+            assert!(number(&summary_file(&place), "/sim_s") >= 1.0, "what was flown is told");
+        }
+    }
+}
+
+#[test]
+fn signals_during_start_up_end_the_run_cleanly() {
+    for clock in [&LOCKSTEP[..], &REALTIME[..]] {
+        for (name, code) in [("INT", 130), ("TERM", 143)] {
+            let place = Place::new();
+            let mut flight = place.take_off("s2-right", clock);
+            flight.wait_for(&place.join("out/manifest.json"));
+            signal(name, flight.pid());
+            let done = flight.finish();
+            assert_aborted(&place, &done, code);
+        }
+    }
+}
+
+#[test]
+fn the_first_of_several_signals_counts() {
+    let place = Place::new();
+    let (flight, _) = take_off(&place, &REALTIME);
+    signal("INT", flight.pid());
+    signal("INT", flight.pid());
+    assert_aborted(&place, &flight.finish(), 130);
+}
+
+#[test]
+fn inline_runs_are_interrupted_too() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &["--runtime", "inline", "--set", "time.dt_s=0.0002"]);
+    flight.wait_for(&place.join("out/processes.json"));
+    signal("TERM", flight.pid());
+    let done = flight.finish();
+    assert_eq!(done.code, Some(143), "{done:?}");
+    assert_eq!(summary_file(&place)["outcome"], "aborted");
+}
+
+/// No process of the run lives two seconds later.
+fn assert_all_die(processes: &[Role], since: Instant) {
+    eventually("all processes of the run end", || processes.iter().all(|process| !is_alive(process.pid)));
+    assert!(since.elapsed() < LAST_WORDS, "they lived for {:?}", since.elapsed());
+}
+
+/// What a killed launcher leaves is found, and removed by `clean` or by the next run.
+#[test]
+fn a_killed_launcher_takes_its_processes_along_and_the_next_run_cleans_up() {
+    for (clock, cleaner) in [(&LOCKSTEP[..], "clean"), (&REALTIME[..], "clean"), (&REALTIME[..], "run")] {
+        let place = Place::new();
+        let (mut flight, processes) = take_off(&place, clock);
+        let (killed, launcher) = (Instant::now(), flight.pid());
+        signal("KILL", launcher);
+        assert_eq!(flight.end().code, None);
+        assert_all_die(&processes, killed);
+        assert_eq!(place.runs_in_domain().len(), 1, "nobody was left to remove it");
+        assert!(!shared_files(launcher).is_empty());
+        let done = match cleaner {
+            "clean" => place.run(&["clean"]),
+            _ => place.run(&["run", &support::paper("s2-right"), "--json"]),
+        };
+        assert_eq!(done.code, Some(0), "{done:?}");
+        assert_eq!(place.runs_in_domain(), Vec::<String>::new());
+        assert_eq!(shared_files(launcher), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn cleaning_leaves_living_runs_alone() {
+    let place = Place::new();
+    let (flight, _) = take_off(&place, &REALTIME);
+    let done = place.run(&["clean"]);
+    assert!(done.stdout.starts_with("removed 0 dead runs"), "{done:?}");
+    assert_eq!(place.runs_in_domain().len(), 1);
+    assert_eq!(flight.finish().code, Some(0));
+}
+
+#[test]
+fn when_all_are_killed_the_next_run_works() {
+    let place = Place::new();
+    let (mut flight, processes) = take_off(&place, &REALTIME);
+    let (killed, launcher) = (Instant::now(), flight.pid());
+    // The launcher last: until then it looks after the others. Some may have been ended by it.
+    let all: Vec<String> = processes.iter().rev().map(|process| process.pid.to_string()).collect();
+    let script = format!("kill -s KILL {}", all.join(" "));
+    std::process::Command::new("sh").args(["-c", &script]).status().unwrap();
+    assert_eq!(flight.end().code, None);
+    assert_all_die(&processes, killed);
+    let done = place.run(&["run", &support::paper("s2-right"), "--json", "--out", "next"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_eq!(shared_files(launcher), Vec::<String>::new());
+    assert_eq!(place.runs_in_domain(), Vec::<String>::new());
+}
+
+#[test]
+fn without_its_world_a_run_is_aborted() {
+    for clock in [&LOCKSTEP[..], &REALTIME[..]] {
+        let place = Place::new();
+        let (mut flight, processes) = take_off(&place, clock);
+        flight.wait_until(1.0);
+        signal("KILL", pid_of(&processes, "world", None));
+        let done = flight.finish();
+        assert_aborted(&place, &done, 3);
+        assert!(done.stderr.contains("world") && done.stderr.contains("KILL"), "{done:?}");
+    }
+}
+
+/// Simulated seconds a second in flights from which a drone is taken.
+const SPEED: f64 = 10.0;
+
+/// Ends a drone's process at about a time of the flight, later on a busy machine, and gives the summary.
+fn without(drone: u64, at_s: f64, how: &str) -> Value {
+    let place = Place::new();
+    let (flight, processes) = take_off(&place, &["--clock", &format!("realtime:{SPEED}")]);
+    std::thread::sleep(Duration::from_secs_f64(at_s / SPEED));
+    signal(how, pid_of(&processes, "drone", Some(drone)));
+    let done = flight.finish();
+    assert_eq!(done.code, Some(0), "drone {drone} ended at about {at_s} s: {done:?}");
+    let summary = done.summary();
+    assert_eq!(summary["outcome"], "reached");
+    assert_eq!(summary["violations"], json!([]), "drone {drone} ended at about {at_s} s");
+    assert!(number(&summary, "/min_separation_m") >= 37.0);
+    assert_unscheduled(&place.join("out"), &summary, drone, "kill");
+    let (noticed_s, ended_s) = (number(&summary, "/faults/0/t_s"), number(&summary, "/mission_s"));
+    assert!(0.8 * at_s < noticed_s && noticed_s < ended_s, "noticed at {noticed_s} s of {ended_s} s");
+    summary
+}
+
+/// The one fault of the run, in its events as in its summary.
+fn assert_unscheduled(folder: &Path, summary: &Value, drone: u64, kind: &str) {
+    let events = faults(folder);
+    assert_eq!(events.len(), 1, "{events:?}");
+    for fault in [&events[0], &summary["faults"][0]] {
+        assert_eq!(fault["kind"], kind);
+        assert_eq!(fault["target"], drone);
+        assert_eq!(fault["scheduled"], false);
+        assert!(fault["t_s"].is_number());
+    }
+    assert_eq!(summary["faults"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_member_killed_in_cruise_is_missed_and_the_mission_flies_on() {
+    let summary = without(7, 1.0, "KILL");
+    assert_eq!(summary["drones"], 8, "as many as there were at the start");
+    let split = summary["stages"][0]["split"].as_array().unwrap();
+    assert_eq!(split.iter().filter_map(Value::as_u64).sum::<u64>(), 7, "the living ones are split: {summary}");
+}
+
+#[test]
+fn a_member_killed_in_the_queue_is_missed_and_the_mission_flies_on() {
+    without(3, 20.0, "KILL");
+}
+
+#[test]
+fn a_member_killed_while_reforming_is_missed_and_the_mission_flies_on() {
+    without(3, 40.0, "KILL");
+    // Drone 3 then hovers where another one has to pass by.
+    without(3, 46.0, "KILL");
+}
+
+#[test]
+fn a_leader_killed_in_cruise_is_replaced() {
+    let summary = without(0, 1.0, "KILL");
+    let leaders: Vec<u64> =
+        summary["leaders"].as_array().unwrap().iter().map(|l| l["leader"].as_u64().unwrap()).collect();
+    assert_eq!(leaders[0], 0);
+    assert!(leaders.iter().any(|&leader| leader != 0), "{leaders:?}");
+    assert!(number(&summary, "/elections") >= 2.0);
+    assert!(number(&summary, "/failover_s/0") > 0.0);
+}
+
+#[test]
+fn a_leader_killed_in_the_queue_or_while_reforming_does_not_end_the_mission() {
+    without(0, 20.0, "KILL");
+    without(0, 40.0, "KILL");
+}
+
+#[test]
+fn a_drone_that_ends_in_another_way_is_dead_as_well() {
+    without(6, 5.0, "TERM");
+}
+
+#[test]
+fn a_drone_killed_in_lockstep_is_missed_too() {
+    let place = Place::new();
+    let (mut flight, processes) = take_off(&place, &LOCKSTEP);
+    flight.wait_until(1.0);
+    signal("KILL", pid_of(&processes, "drone", Some(4)));
+    let done = flight.finish();
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_unscheduled(&place.join("out"), &done.summary(), 4, "kill");
+}
+
+#[test]
+fn a_stopped_drone_is_hung_in_lockstep_and_the_mission_flies_on() {
+    let place = Place::new();
+    let (mut flight, processes) = take_off(&place, &LOCKSTEP);
+    flight.wait_until(1.0);
+    let stopped = Instant::now();
+    signal("STOP", pid_of(&processes, "drone", Some(5)));
+    let done = flight.finish();
+    assert!(stopped.elapsed() >= Duration::from_secs(5), "given up too early: {:?}", stopped.elapsed());
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_unscheduled(&place.join("out"), &done.summary(), 5, "hung");
+}
+
+#[test]
+fn a_stopped_drone_holds_nobody_up_by_the_wall_clock() {
+    let place = Place::new();
+    let (mut flight, processes) = take_off(&place, &REALTIME);
+    flight.wait_until(1.0);
+    let drone = pid_of(&processes, "drone", Some(5));
+    signal("STOP", drone);
+    eventually("it is stopped", || state(drone) == "T");
+    flight.wait_until(12.0);
+    assert_eq!(state(drone), "T", "it flew on without it");
+    signal("CONT", drone);
+    let done = flight.finish();
+    let summary = done.summary();
+    assert!(number(&summary, "/deadline_misses") > 100.0, "{done:?}");
+    assert_eq!(summary["faults"], json!([]), "by the wall clock it is late, not hung: {done:?}");
+}

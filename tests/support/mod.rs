@@ -1,0 +1,249 @@
+//! A place of its own for each test, and the `skein` binary started in it under a watchdog.
+#![allow(dead_code, reason = "each test binary uses a part of it")]
+
+pub mod process;
+
+use process::{Role, is_alive, shared_files};
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Read;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Whatever takes longer than this hangs.
+const WATCHDOG: Duration = Duration::from_secs(120);
+/// Between two looks at something that is waited for.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// A working folder and a domain that no other test shares.
+pub struct Place(TempDir);
+
+impl Place {
+    pub fn new() -> Self {
+        let folder = TempDir::with_prefix("sk").unwrap();
+        let runtime = folder.path().join("x");
+        fs::create_dir(&runtime).unwrap();
+        fs::set_permissions(&runtime, fs::Permissions::from_mode(0o700)).unwrap();
+        Self(folder)
+    }
+
+    /// A path in it.
+    pub fn join(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+        command.args(args).current_dir(self.0.path()).env("XDG_RUNTIME_DIR", self.join("x")).env_remove("SKEIN_LOG");
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    pub fn start(&self, args: &[&str]) -> Flight {
+        let mut child = self.command(args).spawn().unwrap();
+        let stdout = drain(child.stdout.take().unwrap());
+        let stderr = drain(child.stderr.take().unwrap());
+        Flight { child, out: self.join("out"), args: args.join(" "), stdout: Some(stdout), stderr: Some(stderr) }
+    }
+
+    /// Runs a command to its end.
+    pub fn run(&self, args: &[&str]) -> Done {
+        self.start(args).finish()
+    }
+
+    /// Flies a paper scenario into the folder `out` and gives its summary.
+    pub fn fly(&self, name: &str, args: &[&str]) -> Value {
+        let scenario = paper(name);
+        let done = self.run(&[&["run", &scenario, "--json"], args].concat());
+        assert_eq!(done.code, Some(0), "{done:?}");
+        done.summary()
+    }
+
+    /// Starts the flight of a paper scenario into the folder `out`.
+    pub fn take_off(&self, name: &str, args: &[&str]) -> Flight {
+        self.start(&[&["run", &paper(name), "--json", "--out", "out"], args].concat())
+    }
+
+    /// What is in the domain's root beside its lock: runs that live or were left behind.
+    pub fn runs_in_domain(&self) -> Vec<String> {
+        let Ok(entries) = fs::read_dir(self.join("x/skein")) else { return Vec::new() };
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name != "lock").collect()
+    }
+
+    /// Nothing was started or made: neither a domain nor a run's folder.
+    pub fn assert_untouched(&self, known: &Done) {
+        assert!(!self.join("x/skein").exists(), "a domain was made: {known:?}");
+        assert!(!self.join("runs").exists() && !self.join("out").exists(), "a run's folder was made: {known:?}");
+    }
+}
+
+/// A command that has ended.
+#[derive(Debug)]
+pub struct Done {
+    pub args: String,
+    pub pid: u32,
+    /// `None` if a signal ended it.
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Done {
+    /// The one JSON object on stdout.
+    pub fn summary(&self) -> Value {
+        assert_eq!(self.stdout.lines().count(), 1, "one object, in one line: {self:?}");
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error} in {self:?}"))
+    }
+}
+
+/// A command under way. Its processes are gone when this is dropped.
+pub struct Flight {
+    child: Child,
+    out: PathBuf,
+    args: String,
+    stdout: Option<JoinHandle<String>>,
+    stderr: Option<JoinHandle<String>>,
+}
+
+impl Flight {
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Its processes, once all are ready: launcher, world, drones by number.
+    pub fn processes(&mut self) -> Vec<Role> {
+        let file = self.out.join("processes.json");
+        self.wait_for(&file);
+        process::read(&file)
+    }
+
+    /// Waits for a file of the run's folder.
+    pub fn wait_for(&mut self, file: &Path) {
+        let since = Instant::now();
+        while !file.exists() {
+            let ended = self.child.try_wait().unwrap();
+            if ended.is_some() || since.elapsed() > WATCHDOG {
+                let _ = self.child.kill();
+                let said = self.stderr.take().map(|thread| thread.join().unwrap());
+                panic!("`{}`: no {} after {:?}; {ended:?}, {said:?}", self.args, file.display(), since.elapsed());
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Waits until the trace has come to `t_s`: the writer's buffer makes it late by some ticks.
+    pub fn wait_until(&mut self, t_s: f64) {
+        let file = self.out.join("trace.csv");
+        self.wait_for(&file);
+        eventually(&format!("`{}` flies to {t_s} s", self.args), || {
+            let text = fs::read_to_string(&file).unwrap();
+            // The last line may be half written.
+            let mut lines = text.lines().rev().skip(1);
+            lines.next().and_then(|line| line.split(',').next()?.parse::<f64>().ok()).is_some_and(|now| now >= t_s)
+        });
+    }
+
+    /// Waits for its end, and makes sure that it left no process and nothing in shared memory.
+    pub fn finish(mut self) -> Done {
+        let done = self.end();
+        if let Ok(text) = fs::read(self.out.join("processes.json"))
+            && done.args.contains("--out out")
+        {
+            for role in process::parse(&text) {
+                assert!(!is_alive(role.pid), "{role:?} outlived its run: {done:?}");
+            }
+        }
+        assert_eq!(shared_files(done.pid), Vec::<String>::new(), "left in shared memory by {done:?}");
+        done
+    }
+
+    /// Waits for its end.
+    pub fn end(&mut self) -> Done {
+        let since = Instant::now();
+        let code = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status.code();
+            }
+            if since.elapsed() > WATCHDOG {
+                // Its children die with it.
+                let _ = (self.child.kill(), self.child.wait());
+                panic!("`{}` hangs; it said {:?}", self.args, self.stderr.take().map(|thread| thread.join()));
+            }
+            std::thread::sleep(LOOK);
+        };
+        let text = |thread: Option<JoinHandle<String>>| thread.map(|t| t.join().unwrap()).unwrap_or_default();
+        let (stdout, stderr) = (text(self.stdout.take()), text(self.stderr.take()));
+        Done { args: self.args.clone(), pid: self.pid(), code, stdout, stderr }
+    }
+}
+
+impl Drop for Flight {
+    fn drop(&mut self) {
+        let _ = (self.child.kill(), self.child.wait());
+    }
+}
+
+fn drain(mut from: impl Read + Send + 'static) -> JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        from.read_to_end(&mut bytes).unwrap();
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
+}
+
+/// Waits until something holds; fails with `what` if it never does.
+pub fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
+    let since = Instant::now();
+    while !holds() {
+        assert!(since.elapsed() < WATCHDOG, "never true: {what}");
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Path of a scenario of the paper.
+pub fn paper(name: &str) -> String {
+    format!("{}/../scenarios/paper/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A number in a summary, by its JSON pointer.
+pub fn number(summary: &Value, pointer: &str) -> f64 {
+    let value = summary.pointer(pointer).and_then(Value::as_f64);
+    value.unwrap_or_else(|| panic!("{pointer} is no number in {summary}"))
+}
+
+/// Within a part of what is wanted.
+pub fn assert_near(what: &str, found: f64, wanted: f64, part: f64) {
+    assert!((found - wanted).abs() <= wanted * part, "{what}: {found}, wanted {wanted} within {} %", part * 100.0);
+}
+
+/// Reads a JSON file.
+pub fn json(path: impl AsRef<Path>) -> Value {
+    let path = path.as_ref();
+    let bytes = fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The faults in events.jsonl of a run's folder.
+pub fn faults(folder: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(folder.join("events.jsonl")).unwrap();
+    let events = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    events.filter(|event| event["event"] == "fault").collect()
+}
+
+/// Names in a folder.
+pub fn names(folder: impl AsRef<Path>) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries.map(|entry| lossy(&entry.unwrap().file_name())).collect();
+    names.sort();
+    names
+}
+
+fn lossy(name: &OsStr) -> String {
+    name.to_string_lossy().into_owned()
+}
