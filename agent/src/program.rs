@@ -152,7 +152,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(200))]
         #[test]
         fn no_grid_point_is_better(
-            raw in prop::collection::vec((0.0..6.283, -6.0..6.0), 0..6), wanted in (-9.0..9.0, -9.0..9.0)
+            raw in prop::collection::vec((0.0..std::f64::consts::TAU, -6.0..6.0), 0..6), wanted in (-9.0..9.0, -9.0..9.0)
         ) {
             let planes: Vec<_> = raw.iter().map(|&(angle, bound)| plane(angle, bound)).collect();
             let (limit, wanted) = (5.0, Vec2::new(wanted.0, wanted.1));

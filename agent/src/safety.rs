@@ -256,7 +256,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
         #[test]
-        fn two_drones_on_any_crossing_keep_their_distance(angle in 0.3..3.14, offset in -40.0..40.0, share in 0.1..0.9) {
+        fn two_drones_on_any_crossing_keep_their_distance(angle in 0.3..std::f64::consts::PI, offset in -40.0..40.0, share in 0.1..0.9) {
             let other = Vec2::new(f64::cos(angle), f64::sin(angle)) * 10.0;
             let start = -other * 15.0 + Vec2::new(0.0, offset);
             let (p, v) = ([Vec2::new(-150.0, 0.0), start], [Vec2::new(10.0, 0.0), other]);
