@@ -7,16 +7,19 @@
 //! | [`danger`] | detection distances (equations 1–4) |
 //! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
 //! | [`escape`] | out of a corner |
+//! | [`rehearsal`] | a leader flies its alternatives ahead |
 //! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
 //! | [`talk`] | what is said, and when |
 
 pub mod danger;
 pub mod escape;
 pub mod guidance;
+mod neighbours;
 pub mod params;
 pub mod pilot;
 pub mod program;
 pub mod queue;
+pub mod rehearsal;
 pub mod safety;
 pub mod swarm_pilot;
 pub mod talk;

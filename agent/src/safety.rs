@@ -18,7 +18,7 @@ pub struct SafetyParams {
     pub acceleration_max_mps2: f64,
     /// γ, 1/s.
     pub gain_per_s: f64,
-    /// Added to the safe distance, as a share of it.
+    /// Added to the safe distance, as a share of it; at least [`LEAST_MARGIN_M`].
     pub margin: f64,
     /// t_c, s.
     pub reaction_time_s: f64,
@@ -34,6 +34,8 @@ const OBSTACLE_MARGIN_M: f64 = 0.1;
 const LEAST_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration counted upon for braking before an obstacle; the rest turns.
 const OBSTACLE_BRAKING: f64 = 0.7;
+/// Least margin on the safe distance, m: what the length of a tick and [`TANGENT_M`] may cost.
+pub const LEAST_MARGIN_M: f64 = 0.25;
 /// Closer to the border than this, √x is continued by its tangent, m: it would be arbitrarily steep, and beyond the
 /// border there would be none. A drone that is pressed against the border comes to rest as much beyond it.
 const TANGENT_M: f64 = 0.05;
@@ -172,7 +174,8 @@ impl SafetyParams {
         let velocity = -neighbour.velocity_mps;
         // What is known is old, and the answer comes late: meanwhile either may have turned.
         let late_s = neighbour.age_s + self.reaction_time_s;
-        let keep = self.safe_distance_m * (1.0 + self.margin) + late_s * (1.0 + self.acceleration_max_mps2 * late_s);
+        let margin_m = (self.safe_distance_m * self.margin).max(LEAST_MARGIN_M);
+        let keep = self.safe_distance_m + margin_m + late_s * (1.0 + self.acceleration_max_mps2 * late_s);
         let alpha = self.acceleration_max_mps2;
         let beyond_m = distance - keep;
         let (root, slope) = root(alpha, beyond_m);

@@ -6,12 +6,13 @@ use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::{Ahead, ahead_of, queue_speed};
+use crate::rehearsal::{MOST_MEMBERS, Rehearsal};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::talk::Talk;
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::election::{Election, Input};
-use skein_leader::ledger::Ledger;
+use skein_leader::ledger::{Ledger, Orders};
 use skein_leader::membership::{Peers, extrapolated};
 use skein_leader::obstacles::Obstacles;
 use skein_leader::planner::{Member, Planner, Situation};
@@ -21,10 +22,6 @@ use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, POSE_LEADS, QueuePlace, s
 use skein_protocol::{DroneId, GroupId, Message, SimTime, Vec2};
 use std::collections::VecDeque;
 
-/// A beacon that is not older shows what its drone does now, s.
-const FRESH_S: f64 = 0.3;
-/// Neighbours known by beacon alone count up to this many safe distances.
-const BEACON_REACH: f64 = 4.0;
 /// With a reaction time t_c, the velocity gain is at most this over t_c: a higher one oscillates.
 const GAIN_BY_REACTION: f64 = 0.4;
 /// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
@@ -37,21 +34,22 @@ const PATIENCE_IN_FORMATION_S: f64 = 8.0;
 /// One drone's mind, and what it remembers.
 #[derive(Clone, Debug)]
 pub struct SwarmPilot {
-    params: PilotParams,
-    peers: Peers,
-    obstacles: Obstacles,
-    ledger: Ledger,
-    election: Election,
+    pub(crate) params: PilotParams,
+    pub(crate) peers: Peers,
+    pub(crate) obstacles: Obstacles,
+    pub(crate) ledger: Ledger,
+    pub(crate) election: Election,
     planner: Planner,
-    way: Way,
+    pub(crate) way: Way,
     talk: Talk,
     safety: Safety,
     delayed: VecDeque<Vec2>,
     escape: Escape,
+    rehearsal: Option<Rehearsal>,
     members: Vec<Member>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
-    neighbours: Vec<Neighbour>,
+    pub(crate) neighbours: Vec<Neighbour>,
 }
 
 impl SwarmPilot {
@@ -70,6 +68,7 @@ impl SwarmPilot {
             safety: Safety::new(params.safety),
             delayed: VecDeque::from(vec![Vec2::zeros(); reaction_ticks]),
             escape: Escape::default(),
+            rehearsal: None,
             members: Vec::new(),
             silent: Vec::new(),
             ahead: Vec::new(),
@@ -142,18 +141,21 @@ impl SwarmPilot {
         }
         if self.election.leads() {
             self.plan(senses);
+        } else {
+            self.rehearsal = None;
         }
     }
 
     fn plan(&mut self, senses: &Senses<'_>) {
         let now = senses.now;
         self.members.clear();
-        let speed_mps = senses.velocity.norm();
-        self.members.push(Member { id: self.params.me, position: senses.position, speed_mps });
+        let (position, velocity) = (senses.position, senses.velocity);
+        self.members.push(Member { id: self.params.me, position, speed_mps: velocity.norm(), velocity });
         let peers = self.peers.living(now).map(|(id, pose)| Member {
             id,
             position: extrapolated(pose, now),
             speed_mps: Vec2::from(pose.velocity_mps).norm(),
+            velocity: pose.velocity_mps.into(),
         });
         self.members.extend(peers);
         self.members.sort_by_key(|member| member.id);
@@ -161,18 +163,35 @@ impl SwarmPilot {
             let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
             past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
         }
-        let situation = Situation {
+        if let Some(rehearsal) = &mut self.rehearsal {
+            if rehearsal.still_holds(&self.members, self.obstacles.iter().count()) {
+                if let Some(orders) = rehearsal.work() {
+                    self.rehearsal = None;
+                    self.adopt(orders);
+                }
+                return;
+            }
+            self.rehearsal = None;
+        }
+        let mut alternatives = self.planner.decide(&Situation {
             now,
             ballot: self.election.obeyed(),
             members: &self.members,
             silent: &self.silent,
             obstacles: &self.obstacles,
             ledger: &self.ledger,
-        };
-        if let Some(orders) = self.planner.decide(&situation) {
-            self.ledger.adopt(orders, &self.obstacles);
-            self.talk.hurry();
+        });
+        if alternatives.len() > 1 && self.members.len() <= MOST_MEMBERS {
+            let leader = self.clone();
+            self.rehearsal = Some(Rehearsal::new(leader, self.members.clone(), now, alternatives));
+        } else if !alternatives.is_empty() {
+            self.adopt(alternatives.swap_remove(0));
         }
+    }
+
+    fn adopt(&mut self, orders: Orders) {
+        self.ledger.adopt(orders, &self.obstacles);
+        self.talk.hurry();
     }
 
     /// Where drones that fell silent hang by now: their last beacon, and how far they took to stop.
@@ -239,52 +258,6 @@ impl SwarmPilot {
             speed = speed.min(here);
         }
         speed
-    }
-
-    /// Neighbours by own senses, and beyond those by beacon, with the share of an evasion that falls to this drone.
-    fn find_neighbours(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) {
-        self.neighbours.clear();
-        for sensed in senses.neighbours {
-            self.neighbours.push(Neighbour {
-                id: sensed.drone,
-                position_m: sensed.position_m.into(),
-                velocity_mps: sensed.velocity_mps.into(),
-                age_s: 0.0,
-                share: self.share(senses.now, sensed.drone, places),
-            });
-        }
-        let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
-        for (id, pose) in self.peers.living(senses.now) {
-            let position_m = extrapolated(pose, senses.now) - senses.position;
-            if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
-                continue;
-            }
-            let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
-            let (age_s, share) = (senses.now.since(pose.stamp), self.share(senses.now, id, places));
-            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, share });
-        }
-    }
-
-    /// Less than half of an evasion falls to this drone only while the other shows that it obeys the same plan and is
-    /// behind; more if this drone is behind; all of it if the other is silent.
-    fn share(&self, now: SimTime, other: DroneId, places: &[QueuePlace; MAX_PLACES]) -> f64 {
-        let Some(pose) = self.peers.last(other) else { return 1.0 };
-        let age_s = now.since(pose.stamp);
-        if !self.peers.is_living(other, now) {
-            return 1.0;
-        }
-        let open = |place: &&QueuePlace| place.set != 0 && self.way.is_open_set(place.set);
-        for mine in places.iter().filter(open) {
-            let same = |place: &&QueuePlace| place.set == mine.set && place.route == mine.route;
-            let Some(theirs) = pose.queue.iter().find(same) else { continue };
-            if mine.rank > theirs.rank {
-                return self.params.precedence_share;
-            }
-            if mine.rank < theirs.rank && age_s <= FRESH_S && pose.obeyed == self.ledger.stamp() {
-                return 1.0 - self.params.precedence_share;
-            }
-        }
-        0.5
     }
 
     /// Acceleration towards a velocity, made safe, m/s².

@@ -4,14 +4,15 @@ use crate::cost::{Flight, Trip, shortest, trips};
 use crate::ledger::{Ledger, Orders, PlannedSet};
 use crate::planner::{Member, Planner, Situation, Strategy, front};
 use crate::routes::Routes;
-use crate::split::Table;
+use crate::split::{Split, Table};
 use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan};
 use skein_protocol::{GroupId, ObstacleId, Vec2};
 use std::collections::BTreeMap;
 
 impl Planner {
     /// Divides the members over the routes past a set. Those who fly it already, or are past its gate, keep their way.
-    pub(crate) fn avoid(&self, s: &Situation<'_>, set: &[ObstacleId]) -> Option<Orders> {
+    /// One grouping, or the few that are worth a rehearsal.
+    pub(crate) fn avoid(&self, s: &Situation<'_>, set: &[ObstacleId]) -> Option<Vec<Orders>> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &self.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
         let flight = Flight { speed_mps: self.params.speed_mps, course_y_m: self.params.course_y_m };
@@ -20,10 +21,22 @@ impl Planner {
         let arrivals: Vec<Vec<f64>> = ways.iter().map(|row| row.iter().map(|way| way.arrival_s).collect()).collect();
         let kept: Vec<Option<&Assignment>> =
             s.members.iter().map(|m| before.and_then(|p| p.parts.get(&m.id))).collect();
-        let chosen = self.choose(s.members, &routes, &ways, &kept)?;
-        let ranks = ranks(&chosen, &arrivals, &kept);
-        let groups = groups(s, &chosen, &kept, &overlapping(s.ledger, set));
-        let predicted_s = self.table(&arrivals, routes.count())?.assigned(&chosen).ok()?.makespan_s;
+        let groupings = self.choose(s.members, &routes, &ways, &kept)?;
+        groupings.iter().map(|chosen| self.orders(s, set, &routes, &arrivals, &kept, chosen)).collect()
+    }
+
+    fn orders(
+        &self,
+        s: &Situation<'_>,
+        set: &[ObstacleId],
+        routes: &Routes,
+        arrivals: &[Vec<f64>],
+        kept: &[Option<&Assignment>],
+        chosen: &[usize],
+    ) -> Option<Orders> {
+        let ranks = ranks(chosen, arrivals, kept);
+        let groups = groups(s, chosen, kept, &overlapping(s.ledger, set));
+        let predicted_s = self.table(arrivals, routes.count())?.assigned(chosen).ok()?.makespan_s;
         let plan = Plan {
             predicted_s,
             routes: routes.count() as u32,
@@ -47,13 +60,14 @@ impl Planner {
         Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
     }
 
+    /// The route of each member, in one or several groupings.
     fn choose(
         &self,
         members: &[Member],
         routes: &Routes,
         ways: &[Vec<Trip>],
         kept: &[Option<&Assignment>],
-    ) -> Option<Vec<usize>> {
+    ) -> Option<Vec<Vec<usize>>> {
         let settled = |i: usize| match kept[i] {
             Some(part) if usize::from(part.route) < routes.count() => Some(usize::from(part.route)),
             _ if members[i].position.x >= routes.gate_x_m() => Some(shortest(&ways[i])),
@@ -64,22 +78,82 @@ impl Planner {
         let free: Vec<usize> = (0..members.len()).filter(|&i| settled(i).is_none()).collect();
         let rows: Vec<Vec<f64>> = free.iter().map(|&i| ways[i].iter().map(|way| way.arrival_s).collect()).collect();
         let table = self.table(&rows, routes.count())?;
-        let split = match self.params.strategy {
-            Strategy::CongestionAware => table.split(),
-            Strategy::Fixed { left, right } if routes.count() == 2 && left + right == free.len() => {
-                table.fixed(&[right, left]).ok()?
+        let splits = match self.params.strategy {
+            Strategy::Rehearsed => {
+                let lateral_m: Vec<f64> = free.iter().map(|&i| members[i].position.y).collect();
+                few_best(&table, &lateral_m, routes.count())
             }
-            Strategy::ShortestPath | Strategy::Fixed { .. } => table.shortest(),
+            Strategy::CongestionAware => vec![table.split()],
+            Strategy::Fixed { left, right } if routes.count() == 2 && left + right == free.len() => {
+                vec![table.fixed(&[right, left]).ok()?]
+            }
+            Strategy::ShortestPath | Strategy::Fixed { .. } => vec![table.shortest()],
         };
-        let mut chosen: Vec<usize> = (0..members.len()).map(|i| settled(i).unwrap_or(0)).collect();
-        free.iter().zip(split.routes).for_each(|(&i, route)| chosen[i] = route);
-        Some(chosen)
+        let grouping = |split: Split| {
+            let mut chosen: Vec<usize> = (0..members.len()).map(|i| settled(i).unwrap_or(0)).collect();
+            free.iter().zip(split.routes).for_each(|(&i, route)| chosen[i] = route);
+            chosen
+        };
+        Some(splits.into_iter().map(grouping).collect())
     }
 
     /// `None` only for arrivals that are no numbers, which finite positions do not have.
     fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
         Table::new(arrivals, &vec![self.params.headway_s; routes]).ok()
     }
+}
+
+/// Most groupings that are worth a rehearsal, the shortest ways not counted.
+const REHEARSED: usize = 12;
+
+/// The rule's grouping; the best of those with other numbers on the routes, exact or in lateral order (where no lanes
+/// cross); and the shortest ways. By makespan, no two alike.
+fn few_best(table: &Table, lateral_m: &[f64], routes: usize) -> Vec<Split> {
+    let rule = table.split();
+    let mut counts: Vec<usize> = vec![0; routes];
+    rule.routes.iter().for_each(|&route| counts[route] += 1);
+    let mut from_right: Vec<usize> = (0..lateral_m.len()).collect();
+    from_right.sort_by(|&a, &b| lateral_m[a].total_cmp(&lateral_m[b]).then(a.cmp(&b)));
+    let in_order = |counts: &Vec<usize>| {
+        let mut chosen = vec![0; from_right.len()];
+        let lanes = counts.iter().enumerate().flat_map(|(route, &count)| std::iter::repeat_n(route, count));
+        from_right.iter().zip(lanes).for_each(|(&drone, route)| chosen[drone] = route);
+        table.assigned(&chosen).ok()
+    };
+    let numbers = neighbouring(&counts, lateral_m.len());
+    let mut others: Vec<Split> = numbers.iter().chain([&counts]).filter_map(in_order).collect();
+    others.extend(numbers.iter().filter_map(|counts| table.fixed(counts).ok()));
+    others.sort_by(|a, b| a.makespan_s.total_cmp(&b.makespan_s).then(a.total_s.total_cmp(&b.total_s)));
+    let mut kept: Vec<Split> = Vec::new();
+    for split in std::iter::once(rule).chain(others) {
+        if kept.len() < REHEARSED && !kept.iter().any(|other| other.routes == split.routes) {
+            kept.push(split);
+        }
+    }
+    let shortest = table.shortest();
+    if !kept.iter().any(|other| other.routes == shortest.routes) {
+        kept.push(shortest);
+    }
+    kept
+}
+
+/// Numbers of drones on the routes: all of them for two routes, else those that move one or two drones over.
+fn neighbouring(counts: &[usize], drones: usize) -> Vec<Vec<usize>> {
+    if counts.len() == 2 {
+        return (0..=drones).map(|right| vec![right, drones - right]).collect();
+    }
+    let mut all = Vec::new();
+    for from in 0..counts.len() {
+        for to in (0..counts.len()).filter(|&to| to != from) {
+            for moved in 1..=counts[from].min(2) {
+                let mut next = counts.to_vec();
+                next[from] -= moved;
+                next[to] += moved;
+                all.push(next);
+            }
+        }
+    }
+    all
 }
 
 /// The sets before `routes` that a member has still to leave, with its route past each.

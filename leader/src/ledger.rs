@@ -61,6 +61,12 @@ impl Ledger {
         }
     }
 
+    /// The ledger that another drone would have, had it heard the same.
+    #[must_use]
+    pub fn of_member(&self, me: DroneId) -> Self {
+        Self { me, ..self.clone() }
+    }
+
     /// The plan this drone obeys, with the parts it has heard of.
     #[must_use]
     pub fn obeyed(&self) -> Option<&Orders> {

@@ -14,3 +14,4 @@ pub mod routes;
 pub mod slots;
 pub mod split;
 pub mod string;
+pub mod tps;

@@ -47,6 +47,11 @@ impl Peers {
         }
     }
 
+    /// Forgets a peer.
+    pub fn forget(&mut self, peer: DroneId) {
+        self.last.remove(&peer);
+    }
+
     /// How long a peer may be silent before it counts as gone, s: `base_s`, or more if its beacons come in rarely.
     #[must_use]
     pub fn patience_s(&self, peer: DroneId, base_s: f64) -> f64 {

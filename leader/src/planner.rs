@@ -5,6 +5,7 @@ use crate::ledger::{Ledger, Orders};
 use crate::obstacles::{Obstacles, set_array};
 use crate::reform::Reform;
 use crate::routes::RouteParams;
+use crate::slots::Reformation;
 use skein_protocol::formation::Shape;
 use skein_protocol::payload::{PHASE_AVOID, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
@@ -14,6 +15,8 @@ use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, V
 pub enum Strategy {
     /// Least time of the last drone past the gate (paper, Algorithm 3).
     CongestionAware,
+    /// The best few groupings by that rule and the shortest ways, flown ahead in a rehearsal; the cheapest wins.
+    Rehearsed,
     /// Each drone takes its own shortest way.
     ShortestPath,
     /// So many drones on the left and on the right of one obstacle, each side filled in the least time.
@@ -66,6 +69,8 @@ pub struct PlannerParams {
     pub shape: Shape,
     /// Its spacing, m.
     pub spacing_m: f64,
+    /// Who takes which slot.
+    pub reformation: Reformation,
     /// A drone has arrived when it is as near as this to its slot, m.
     pub arrival_error_m: f64,
     /// Distance of slots from drones that hang dead in the air, m.
@@ -87,6 +92,8 @@ pub struct Member {
     pub position: Vec2,
     /// How fast it flies, m/s.
     pub speed_mps: f64,
+    /// Its velocity, m/s.
+    pub velocity: Vec2,
 }
 
 /// What a leader knows when it decides.
@@ -130,15 +137,16 @@ impl Planner {
         Self { params, reform: Reform::default() }
     }
 
-    /// New orders, if there is something to decide.
-    pub fn decide(&mut self, s: &Situation<'_>) -> Option<Orders> {
+    /// New orders, if there is something to decide: one, or alternatives to rehearse, by the paper's rule the first.
+    pub fn decide(&mut self, s: &Situation<'_>) -> Vec<Orders> {
         match self.need(s) {
             Need::Plan(set) => {
                 let since = self.learnt(s, &set);
-                (s.now.since(since) >= self.params.debounce_s).then(|| self.avoid(s, &set)).flatten()
+                let due = s.now.since(since) >= self.params.debounce_s;
+                due.then(|| self.avoid(s, &set)).flatten().unwrap_or_default()
             }
-            Need::Wait => None,
-            Need::Formation => self.formation(s),
+            Need::Wait => Vec::new(),
+            Need::Formation => self.formation(s).into_iter().collect(),
         }
     }
 

@@ -74,7 +74,7 @@ impl Planner {
         let shape = if self.reform.open { opened(&close) } else { close };
         let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
-        let taken = slots::assign(&positions, &places).ok()?;
+        let taken = slots::assign_by(self.params.reformation, &positions, &places).ok()?;
         let plan = self.plan(s, phase, &[], anchor);
         let group = |id| s.ledger.obeyed().and_then(|o| o.parts.get(&id)).map_or(GroupId::ALL, |part| part.group);
         let groups: Vec<GroupId> = s.members.iter().map(|m| group(m.id)).collect();

@@ -1,5 +1,6 @@
-//! Which drone takes which slot of the target shape: least total squared distance (Jonker–Volgenant, O(n²·m)).
+//! Which drone takes which slot of the target shape.
 
+use crate::tps;
 use skein_protocol::Vec2;
 use thiserror::Error;
 
@@ -13,8 +14,67 @@ pub struct TooFewSlots {
     pub slots: usize,
 }
 
-/// The slot of each drone, by index, no slot twice, the sum of squared distances least. Positions and slots in one
-/// frame, m, finite. Surplus slots stay empty.
+/// How slots are given to drones (paper, Algorithm 5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reformation {
+    /// Least sum of squared distances.
+    Optimal,
+    /// The paper's annealed thin-plate mapping; optimal where that one has no answer: see [`tps::assign`].
+    Tps {
+        /// λ of the paper's E6, m².
+        lambda_m2: f64,
+    },
+    /// The closest pair of drone and slot first.
+    Greedy,
+    /// Each drone the slot of its own index.
+    Identity,
+}
+
+/// The slot of each drone, by index, no slot twice. Positions and slots in one frame, m, finite. Surplus slots stay
+/// empty.
+///
+/// # Errors
+/// [`TooFewSlots`].
+pub fn assign_by(method: Reformation, positions: &[Vec2], slots: &[Vec2]) -> Result<Vec<usize>, TooFewSlots> {
+    if slots.len() < positions.len() {
+        return Err(TooFewSlots { drones: positions.len(), slots: slots.len() });
+    }
+    match method {
+        Reformation::Optimal => assign(positions, slots),
+        Reformation::Tps { lambda_m2 } => {
+            tps::assign(positions, slots, lambda_m2).map_or_else(|| assign(positions, slots), Ok)
+        }
+        Reformation::Greedy => {
+            let cost = |drone: usize, slot: usize| (positions[drone] - slots[slot]).norm_squared();
+            Ok(cheapest_first(positions.len(), slots.len(), &cost))
+        }
+        Reformation::Identity => Ok((0..positions.len()).collect()),
+    }
+}
+
+/// Takes the cheapest pair of what is left, again and again; ties: the lower drone, then the lower slot. At least as
+/// many slots as drones.
+pub(crate) fn cheapest_first(drones: usize, slots: usize, cost: &impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    let mut free: Vec<usize> = (0..slots).collect();
+    let best = |drone: usize, free: &[usize]| {
+        let offers = free.iter().map(|&slot| (cost(drone, slot), slot));
+        offers.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, 0))
+    };
+    let mut waiting: Vec<(usize, (f64, usize))> = (0..drones).map(|drone| (drone, best(drone, &free))).collect();
+    let mut taken = vec![0; drones];
+    while let Some(next) = (0..waiting.len()).min_by(|&a, &b| waiting[a].1.0.total_cmp(&waiting[b].1.0)) {
+        let (drone, (_, slot)) = waiting.remove(next);
+        taken[drone] = slot;
+        free.retain(|&other| other != slot);
+        for (other, offer) in waiting.iter_mut().filter(|(_, offer)| offer.1 == slot) {
+            *offer = best(*other, &free);
+        }
+    }
+    taken
+}
+
+/// The slot of each drone, by index, no slot twice, the sum of squared distances least (Jonker–Volgenant, O(n²·m)).
+/// Positions and slots in one frame, m, finite. Surplus slots stay empty.
 ///
 /// # Errors
 /// [`TooFewSlots`].

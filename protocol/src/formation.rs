@@ -19,6 +19,8 @@ pub enum Shape {
     Grid,
     /// On a circle, `spacing_m` between neighbours; a lone drone at its front.
     Circle,
+    /// A filled triangle, tip ahead: rows of 1, 2, 3, …, `spacing_m` between all neighbours, filled from the middle.
+    Wedge,
     /// Offsets from the anchor, m.
     Offsets(Vec<[f64; 2]>),
 }
@@ -40,6 +42,7 @@ impl Shape {
                 (0..count).map(|i| Vec2::new(0.0 - (i / width) as f64, side(i % width)) * spacing_m).collect()
             }
             Self::Circle => circle(count, spacing_m),
+            Self::Wedge => wedge(count, spacing_m),
             Self::Offsets(offsets) => offsets.iter().take(count).map(|&o| Vec2::from(o)).collect(),
         }
     }
@@ -66,6 +69,16 @@ fn circle(count: usize, spacing_m: f64) -> Vec<Vec2> {
     (0..count).map(|i| Vec2::new((step * i as f64).cos() - 1.0, (step * i as f64).sin()) * radius).collect()
 }
 
+fn wedge(count: usize, spacing_m: f64) -> Vec<Vec2> {
+    let depth = 3.0f64.sqrt() / 2.0;
+    let row = |row: usize| {
+        // An even number of slots has none in the middle.
+        let half = if row % 2 == 1 { 0.5 } else { 0.0 };
+        (0..=row).map(move |i| Vec2::new(0.0 - depth * row as f64, side(i) - half) * spacing_m)
+    };
+    (0..).flat_map(row).take(count).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,8 +94,17 @@ mod tests {
     }
 
     #[test]
+    fn a_wedge_is_full_rows_of_one_two_and_three() {
+        let depth = 75.0f64.sqrt();
+        let wanted = [(0.0, 0.0), (-1.0, -5.0), (-1.0, 5.0), (-2.0, 0.0), (-2.0, 10.0), (-2.0, -10.0)];
+        for (slot, (row, y)) in Shape::Wedge.slots(6, 10.0).iter().zip(wanted) {
+            assert!((slot - Vec2::new(row * depth, y)).norm() < 1e-9, "{slot} is not in row {row} at {y} m");
+        }
+    }
+
+    #[test]
     fn slots_are_spaced_and_the_front_one_is_first() {
-        for shape in [Shape::NestedV, Shape::V, Shape::Line, Shape::Column, Shape::Grid, Shape::Circle] {
+        for shape in [Shape::NestedV, Shape::V, Shape::Line, Shape::Column, Shape::Grid, Shape::Circle, Shape::Wedge] {
             for count in [1, 2, 5, 8, 13, 40] {
                 let slots = shape.slots(count, 10.0);
                 assert_eq!(slots.len(), count);

@@ -10,10 +10,11 @@
 //! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
 //! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
 //! | [`record`] | what the world tells the recorder |
-//! | [`formation`], [`shape`] | target shapes; obstacle shapes |
+//! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
 
 pub mod digest;
 pub mod downlink;
+pub mod energy;
 pub mod formation;
 pub mod frame;
 pub mod ids;

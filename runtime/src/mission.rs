@@ -9,8 +9,9 @@ use skein_agent::{PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
 use skein_leader::planner::{Destination, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
+use skein_leader::slots::Reformation;
 use skein_protocol::{DroneId, SimTime, Vec2};
-use skein_scenario::{End, Failsafe, Scenario, Strategy as StrategyKey};
+use skein_scenario::{End, Failsafe, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
 
 /// Neighbours are sensed within this many safe distances.
@@ -116,6 +117,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
     PlannerParams {
         strategy: match scenario.strategy {
             StrategyKey::CongestionAware | StrategyKey::CongestionAwarePaper => Strategy::CongestionAware,
+            StrategyKey::CongestionAwareRehearsed => Strategy::Rehearsed,
             StrategyKey::ShortestPath => Strategy::ShortestPath,
             StrategyKey::Fixed { left, right } => Strategy::Fixed { left: left as usize, right: right as usize },
         },
@@ -124,6 +126,12 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         routes: RouteParams { clearance_m: avoidance.clearance_m, planning_distance_m: avoidance.planning_distance_m },
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
+        reformation: match scenario.mission.reformation {
+            ReformationKey::Optimal => Reformation::Optimal,
+            ReformationKey::Tps => Reformation::Tps { lambda_m2: scenario.mission.tps_lambda },
+            ReformationKey::Greedy => Reformation::Greedy,
+            ReformationKey::Identity => Reformation::Identity,
+        },
         arrival_error_m: scenario.mission.arrival_error_m,
         safe_distance_m: drone.safe_distance_m,
         course_y_m: scenario.formation.start_m[1],

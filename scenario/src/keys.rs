@@ -26,9 +26,10 @@ pub struct Scenario {
     #[serde(default = "first_seed")]
     #[schemars(range(min = 0, max = 9_223_372_036_854_775_807_i64))]
     pub seed: u64,
-    /// How drones are shared out to the routes round an obstacle set: `congestion-aware` (rehearsed),
-    /// `congestion-aware-paper` (the paper's rule to the letter), `shortest-path`, or `fixed:L/R` (L drones to the
-    /// left, R to the right of the only obstacle).
+    /// How drones are shared out to the routes round an obstacle set: `congestion-aware` and
+    /// `congestion-aware-paper` (the paper's rule), `congestion-aware-rehearsed` (the best few groupings are flown ahead,
+    /// the cheapest is taken), `shortest-path`, or `fixed:L/R` (L drones to the left, R to the right of the only
+    /// obstacle).
     #[serde(default)]
     pub strategy: Strategy,
     /// Simulated time.
@@ -141,6 +142,8 @@ pub enum FormationShape {
     Grid,
     /// On a circle.
     Circle,
+    /// A filled triangle: rows of 1, 2, 3, … behind the tip.
+    Wedge,
 }
 
 /// When the mission is over.
@@ -161,12 +164,40 @@ pub struct Mission {
     /// A drone has arrived when it is as near as this to its slot.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub arrival_error_m: f64,
+    /// How slots are given to drones when the formation closes.
+    pub reformation: Reformation,
+    /// λ of the spline with reformation = "tps" (the paper's E6), m²: the greater, the more the formation keeps its
+    /// order; with 0 each drone maps to the closest slot, shape counts for nothing.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub tps_lambda: f64,
 }
 
 impl Default for Mission {
     fn default() -> Self {
-        Self { end: End::Hold, stop_x_m: 100.0, goal_m: None, reform_speed_max_mps: 20.0, arrival_error_m: 0.8 }
+        Self {
+            end: End::Hold,
+            stop_x_m: 100.0,
+            goal_m: None,
+            reform_speed_max_mps: 20.0,
+            arrival_error_m: 0.8,
+            reformation: Reformation::Optimal,
+            tps_lambda: 0.0,
+        }
     }
+}
+
+/// How slots are given to drones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reformation {
+    /// Least sum of squared distances.
+    Optimal,
+    /// The paper's annealed thin-plate mapping; above 200 drones as optimal.
+    Tps,
+    /// The closest pair of drone and slot first.
+    Greedy,
+    /// In the order of the drones' numbers.
+    Identity,
 }
 
 /// What ends the mission.

@@ -19,7 +19,7 @@ mod strategy;
 pub use error::{Issue, ScenarioErrors};
 pub use keys::{
     Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
-    Protocol, RadioKeys, Scenario, Sensors, Time,
+    Protocol, RadioKeys, Reformation, Scenario, Sensors, Time,
 };
 pub use obstacle::Obstacle;
 pub use parse::Source;

@@ -21,6 +21,7 @@ impl Scenario {
             (None, Some(FormationShape::Column)) => Shape::Column,
             (None, Some(FormationShape::Grid)) => Shape::Grid,
             (None, Some(FormationShape::Circle)) => Shape::Circle,
+            (None, Some(FormationShape::Wedge)) => Shape::Wedge,
         }
     }
 

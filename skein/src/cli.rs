@@ -34,6 +34,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Fly a grid of missions side by side, resumable: CSV, JSON and plots with 95 % intervals
     Sweep(crate::sweep::SweepArgs),
+    /// Fly the paper: every table and figure, ours beside the published, in one report
+    Reproduce(crate::reproduce::ReproduceArgs),
     /// Print the TOML of a random scene
     Scene(crate::sweep::SceneArgs),
     /// Draw the plots of a recorded run and print its summary
@@ -74,7 +76,8 @@ pub enum SchemaOf {
 pub struct ScenarioArgs {
     /// Scenario file (TOML)
     pub scenario: PathBuf,
-    /// How drones are grouped: congestion-aware, congestion-aware-paper, shortest-path or fixed:L/R
+    /// How drones are grouped: congestion-aware, congestion-aware-paper, congestion-aware-rehearsed,
+    /// shortest-path or fixed:L/R
     #[arg(long, value_name = "STRATEGY")]
     pub strategy: Option<String>,
     /// Seed of everything random

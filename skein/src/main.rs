@@ -9,6 +9,7 @@ mod input;
 mod interrupt;
 mod progress;
 mod report;
+mod reproduce;
 mod roles;
 mod run;
 mod schema;
@@ -42,6 +43,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Run(args) => run::run(&args),
         Command::Check(args) => check::check(&args),
         Command::Sweep(args) => sweep::sweep(&args),
+        Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::Scene(args) => sweep::scene(&args),
         Command::Report(args) => report::report(&args),
         Command::Clean => housekeeping::clean(),

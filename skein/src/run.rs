@@ -66,7 +66,8 @@ fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure
     })
 }
 
-fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<(), Failure> {
+/// Writes what was ordered into the run's folder.
+pub fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<(), Failure> {
     let resolved = serde_json::to_value(scenario).map_err(Failure::environment)?;
     let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
     let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);

@@ -1,8 +1,8 @@
 //! One drone's body: a planar point mass (the paper's K1), its failsafe, its energy (E7).
 
-use crate::energy::power_w;
 use crate::params::{Failsafe, WorldParams};
 use skein_protocol::Vec2;
+use skein_protocol::energy::power_w;
 
 /// Altitude from which a dead drone lands, m.
 pub(crate) const ALTITUDE_M: f64 = 20.0;

@@ -17,6 +17,8 @@ pub(crate) struct Finish {
     middle: Vec2,
     grid: Grid,
     taken: Vec<bool>,
+    /// Which drones have been past all obstacles: where the slots then are is the leader's choice.
+    past: Vec<bool>,
 }
 
 impl Finish {
@@ -29,13 +31,26 @@ impl Finish {
         self.form(living, params);
         match params.end {
             End::Hold { stop_x_m } => {
-                holds(params, bodies, stages) && {
+                self.note_past(stages.rear_x_m + params.planning_distance_m, bodies);
+                self.holds(bodies) && {
                     let anchor = self.anchor(bodies, living);
                     anchor.x >= stop_x_m - params.arrival_error_m && self.filled(bodies, anchor, params.arrival_error_m)
                 }
             }
             End::Goal { front_m } => stages.all_passed() && self.filled(bodies, front_m, params.arrival_error_m),
         }
+    }
+
+    fn note_past(&mut self, past_x_m: f64, bodies: &[Body]) {
+        self.past.resize(bodies.len(), false);
+        self.past.iter_mut().zip(bodies).for_each(|(past, body)| *past |= body.position.x >= past_x_m);
+    }
+
+    /// Whether every living drone has been past every obstacle and is slow.
+    fn holds(&self, bodies: &[Body]) -> bool {
+        let slow = HOLD_SPEED_MPS * HOLD_SPEED_MPS;
+        let mut living = bodies.iter().zip(&self.past).filter(|(body, _)| body.alive);
+        living.all(|(body, past)| *past && body.velocity.norm_squared() <= slow)
     }
 
     /// Makes the slots of so many drones, unless they are at hand.
@@ -75,13 +90,6 @@ impl Finish {
     }
 }
 
-/// Whether every living drone is past every obstacle and slow.
-fn holds(params: &WorldParams, bodies: &[Body], stages: &Stages) -> bool {
-    let past = stages.rear_x_m + params.planning_distance_m;
-    let slow = HOLD_SPEED_MPS * HOLD_SPEED_MPS;
-    bodies.iter().filter(|body| body.alive).all(|b| b.position.x >= past && b.velocity.norm_squared() <= slow)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,6 +112,16 @@ mod tests {
 
     fn open() -> Stages {
         Stages::new(&[], 40.0)
+    }
+
+    #[test]
+    fn a_drone_that_turns_back_to_its_slot_has_still_been_past() {
+        let outline = Outline::new(&rectangle(0.0, 0.0, 10.0, 10.0));
+        let stages = Stages::new(&[outline], 40.0);
+        let (params, mut finish) = (hold(-1e9), Finish::default());
+        assert!(!finish.met(&params, &formed(Vec2::new(20.0, 0.0)), &stages));
+        assert!(finish.met(&params, &formed(Vec2::new(500.0, 0.0)), &stages));
+        assert!(finish.met(&params, &formed(Vec2::new(20.0, 0.0)), &stages));
     }
 
     #[test]

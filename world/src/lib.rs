@@ -7,7 +7,6 @@
 //! |---|---|
 //! | [`params`] | what a mission is made of |
 //! | [`world`] | one tick: senses down, answers up, advance, record |
-//! | [`energy`] | power of level flight |
 //! | `body`, `geometry`, `grid`, `senses` | kinematics; distances; who is near whom and what |
 //! | `process` | a drone's process, as far as the world sees it |
 //! | `invariants`, `stages`, `finish` | what must hold; obstacle sets on the way; when the mission is over |
@@ -15,7 +14,6 @@
 
 mod body;
 mod decisions;
-pub mod energy;
 mod finish;
 mod geometry;
 mod grid;

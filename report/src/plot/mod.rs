@@ -2,6 +2,7 @@
 //! that colour-blind people tell apart (Okabe and Ito).
 
 mod curves;
+pub mod reproduce;
 mod samples;
 mod style;
 pub mod sweep;

@@ -119,7 +119,7 @@ fn draw_tracks(
 }
 
 /// The outline with its rounding: about each vertex an arc from one edge's normal to the next one's.
-fn outline(shape: &ConvexShape) -> Vec<(f64, f64)> {
+pub(super) fn outline(shape: &ConvexShape) -> Vec<(f64, f64)> {
     let vertices: Vec<Vec2> = shape.vertices().collect();
     let n = vertices.len();
     let normal = |from: Vec2, to: Vec2| {

@@ -51,7 +51,8 @@ pub struct SceneArgs {
     pub obstacles: Option<[u32; 2]>,
 }
 
-fn jobs(text: &str) -> Result<usize, String> {
+/// A number of workers.
+pub fn jobs(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|count| (1..=1024).contains(count)).ok_or_else(|| "expected 1 to 1024".to_owned())
 }
 

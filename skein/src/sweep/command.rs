@@ -95,7 +95,7 @@ fn fly_missing(
         true => Runtime::Processes(flights.join(std::process::id().to_string())),
         false => Runtime::Inline,
     };
-    let bar = progress_bar(args, grid.len(), rows.len());
+    let bar = progress_bar(args.quiet || args.json, grid.len(), rows.len());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let workers = args.jobs.unwrap_or(cores).min(missing.len());
     let ended = fly_all(grid, &missing, workers, &runtime, interrupt, |row| {
@@ -112,8 +112,9 @@ fn fly_missing(
     ended.map_err(|error| Failure::environment(format!("{}: {error}", store.path("rows.jsonl").display())))
 }
 
-fn progress_bar(args: &SweepArgs, runs: usize, done: usize) -> ProgressBar {
-    let hidden = args.quiet || args.json || !std::io::stderr().is_terminal();
+/// A bar over so many runs, of which some are done; none if `quiet` or stderr is no terminal.
+pub fn progress_bar(quiet: bool, runs: usize, done: usize) -> ProgressBar {
+    let hidden = quiet || !std::io::stderr().is_terminal();
     let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(runs as u64) };
     if let Ok(style) = ProgressStyle::with_template("{spinner} {pos} of {len} runs {wide_bar} {per_sec}, {eta} left") {
         bar.set_style(style);

@@ -54,7 +54,8 @@ pub fn fly(grid: &Grid<'_>, job: usize, runtime: &Runtime, interrupt: &Interrupt
     })
 }
 
-fn fly_inline(scenario: &Scenario, interrupt: &Interrupt) -> Result<Summary, String> {
+/// The summary of a flight in this thread; the error is why there is none.
+pub fn fly_inline(scenario: &Scenario, interrupt: &Interrupt) -> Result<Summary, String> {
     let facts = facts(scenario, "inline", "lockstep").map_err(|_| "a scenario without facts")?;
     let mut recorder = Recorder::in_memory(facts);
     let end = inline::run(scenario, &mut recorder, || interrupt.signal()).map_err(|error| error.to_string())?;

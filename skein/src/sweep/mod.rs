@@ -3,19 +3,19 @@
 //! A sweep's folder holds `experiment.json` (whose sweep it is), `rows.jsonl` (a finished run a line, what a sweep is
 //! resumed from), and once all runs are done `runs.csv`, `summary.json` and `plots/*.svg`.
 
-mod args;
+pub(crate) mod args;
 mod cells;
-mod command;
+pub(crate) mod command;
 mod draw;
 mod experiment;
-mod fly;
+pub(crate) mod fly;
 mod grid;
 mod metrics;
 mod plots;
-mod pool;
+pub(crate) mod pool;
 mod random;
 mod row;
-mod statistics;
+pub(crate) mod statistics;
 mod store;
 mod table;
 

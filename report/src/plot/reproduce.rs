@@ -1,0 +1,363 @@
+//! Figures that put a mission beside a paper's: moments of it seen from above, and bars side by side.
+
+use super::style::PALETTE;
+use super::sweep::escaped;
+use super::tracks::outline;
+use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::folder::RunFolder;
+use crate::trace;
+use plotters::style::RGBColor;
+use skein_protocol::Vec2;
+use skein_protocol::shape::ConvexShape;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// How far back a drone's way is shown at a moment, s.
+const TAIL_S: f64 = 8.0;
+/// Time between two points of that way, s.
+const STEP_S: f64 = 0.25;
+/// Width of a drawing, px.
+const WIDTH: f64 = 1100.0;
+
+/// One drone at a moment.
+struct Seen {
+    position_m: Vec2,
+    group: String,
+    tail: Vec<Vec2>,
+}
+
+/// How far the swarm is spread in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// When, s.
+    pub t_s: f64,
+    /// Extent across the flight direction, m.
+    pub width_m: f64,
+    /// Mean distance over all pairs of drones, m; 0 for a lone one.
+    pub distance_m: f64,
+}
+
+/// Moments of a flown run.
+pub struct Snapshots {
+    /// Time of each, s, and every living drone then.
+    moments: Vec<(f64, Vec<Seen>)>,
+    /// Where drones were, m: lower left and upper right corner.
+    corners: (Vec2, Vec2),
+    /// Of every tick.
+    spreads: Vec<Spread>,
+}
+
+impl Snapshots {
+    /// Reads a run's trace for these moments, s; one beyond the end shows the end.
+    ///
+    /// # Errors
+    /// [`ReportError::Io`], [`ReportError::Content`] for a broken trace.
+    pub fn read(folder: &RunFolder, times_s: &[f64]) -> Result<Self, ReportError> {
+        let mut tails: BTreeMap<usize, Vec<(f64, Vec2)>> = BTreeMap::new();
+        let mut found = Self {
+            moments: Vec::new(),
+            corners: (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)),
+            spreads: Vec::new(),
+        };
+        let mut last: Vec<trace::TraceRow> = Vec::new();
+        trace::read(&folder.path().join(trace::FILE), |rows| {
+            found.measure(rows);
+            for row in rows {
+                let tail = tails.entry(row.drone).or_default();
+                if tail.last().is_none_or(|(t_s, _)| row.t_s - t_s >= STEP_S) {
+                    tail.push((row.t_s, row.position_m));
+                }
+            }
+            while times_s.get(found.moments.len()).is_some_and(|&t_s| rows[0].t_s >= t_s) {
+                found.moments.push(moment(rows, &tails));
+            }
+            last = rows.to_vec();
+        })?;
+        if !last.is_empty() {
+            let missing = times_s.len().saturating_sub(found.moments.len());
+            found.moments.extend((0..missing).map(|_| moment(&last, &tails)));
+        }
+        Ok(found)
+    }
+
+    fn measure(&mut self, rows: &[trace::TraceRow]) {
+        let nothing = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+        let join = |(low, high): (Vec2, Vec2), at: &Vec2| (low.inf(at), high.sup(at));
+        let (low, high) = rows.iter().map(|row| &row.position_m).fold(nothing, join);
+        self.corners = join(join(self.corners, &low), &high);
+        let pair = |i: usize| rows[..i].iter().map(move |other| (other.position_m - rows[i].position_m).norm());
+        let total: f64 = (0..rows.len()).flat_map(pair).sum();
+        let pairs = rows.len() * (rows.len() - 1) / 2;
+        let distance_m = total / pairs.max(1) as f64;
+        self.spreads.push(Spread { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
+    }
+
+    /// The ticks between these times, s.
+    pub fn spreads(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Spread> {
+        self.spreads.iter().filter(move |spread| (from_s..=to_s).contains(&spread.t_s))
+    }
+
+    /// The groups in which drones fly at the moment of this place, in order.
+    #[must_use]
+    pub fn groups(&self, moment: usize) -> Vec<&str> {
+        let seen = self.moments.get(moment).map_or(&[][..], |moment| &moment.1);
+        let mut groups: Vec<&str> = seen.iter().map(|drone| drone.group.as_str()).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        groups
+    }
+
+    /// The SVG: a panel a moment, two in a row, a metre as long in all of them.
+    #[must_use]
+    pub fn draw(&self, facts: &RunFacts, title: &str) -> String {
+        let (mut low, mut high) = self.corners;
+        for (from, to) in facts.obstacles.iter().map(ConvexShape::bounds) {
+            (low, high) = (low.inf(&from), high.sup(&to));
+        }
+        let edge = Vec2::repeat(15.0);
+        let view = View { low: low - edge, high: high + edge };
+        let rows = self.moments.len().div_ceil(2);
+        let height = 70.0 + rows as f64 * view.pitch();
+        let mut svg = opening(height, title);
+        let colours = self.colours();
+        self.draw_legend(&mut svg, &colours);
+        for (i, (t_s, seen)) in self.moments.iter().enumerate() {
+            let (x, y) = (14.0 + (i % 2) as f64 * (WIDTH / 2.0), 70.0 + (i / 2) as f64 * view.pitch());
+            let _ = writeln!(svg, "<g transform=\"translate({x:.0} {y:.0})\">");
+            view.draw(&mut svg, facts, seen, &colours);
+            let label = format!("t = {t_s:.0} s: {}", self.groups(i).join(", "));
+            let _ = writeln!(svg, "<text x=\"8\" y=\"18\">{}</text></g>", escaped(&label));
+        }
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    fn colours(&self) -> BTreeMap<&str, RGBColor> {
+        let groups = (0..self.moments.len()).flat_map(|i| self.groups(i));
+        let mut colours: BTreeMap<&str, RGBColor> = groups.map(|group| (group, PALETTE[0])).collect();
+        colours.values_mut().zip(PALETTE.iter().cycle()).for_each(|(colour, &fresh)| *colour = fresh);
+        colours
+    }
+
+    fn draw_legend(&self, svg: &mut String, colours: &BTreeMap<&str, RGBColor>) {
+        let mut x = 20.0;
+        for (group, colour) in colours {
+            let _ = writeln!(
+                svg,
+                "<circle cx=\"{x:.0}\" cy=\"51\" r=\"5\" fill=\"{}\"/><text x=\"{:.0}\" y=\"56\">{}</text>",
+                hex(*colour),
+                x + 10.0,
+                escaped(group)
+            );
+            x += 34.0 + 8.0 * group.chars().count() as f64;
+        }
+        let note = format!("the way of the last {TAIL_S:.0} s behind each drone; flight to the right");
+        let _ = writeln!(svg, "<text x=\"{:.0}\" y=\"56\">{note}</text>", x + 10.0);
+    }
+}
+
+fn moment(rows: &[trace::TraceRow], tails: &BTreeMap<usize, Vec<(f64, Vec2)>>) -> (f64, Vec<Seen>) {
+    let t_s = rows[0].t_s;
+    let seen = |row: &trace::TraceRow| {
+        let tail = tails.get(&row.drone).into_iter().flatten().filter(|point| point.0 >= t_s - TAIL_S);
+        let tail = tail.map(|point| point.1).chain([row.position_m]).collect();
+        Seen { position_m: row.position_m, group: row.group.clone(), tail }
+    };
+    (t_s, rows.iter().map(seen).collect())
+}
+
+/// What of the world a panel shows, m.
+struct View {
+    low: Vec2,
+    high: Vec2,
+}
+
+impl View {
+    /// Width of a panel, px.
+    const PANEL: f64 = WIDTH / 2.0 - 28.0;
+
+    fn scale(&self) -> f64 {
+        Self::PANEL / (self.high.x - self.low.x).max(1.0)
+    }
+
+    fn height(&self) -> f64 {
+        (self.high.y - self.low.y) * self.scale()
+    }
+
+    /// From one row of panels to the next, px.
+    fn pitch(&self) -> f64 {
+        self.height() + 18.0
+    }
+
+    fn at(&self, point: Vec2) -> (f64, f64) {
+        ((point.x - self.low.x) * self.scale(), (self.high.y - point.y) * self.scale())
+    }
+
+    fn path(&self, points: impl Iterator<Item = Vec2>) -> String {
+        let places: Vec<String> = points.map(|point| self.at(point)).map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        places.join(" ")
+    }
+
+    fn draw(&self, svg: &mut String, facts: &RunFacts, seen: &[Seen], colours: &BTreeMap<&str, RGBColor>) {
+        let (width, height) = (Self::PANEL, self.height());
+        let _ = writeln!(svg, "<rect width=\"{width:.0}\" height=\"{height:.0}\" fill=\"none\" stroke=\"#e8e8e8\"/>");
+        for shape in &facts.obstacles {
+            let corners = self.path(outline(shape).into_iter().map(|(x, y)| Vec2::new(x, y)));
+            let _ = writeln!(svg, "<polygon points=\"{corners}\" fill=\"#bebebe\"/>");
+        }
+        for drone in seen {
+            let colour = hex(colours.get(drone.group.as_str()).copied().unwrap_or(PALETTE[0]));
+            let tail = self.path(drone.tail.iter().copied());
+            let (x, y) = self.at(drone.position_m);
+            let _ = writeln!(
+                svg,
+                "<polyline points=\"{tail}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>\
+                 <circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{colour}\"/>"
+            );
+        }
+    }
+}
+
+/// Groups of bars over names, one bar of each kind in a group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bars {
+    /// Above.
+    pub title: String,
+    /// What the bars show, with its unit.
+    pub y_label: String,
+    /// In the legend; a colour each.
+    pub kinds: Vec<String>,
+    /// By group: its name in two lines, a note above it, and a value from zero for each kind.
+    pub groups: Vec<BarGroup>,
+}
+
+/// A group of [`Bars`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct BarGroup {
+    /// Below the bars, two lines.
+    pub name: [String; 2],
+    /// Above them.
+    pub note: String,
+    /// One a kind.
+    pub values: Vec<f64>,
+}
+
+impl Bars {
+    /// Left and upper edge of the bars, and height of the tallest, px.
+    const LEFT: f64 = 30.0;
+    const TOP: f64 = 120.0;
+    const TALL: f64 = 300.0;
+
+    /// The SVG: each bar with its value above it.
+    #[must_use]
+    pub fn draw(&self) -> String {
+        let bottom = Self::TOP + Self::TALL;
+        let mut svg = opening(bottom + 58.0, &self.title);
+        let mut x = Self::LEFT;
+        for (kind, colour) in self.kinds.iter().zip(PALETTE.iter().cycle()) {
+            let (fill, after) = (hex(*colour), x + 20.0);
+            let kind_text = escaped(kind);
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{x:.0}\" y=\"46\" width=\"14\" height=\"14\" fill=\"{fill}\"/>\
+                 <text x=\"{after:.0}\" y=\"58\">{kind_text}</text>"
+            );
+            x += 50.0 + 7.5 * kind.chars().count() as f64;
+        }
+        let _ = writeln!(svg, "<text x=\"{x:.0}\" y=\"58\">{}</text>", escaped(&self.y_label));
+        let highest = self.groups.iter().flat_map(|group| &group.values).fold(f64::MIN_POSITIVE, |a, &b| a.max(b));
+        let pitch = (WIDTH - 2.0 * Self::LEFT) / self.groups.len().max(1) as f64;
+        for (i, group) in self.groups.iter().enumerate() {
+            self.draw_group(&mut svg, group, Self::LEFT + i as f64 * pitch, pitch, Self::TALL / highest);
+        }
+        let right = WIDTH - Self::LEFT;
+        let _ = writeln!(svg, "<path d=\"M{} {bottom}H{right}\" stroke=\"#333\"/>\n</svg>", Self::LEFT);
+        svg
+    }
+
+    fn draw_group(&self, svg: &mut String, group: &BarGroup, left: f64, pitch: f64, scale: f64) {
+        let bottom = Self::TOP + Self::TALL;
+        let width = (pitch * 0.84) / group.values.len().max(1) as f64;
+        for (i, (value, colour)) in group.values.iter().zip(PALETTE.iter().cycle()).enumerate() {
+            let (x, height, fill) = (left + pitch * 0.08 + i as f64 * width, value.max(0.0) * scale, hex(*colour));
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{height:.1}\" fill=\"{fill}\"/>\
+                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{value:.1}</text>",
+                x + 2.0,
+                bottom - height,
+                width - 4.0,
+                x + width / 2.0,
+                bottom - height - 6.0
+            );
+        }
+        let middle = left + pitch / 2.0;
+        let top = group.values.iter().fold(0.0f64, |a, &b| a.max(b)) * scale;
+        let lines =
+            [(bottom - top - 26.0, &group.note), (bottom + 20.0, &group.name[0]), (bottom + 38.0, &group.name[1])];
+        // Small enough for the longest name to stay in its group.
+        for (y, line) in lines {
+            let text = escaped(line);
+            let _ = writeln!(
+                svg,
+                "<text x=\"{middle:.1}\" y=\"{y:.1}\" font-size=\"12\" text-anchor=\"middle\">{text}</text>"
+            );
+        }
+    }
+}
+
+/// Canvas and title.
+fn opening(height: f64, title: &str) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH:.0}\" height=\"{height:.0}\" viewBox=\"0 0 \
+         {WIDTH:.0} {height:.0}\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"14\" fill=\"#333\">\n\
+         <rect width=\"{WIDTH:.0}\" height=\"{height:.0}\" fill=\"#fff\"/>\n\
+         <text x=\"20\" y=\"30\" font-size=\"18\">{}</text>\n",
+        escaped(title)
+    )
+}
+
+fn hex(RGBColor(r, g, b): RGBColor) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::facts;
+
+    #[test]
+    fn moments_show_who_was_where_and_the_last_stands_for_what_is_beyond_the_end() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
+        for (t_s, y, group) in [(0.02, 10.0, "N"), (1.0, 40.0, "N1"), (2.0, 20.0, "N1")] {
+            writeln!(csv, "{t_s},0,{t_s},0,1,0,N,,0\n{t_s},1,{t_s},{y},1,0,{group},,0").unwrap();
+        }
+        std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
+        let found = Snapshots::read(&folder, &[0.0, 0.5, 9.0]).unwrap();
+        assert_eq!(found.moments.iter().map(|moment| moment.0).collect::<Vec<_>>(), [0.02, 1.0, 2.0]);
+        assert_eq!((found.groups(0), found.groups(1)), (vec!["N"], vec!["N", "N1"]));
+        let spread = |t_s, m| Spread { t_s, width_m: m, distance_m: m };
+        assert_eq!(found.spreads(0.5, 9.0).copied().collect::<Vec<_>>(), [spread(1.0, 40.0), spread(2.0, 20.0)]);
+        let svg = found.draw(&facts(2), "a < b");
+        assert_eq!(svg.matches("<g ").count(), 3);
+        assert!(svg.contains("a &lt; b") && svg.contains("t = 2 s: N, N1"), "{svg}");
+    }
+
+    #[test]
+    fn the_tallest_bar_fills_the_height_and_the_others_their_share() {
+        let group = BarGroup { name: ["S1".into(), "total".into()], note: "1.50".into(), values: vec![20.0, 30.0] };
+        let bars = Bars {
+            title: "energy".into(),
+            y_label: "kJ".into(),
+            kinds: vec!["a".into(), "b".into()],
+            groups: vec![group],
+        };
+        let svg = bars.draw();
+        for text in ["height=\"300.0\"", "height=\"200.0\"", ">30.0<", ">1.50<", ">S1<", ">total<", ">kJ<"] {
+            assert!(svg.contains(text), "{text} is not in {svg}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The paper's figures, drawn from our flights.
+
+use super::flights::{DRONES, Flight, GEOMETRIES, PAPER, PLACEMENTS, SHORTEST, fixed};
+use super::forest::Forest;
+use super::results::Results;
+use super::rows::{CONVENTIONS, pass_s};
+use skein_report::plot::reproduce::{BarGroup, Bars};
+use skein_report::plot::sweep::{Lines, Point, Series};
+
+/// A drawn figure.
+pub struct Figure {
+    /// In the folder `figures`.
+    pub file: String,
+    /// Below it.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// All figures that have data; the error says what cannot be drawn.
+pub fn figures(results: &Results, forest: &Forest) -> Result<Vec<Figure>, String> {
+    let mut figures = Vec::new();
+    // S2 first: it is the geometry closest to the published numbers.
+    for geometry in ["s2", "s1", "s3b"] {
+        figures.extend(time_against_split(results, geometry)?);
+    }
+    figures.push(Figure {
+        file: "f2-snapshots.svg".to_owned(),
+        caption: "F2. The forest mission at the paper's moments and at its end.".to_owned(),
+        svg: forest.snapshots.draw(&forest.facts, "Snapshots of the forest mission"),
+    });
+    let plots = [
+        ("trace.svg", "f3-trace.svg", "F3. Trace of the whole forest mission: ◇ start, ● end."),
+        ("speed.svg", "f4-speed.svg", "F4. Average speed of the drones, ± standard deviation, forest."),
+        (
+            "distance.svg",
+            "f5-distance.svg",
+            "F5. Average distance between drones, ± standard deviation over pairs, forest; the safe distance is the \
+             red line.",
+        ),
+        (
+            "separation.svg",
+            "f5-separation.svg",
+            "F5, beside it: the least distance of two drones, which is what the safe distance bounds.",
+        ),
+    ];
+    for (plot, file, caption) in plots {
+        let svg = forest.plots.iter().find(|(name, _)| name == plot).map(|(_, svg)| svg.clone());
+        figures.extend(svg.map(|svg| Figure { file: file.to_owned(), caption: caption.to_owned(), svg }));
+    }
+    figures.push(energies(results));
+    Ok(figures)
+}
+
+fn time_against_split(results: &Results, geometry: &str) -> Result<Option<Figure>, String> {
+    let line = |placement: &str| {
+        let point = |left: u32| {
+            let flight = Flight::new(&format!("{geometry}-{placement}"), &fixed(left));
+            let mean = pass_s(results.reached(&flight)?)?;
+            Some(Point { x: left.into(), mean, low: mean, high: mean })
+        };
+        Series { label: format!("obstacle {placement}"), points: (0..=DRONES).filter_map(point).collect() }
+    };
+    let series: Vec<Series> = PLACEMENTS.map(line).into_iter().filter(|line| !line.points.is_empty()).collect();
+    if series.is_empty() {
+        return Ok(None);
+    }
+    let name = geometry.replacen('s', "S", 1);
+    let lines = Lines {
+        title: format!("Time to pass against the split, {name}"),
+        x_label: format!("drones past the left side, of {DRONES}"),
+        y_label: "time from detection until the last drone is past (s)".to_owned(),
+        series,
+    };
+    Ok(Some(Figure {
+        file: format!("f1-{geometry}.svg"),
+        caption: format!("F1. Time against split for the three placements, {name}; left is seen along the flight."),
+        svg: lines.draw()?,
+    }))
+}
+
+fn energies(results: &Results) -> Figure {
+    let group = |geometry: &str, (_, words, energy): super::rows::Convention| {
+        let of = |strategy| {
+            let flight = Flight::new(&format!("{geometry}-right"), strategy);
+            results.reached(&flight).and_then(energy).map(|joules| joules / 1e3)
+        };
+        let (paper, shortest) = (of(PAPER)?, of(SHORTEST)?);
+        let note = format!("ratio {:.3}", shortest / paper);
+        let name = [geometry.replacen('s', "S", 1), words.to_owned()];
+        Some(BarGroup { name, note, values: vec![paper, shortest] })
+    };
+    let pairs = GEOMETRIES.iter().flat_map(|geometry| CONVENTIONS.map(|convention| (geometry, convention)));
+    let bars = Bars {
+        title: "Energy of both strategies under each convention, obstacle right".to_owned(),
+        y_label: "energy of all drones (kJ)".to_owned(),
+        kinds: vec![PAPER.to_owned(), SHORTEST.to_owned()],
+        groups: pairs.filter_map(|(geometry, convention)| group(geometry, convention)).collect(),
+    };
+    Figure {
+        file: "f6-energy.svg".to_owned(),
+        caption: "F6. Energy by when the counting starts and ends; above each pair shortest path / congestion aware."
+            .to_owned(),
+        svg: bars.draw(),
+    }
+}

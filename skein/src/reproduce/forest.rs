@@ -1,0 +1,56 @@
+//! The forest mission, recorded: what figures and the times of the paper's story are taken from.
+
+use super::flights::{Flight, PAPER};
+use crate::exit::Failure;
+use crate::facts::facts;
+use crate::interrupt::Interrupt;
+use crate::run::write_manifest;
+use skein_protocol::record::Outcome;
+use skein_report::plot::reproduce::Snapshots;
+use skein_report::{Ending, Recorder, RunFacts, RunFolder, Summary, plot};
+use skein_runtime::inline;
+use std::path::Path;
+
+/// Moments of the paper's snapshots, s; the last is the mission's end.
+pub const MOMENTS_S: [f64; 5] = [0.0, 25.0, 50.0, 70.0, f64::INFINITY];
+/// The place among them at which the paper speaks of four subgroups.
+pub const FOUR_GROUPS: usize = 3;
+
+/// The recorded mission.
+pub struct Forest {
+    /// As ordered.
+    pub facts: RunFacts,
+    /// What came of it.
+    pub summary: Summary,
+    /// Moments of it.
+    pub snapshots: Snapshots,
+    /// File names and SVGs of a run's plots.
+    pub plots: Vec<(String, String)>,
+}
+
+impl Forest {
+    /// Flies it with the paper's rule and records it in this folder, which may hold an earlier recording.
+    pub fn record(path: &Path, interrupt: &Interrupt) -> Result<Self, Failure> {
+        let scenario = Flight::new("forest", PAPER).resolve().map_err(Failure::environment)?;
+        let facts = facts(&scenario, "inline", "lockstep")?;
+        let folder = RunFolder::at(path, true).map_err(Failure::usage)?;
+        write_manifest(&folder, &facts, &scenario)?;
+        let mut recorder = Recorder::in_folder(facts.clone(), &folder).map_err(Failure::environment)?;
+        let end = inline::run(&scenario, &mut recorder, || interrupt.signal()).map_err(Failure::environment)?;
+        let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+        let (summary, recorded) = recorder.finish(&ending);
+        recorded.map_err(Failure::environment)?;
+        if let Some(error) = end.sink_error {
+            return Err(Failure::environment(error));
+        }
+        folder.write_summary(&summary).map_err(Failure::environment)?;
+        let mut plots = Vec::new();
+        for path in plot::write(&folder, &facts).map_err(Failure::environment)? {
+            let svg = std::fs::read_to_string(&path);
+            let svg = svg.map_err(|error| Failure::environment(format!("{}: {error}", path.display())))?;
+            plots.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), svg));
+        }
+        let snapshots = Snapshots::read(&folder, &MOMENTS_S).map_err(Failure::environment)?;
+        Ok(Self { facts, summary, snapshots, plots })
+    }
+}

@@ -1,0 +1,160 @@
+//! `skein reproduce`: the published numbers beside ours.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod support;
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use support::{Place, assert_near, names};
+
+/// REPRODUCTION's numbers and the tolerance of each: a part of it, or an absolute one.
+enum Within {
+    Part(f64),
+    Absolute(f64),
+}
+use Within::{Absolute, Part};
+
+const NUMBERS: [(&str, f64, Within); 41] = [
+    ("R1.S1.time", 28.6, Part(0.05)),
+    ("R1.S2.time", 28.65, Part(0.05)),
+    ("R1.S3b.time", 28.65, Part(0.05)),
+    ("R3.S1.time", 30.45, Part(0.05)),
+    ("R3.S2.time", 30.55, Part(0.05)),
+    ("R3.S3b.time", 29.55, Part(0.05)),
+    ("R4.S1.congestion-aware-paper", 54.12, Part(0.04)),
+    ("R4.S2.congestion-aware-paper", 54.08, Part(0.04)),
+    ("R4.S3b.congestion-aware-paper", 55.91, Part(0.04)),
+    ("R4.S1.shortest-path", 62.17, Part(0.04)),
+    ("R4.S2.shortest-path", 62.05, Part(0.04)),
+    ("R4.S3b.shortest-path", 63.08, Part(0.04)),
+    ("R4.S1.ratio.total", 1.15, Absolute(0.03)),
+    ("R4.S2.ratio.total", 1.15, Absolute(0.03)),
+    ("R4.S3b.ratio.total", 1.125, Absolute(0.03)),
+    ("R4.S1.time.shortest-path", 38.25, Part(0.05)),
+    ("R4.S2.time.shortest-path", 39.35, Part(0.05)),
+    ("R4.S3b.time.shortest-path", 36.6, Part(0.05)),
+    ("T*.S1.best", 30.10, Absolute(0.15)),
+    ("T*.S1.shortest", 37.36, Absolute(0.15)),
+    ("T*.S1.centred", 27.57, Absolute(0.15)),
+    ("T*.S2.best", 29.95, Absolute(0.15)),
+    ("T*.S2.shortest", 38.08, Absolute(0.15)),
+    ("T*.S2.centred", 27.36, Absolute(0.15)),
+    ("T*.S3b.best", 28.93, Absolute(0.15)),
+    ("T*.S3b.shortest", 34.68, Absolute(0.15)),
+    ("T*.S3b.centred", 27.60, Absolute(0.15)),
+    ("R5.detection.1", 24.0, Part(0.05)),
+    ("R5.passed.1", 49.2, Part(0.05)),
+    ("R5.detection.2", 64.8, Part(0.05)),
+    ("R5.passed.2", 80.7, Part(0.05)),
+    ("R5.passed.2.jitter", 82.0, Absolute(4.0)),
+    ("R5.reformation", 84.1, Part(0.05)),
+    ("R5.end", 90.5, Part(0.05)),
+    ("R5.energy.congestion-aware-paper", 93.9, Part(0.04)),
+    ("R5.energy.shortest-path", 101.4, Part(0.04)),
+    ("R4.S2.ratio.jitter", 1.15, Absolute(0.03)),
+    ("P1.0", 168.48, Absolute(0.01)),
+    ("P1.5", 143.61, Absolute(0.01)),
+    ("P1.10", 126.03, Absolute(0.01)),
+    ("P1.20", 178.30, Absolute(0.01)),
+];
+
+fn reproduced(place: &Place) -> BTreeMap<String, Value> {
+    let done = place.run(&["reproduce", "--quick", "--out", "paper"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let rows: Vec<Value> = serde_json::from_slice(&fs::read(place.join("paper/reproduction.json")).unwrap()).unwrap();
+    let count = rows.len();
+    let by_id: BTreeMap<String, Value> =
+        rows.into_iter().map(|row| (row["id"].as_str().unwrap().to_owned(), row)).collect();
+    assert_eq!(by_id.len(), count, "an id stands for one row");
+    by_id
+}
+
+#[test]
+fn the_published_numbers_are_met_and_the_report_is_whole() {
+    let place = Place::new();
+    let rows = reproduced(&place);
+    numbers(&rows);
+    splits_and_groups(&rows);
+    report(&place);
+    commands(&place, &rows);
+    folders(&place);
+}
+
+fn numbers(rows: &BTreeMap<String, Value>) {
+    let ours = |id: &str| rows[id]["ours"].as_f64().unwrap_or_else(|| panic!("{id} has no number"));
+    for (id, wanted, within) in NUMBERS {
+        match within {
+            Part(part) => assert_near(id, ours(id), wanted, part),
+            Absolute(off) => assert!((ours(id) - wanted).abs() <= off, "{id}: {}, wanted {wanted} ± {off}", ours(id)),
+        }
+    }
+    assert!(ours("R5.separation") >= 25.0 && ours("R6") <= 0.8 && ours("R6.slot") <= 0.8);
+    assert!((ours("R5.peak") - 43.0).abs() <= 2.0, "{}", ours("R5.peak"));
+    let interval = &rows["R4.S2.ratio.jitter"]["interval"];
+    let (low, high) = (interval[0].as_f64().unwrap(), interval[1].as_f64().unwrap());
+    assert!(low < ours("R4.S2.ratio.jitter") && ours("R4.S2.ratio.jitter") < high, "{interval}");
+}
+
+fn splits_and_groups(rows: &BTreeMap<String, Value>) {
+    for (id, split) in [("R1", "4/4"), ("R2", "6/2"), ("R3", "2/6")] {
+        for geometry in ["S1", "S2", "S3b"] {
+            let row = &rows[&format!("{id}.{geometry}.split")];
+            assert_eq!((&row["ours"], &row["published"]), (&split.into(), &split.into()), "{row}");
+        }
+    }
+    assert_eq!(rows["R5.groups"]["ours"], "N11 N12 N21 N22");
+    for (id, row) in rows {
+        let keys = ["id", "published", "ours", "unit", "command"];
+        assert!(keys.iter().all(|key| row.get(key).is_some()), "{id}: {row}");
+    }
+}
+
+fn report(place: &Place) {
+    assert_eq!(
+        names(place.join("paper")),
+        ["figures", "forest", "report.html", "report.md", "reproduction.json", "results.csv"]
+    );
+    let figures = names(place.join("paper/figures"));
+    let wanted = [
+        "f1-s2.svg",
+        "f2-snapshots.svg",
+        "f3-trace.svg",
+        "f4-speed.svg",
+        "f5-distance.svg",
+        "f5-separation.svg",
+        "f6-energy.svg",
+    ];
+    assert_eq!(figures, wanted);
+    let (html, text) = (place.join("paper/report.html"), place.join("paper/report.md"));
+    let (html, text) = (fs::read_to_string(html).unwrap(), fs::read_to_string(text).unwrap());
+    assert_eq!(html.matches("<svg").count(), figures.len());
+    assert!(!html.contains("<img") && !html.contains("<script") && !html.contains("<link"), "it needs nothing else");
+    assert!(figures.iter().all(|figure| text.contains(figure)));
+    assert!(text.contains("mirrored") && text.contains("None."), "{text}");
+    let csv = fs::read_to_string(place.join("paper/results.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 9 * 2 + 3 * 9 + 2 + 8 * 4);
+    assert!(csv.lines().skip(1).all(|line| line.split(',').nth(4) == Some("reached")), "{csv}");
+}
+
+/// The command of a row gives its number.
+fn commands(place: &Place, rows: &BTreeMap<String, Value>) {
+    let row = &rows["R3.S2.time"];
+    let command =
+        row["command"].as_str().unwrap().replace("scenarios/paper/s2-right.toml", &support::paper("s2-right"));
+    let words: Vec<&str> = command.split(' ').skip(1).collect();
+    let done = place.run(&[&words[..], &["--json", "--runtime", "inline", "--no-record"]].concat());
+    let time_s = support::number(&done.summary(), "/stages/0/pass_time_s");
+    assert!((time_s - row["ours"].as_f64().unwrap()).abs() < 1e-3, "{time_s}, {row}");
+}
+
+/// An existing folder is refused, and one that is not a report's also with --force.
+fn folders(place: &Place) {
+    let refused = place.run(&["reproduce", "--quick", "--out", "paper"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    fs::create_dir(place.join("mine")).unwrap();
+    fs::write(place.join("mine/notes.txt"), "mine").unwrap();
+    let refused = place.run(&["reproduce", "--quick", "--force", "--out", "mine"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert_eq!(names(place.join("mine")), ["notes.txt"]);
+}
