@@ -25,8 +25,8 @@ pub struct Command {
     pub part_hash: u64,
     /// Its group.
     pub group: GroupId,
-    /// Whether it leads.
-    pub leads: bool,
+    /// The group it leads, if it leads.
+    pub leads: Option<GroupId>,
     /// A `PHASE_…`.
     pub phase: u32,
     /// Route and place in its queue while it passes an obstacle set.
@@ -40,7 +40,7 @@ impl Default for Command {
             obeyed: PlanStamp::default(),
             part_hash: 0,
             group: GroupId::ALL,
-            leads: false,
+            leads: None,
             phase: 0,
             place: None,
         }
@@ -55,7 +55,9 @@ impl Command {
         slot.part_hash = self.part_hash;
         slot.group = self.group;
         slot.phase = self.phase;
-        slot.flags = if self.leads { SLOT_LEADS } else { 0 } | if self.place.is_some() { SLOT_QUEUED } else { 0 };
+        slot.led = self.leads.unwrap_or_default();
+        slot.flags =
+            if self.leads.is_some() { SLOT_LEADS } else { 0 } | if self.place.is_some() { SLOT_QUEUED } else { 0 };
         (slot.route, slot.rank) = self.place.unwrap_or((NO_ROUTE, 0));
     }
 }

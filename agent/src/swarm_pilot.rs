@@ -282,7 +282,7 @@ impl SwarmPilot {
             obeyed: self.ledger.stamp(),
             part_hash: self.ledger.part_hash(),
             group: self.group(),
-            leads: self.election.leads(),
+            leads: self.election.leads().then_some(GroupId::ALL),
             phase: self.ledger.obeyed().map_or(0, |orders| orders.plan.phase),
             place: open.map(|place| (place.route, place.rank)),
         }
@@ -322,7 +322,7 @@ impl Pilot for SwarmPilot {
             &crate::talk::Topics {
                 obeyed: command.obeyed,
                 group: command.group,
-                leads: command.leads,
+                leads: command.leads.is_some(),
                 places,
                 ledger: &self.ledger,
                 obstacles: &self.obstacles,

@@ -30,7 +30,7 @@ pub struct RecordHead {
 
 /// [`DroneRow::flags`]: its process lives.
 pub const ROW_ALIVE: u32 = 1;
-/// [`DroneRow::flags`]: it leads its group.
+/// [`DroneRow::flags`]: it leads a group.
 pub const ROW_LEADS: u32 = 2;
 /// [`DroneRow::flags`]: it flies a route past an obstacle set.
 pub const ROW_QUEUED: u32 = 4;
@@ -51,6 +51,8 @@ pub struct DroneRow {
     pub obeyed: PlanStamp,
     /// Its group.
     pub group: GroupId,
+    /// The group it leads, with [`ROW_LEADS`].
+    pub led: GroupId,
     /// [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`].
     pub flags: u32,
     /// A `PHASE_…` of [`crate::payload`].

@@ -5,7 +5,7 @@ use crate::ids::{GroupId, PlanStamp};
 use crate::radio::DROP_REASONS;
 use bytemuck::{Pod, Zeroable};
 
-/// [`Slot::flags`]: the drone leads its group.
+/// [`Slot::flags`]: the drone leads a group.
 pub const SLOT_LEADS: u32 = 1;
 /// [`Slot::flags`]: the drone flies a route past an obstacle set.
 pub const SLOT_QUEUED: u32 = 2;
@@ -27,6 +27,8 @@ pub struct Slot {
     pub obeyed: PlanStamp,
     /// Its group.
     pub group: GroupId,
+    /// The group it leads, with [`SLOT_LEADS`].
+    pub led: GroupId,
     /// Number of messages heard in this tick.
     pub heard: u32,
     /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
@@ -42,7 +44,7 @@ pub struct Slot {
     /// How long the step took, ns of wall time; no part of the digest. 0 in the inline runtime.
     pub step_ns: u32,
     /// Always 0.
-    pub reserved: [u32; 5],
+    pub reserved: [u32; 3],
 }
 
 /// Bins of [`LinkStats`]' histograms, one tick wide; the last also holds all that is longer.

@@ -108,6 +108,10 @@ impl Accumulator {
         if fresh {
             self.counts.sent += record.frames.len() as u64;
             self.rows(tick, seconds(record.head.now), record.rows);
+        } else if record.head.lost > 0 {
+            // The last ticks were lost, and only the mission's end got through.
+            self.counts.tick = self.counts.tick.max(Some(tick));
+            self.counts.t_s = self.counts.t_s.max(seconds(record.head.now));
         }
         Ok(fresh)
     }

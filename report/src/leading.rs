@@ -41,7 +41,7 @@ impl Leading {
     /// A drone died that was last seen as `row`.
     pub fn died(&mut self, t_s: f64, row: &DroneRow) {
         if leads(row) {
-            self.orphans.push(Orphan { group: row.group, since_s: t_s, failover: self.failover_s.len() });
+            self.orphans.push(Orphan { group: row.led, since_s: t_s, failover: self.failover_s.len() });
             self.failover_s.push(None);
         }
     }
@@ -49,8 +49,7 @@ impl Leading {
     /// Takes the rows of a tick that lasted `dt_s`. The dead lead nobody.
     pub fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
         self.leaders.clear();
-        self.leaders
-            .extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.group, drone)));
+        self.leaders.extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.led, drone)));
         self.leaders.sort_unstable();
         let (leaders, failover_s) = (&self.leaders, &mut self.failover_s);
         self.orphans.retain(|orphan| {
@@ -82,7 +81,7 @@ mod tests {
     use skein_protocol::record::ROW_ALIVE;
 
     fn leader(x_m: f64, group: GroupId) -> DroneRow {
-        DroneRow { flags: ROW_ALIVE | ROW_LEADS, group, ..row(x_m, 0.0) }
+        DroneRow { flags: ROW_ALIVE | ROW_LEADS, led: group, ..row(x_m, 0.0) }
     }
 
     #[test]

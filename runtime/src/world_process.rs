@@ -191,14 +191,14 @@ impl Air {
         Ok(())
     }
 
-    /// Whether the recorder took it.
+    /// Whether it was delivered.
     fn send_record(&self) -> Result<bool, RuntimeError> {
         let record = self.world.record();
         let head = RecordHead { events_len: self.untold.len() as u32, lost: self.lost, ..*record.head };
         let record = RecordView { head: &head, events: &self.untold, ..record };
-        let dropped = self.record.dropped();
-        self.record.send(head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
-        Ok(self.record.dropped() == dropped)
+        // Not what the handler of a full buffer counted: a sample that it gave up may still be delivered.
+        let receivers = self.record.send(head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
+        Ok(receivers > 0)
     }
 
     /// Sends the last record, which must get through. The launcher ends this process if it does not want it.

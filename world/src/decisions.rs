@@ -49,7 +49,7 @@ impl Decisions {
 
     /// Tells that a drone takes up or lays down leading.
     pub fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut Log) {
-        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.group, slot.obeyed.ballot));
+        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.led, slot.obeyed.ballot));
         let before = std::mem::replace(&mut self.0[drone.index()].leading, leads);
         if before == leads {
             return;

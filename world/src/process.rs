@@ -64,6 +64,7 @@ impl Process {
             energy_j: body.energy_j,
             obeyed: slot.obeyed,
             group: slot.group,
+            led: slot.led,
             flags: alive * flags,
             phase: slot.phase,
             heard: alive * slot.heard,
