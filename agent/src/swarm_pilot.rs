@@ -1,6 +1,5 @@
 //! The paper's drone: detect, obey, avoid, queue, re-form; plan for all while it leads. Paper, Algorithm 1.
 
-use crate::danger::Braking;
 use crate::escape::Escape;
 use crate::guidance::anchor;
 use crate::params::PilotParams;
@@ -338,11 +337,4 @@ impl Pilot for SwarmPilot {
         ages.clear();
         ages.extend(self.peers.living(now).map(|(_, pose)| now.since(pose.stamp)));
     }
-}
-
-/// Time until the nearest sensed obstacle would be hit at the present speed (equation 1), s; infinity if none is sensed.
-#[must_use]
-pub fn time_to_impact_s(senses: &Senses<'_>) -> f64 {
-    let nearest = senses.obstacles.iter().map(|o| o.distance_m).fold(f64::INFINITY, f64::min);
-    Braking::time_to_impact_s(nearest, senses.velocity.norm())
 }
