@@ -22,7 +22,6 @@ pub mod queue;
 pub mod rehearsal;
 pub mod safety;
 pub mod swarm_pilot;
-pub mod talk;
 pub mod way;
 
 pub use params::PilotParams;

@@ -26,7 +26,7 @@ impl SwarmPilot {
             });
         }
         let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
-        for (id, pose) in self.peers.living(senses.now) {
+        for (id, pose) in self.leading.peers.living(senses.now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
@@ -40,9 +40,9 @@ impl SwarmPilot {
     /// Less than half of an evasion falls to this drone only while the other shows that it obeys the same plan and is
     /// behind; more if this drone is behind; all of it if the other is silent.
     fn share(&self, now: SimTime, other: DroneId, places: &[QueuePlace; MAX_PLACES]) -> f64 {
-        let Some(pose) = self.peers.last(other) else { return 1.0 };
+        let Some(pose) = self.leading.peers.last(other) else { return 1.0 };
         let age_s = now.since(pose.stamp);
-        if !self.peers.is_living(other, now) {
+        if !self.leading.peers.is_living(other, now) {
             return 1.0;
         }
         let open = |place: &&QueuePlace| place.set != 0 && self.way.is_open_set(place.set);
@@ -52,7 +52,7 @@ impl SwarmPilot {
             if mine.rank > theirs.rank {
                 return self.params.precedence_share;
             }
-            if mine.rank < theirs.rank && age_s <= FRESH_S && pose.obeyed == self.ledger.stamp() {
+            if mine.rank < theirs.rank && age_s <= FRESH_S && pose.obeyed == self.leading.ledger.stamp() {
                 return 1.0 - self.params.precedence_share;
             }
         }

@@ -4,6 +4,7 @@ use crate::danger::Braking;
 use crate::guidance::GuidanceParams;
 use crate::safety::SafetyParams;
 use skein_leader::election::ElectionParams;
+use skein_leader::leading::LeadingParams;
 use skein_leader::planner::PlannerParams;
 use skein_protocol::{DroneId, SimTime};
 
@@ -40,4 +41,23 @@ pub struct PilotParams {
     pub repeat_period_s: f64,
     /// A peer that is silent for longer counts as gone, s.
     pub peer_timeout_s: f64,
+}
+
+impl PilotParams {
+    /// What its leading part needs of them.
+    #[must_use]
+    pub fn leading(&self) -> LeadingParams {
+        LeadingParams {
+            me: self.me,
+            drones: self.drones,
+            incarnation: self.incarnation,
+            start: self.start,
+            dt_s: self.dt_s,
+            election: self.election,
+            planner: self.planner.clone(),
+            beacon_period_s: self.beacon_period_s,
+            repeat_period_s: self.repeat_period_s,
+            peer_timeout_s: self.peer_timeout_s,
+        }
+    }
 }

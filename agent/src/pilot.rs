@@ -3,7 +3,7 @@
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{DroneId, GroupId, Message, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime, Vec2};
 
 /// A message that came in by the radio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Command {
     pub group: GroupId,
     /// The group it leads, if it leads.
     pub leads: Option<GroupId>,
+    /// The term it obeys, or leads in.
+    pub term: Ballot,
     /// A `PHASE_…`.
     pub phase: u32,
     /// Route and place in its queue while it passes an obstacle set.
@@ -41,6 +43,7 @@ impl Default for Command {
             part_hash: 0,
             group: GroupId::ALL,
             leads: None,
+            term: Ballot::NONE,
             phase: 0,
             place: None,
         }
@@ -54,6 +57,7 @@ impl Command {
         slot.obeyed = self.obeyed;
         slot.part_hash = self.part_hash;
         slot.group = self.group;
+        slot.term = self.term;
         slot.phase = self.phase;
         slot.led = self.leads.unwrap_or_default();
         slot.flags =

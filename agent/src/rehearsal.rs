@@ -6,7 +6,6 @@ use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Heard, Pilot};
 use crate::swarm_pilot::SwarmPilot;
-use skein_leader::election::Input;
 use skein_leader::geometry::nearest;
 use skein_leader::ledger::Orders;
 use skein_leader::planner::{Member, Strategy};
@@ -58,7 +57,7 @@ impl Rehearsal {
     pub fn new(leader: SwarmPilot, members: Vec<Member>, start: SimTime, alternatives: Vec<Orders>) -> Self {
         let shape =
             |(id, known): (_, &skein_leader::obstacles::Known)| SensedShape { shape: known.shape, id, reserved: 0 };
-        let shapes = leader.obstacles.iter().map(shape).collect();
+        let shapes = leader.leading.obstacles.iter().map(shape).collect();
         let leader = Box::new(leader);
         Self { leader, members, shapes, start, alternatives, forecasts: Vec::new(), stage: None }
     }
@@ -127,7 +126,8 @@ impl Stage {
     fn new(leader: &SwarmPilot, members: &[Member], start: SimTime, orders: &Orders) -> Self {
         let pilots: Vec<SwarmPilot> =
             members.iter().map(|member| leader.understudy(member.id, start, STEP_S, orders)).collect();
-        let gate_x_m = pilots.first().and_then(|pilot| pilot.ledger.sets().last().map(|set| set.routes.gate_x_m()));
+        let gate_x_m =
+            pilots.first().and_then(|pilot| pilot.leading.ledger.sets().last().map(|set| set.routes.gate_x_m()));
         Self {
             params: leader.params.clone(),
             start,
@@ -217,7 +217,7 @@ impl Stage {
     }
 
     fn in_slot(&self, i: usize) -> bool {
-        let ledger = &self.pilots[i].ledger;
+        let ledger = &self.pilots[i].leading.ledger;
         let (Some(orders), Some(part)) = (ledger.obeyed(), ledger.part()) else { return false };
         let slot = anchor(&orders.plan, self.now).0 + Vec2::from(part.slot_m);
         let error_m = self.params.planner.arrival_error_m;
@@ -233,17 +233,9 @@ impl SwarmPilot {
         params.beacon_period_s = dt_s;
         // In the mind nothing is rehearsed again.
         params.planner.strategy = Strategy::CongestionAware;
+        let leading = self.leading.of_member(&params.leading(), now, orders);
         let mut study = Self::new(params);
-        study.obstacles = self.obstacles.clone();
-        study.peers = self.peers.clone();
-        study.peers.forget(me);
-        study.ledger = self.ledger.of_member(me);
-        study.ledger.adopt(orders.clone(), &study.obstacles);
-        if me == self.params.me {
-            study.election = self.election.clone();
-        } else {
-            study.election.handle(now, 0, Input::Sign(self.election.obeyed()));
-        }
+        study.leading = leading;
         study
     }
 }

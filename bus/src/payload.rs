@@ -7,7 +7,7 @@ use skein_protocol::frame::Frame;
 use std::fmt;
 
 // The names below carry the version of the protocol's payloads: raise both together.
-const _: () = assert!(skein_protocol::payload::VERSION == 1);
+const _: () = assert!(skein_protocol::payload::VERSION == 2);
 
 /// Eight bytes of a byte stream; which stream is told by the type.
 ///
@@ -28,14 +28,14 @@ pub struct RecordWord(u64);
 // SAFETY: an integer, self-contained and of one layout.
 unsafe impl ZeroCopySend for DownWord {
     unsafe fn type_name() -> &'static str {
-        "skein.downlink.v1"
+        "skein.downlink.v2"
     }
 }
 
 // SAFETY: an integer, self-contained and of one layout.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
-        "skein.record.v1"
+        "skein.record.v2"
     }
 }
 
@@ -52,14 +52,14 @@ pub struct WireFrame(pub(crate) Frame);
 // SAFETY: `Frame` is plain `repr(C)` data without padding or pointers.
 unsafe impl ZeroCopySend for WireFrame {
     unsafe fn type_name() -> &'static str {
-        "skein.frame.v1"
+        "skein.frame.v2"
     }
 }
 
 /// User header of a byte stream.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
-#[type_name("skein.stream-header.v1")]
+#[type_name("skein.stream-header.v2")]
 pub struct StreamHeader {
     /// The tick that the sample belongs to.
     pub tick: u64,
@@ -70,7 +70,7 @@ pub struct StreamHeader {
 /// User header of an uplink sample.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
-#[type_name("skein.uplink-header.v1")]
+#[type_name("skein.uplink-header.v2")]
 pub struct UplinkHeader {
     /// The tick in which the frames were sent.
     pub tick: u64,

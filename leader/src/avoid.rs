@@ -1,82 +1,131 @@
 //! Who flies which way past an obstacle set (paper, Algorithm 3).
 
 use crate::cost::{Flight, Trip, shortest, trips};
+use crate::council::{self, arrivals_s};
 use crate::ledger::{Ledger, Orders, PlannedSet};
-use crate::planner::{Member, Planner, Situation, Strategy, front};
+use crate::planner::{Member, Planner, Situation, Strategy};
 use crate::routes::Routes;
 use crate::split::{Split, Table};
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan};
-use skein_protocol::{GroupId, ObstacleId, Vec2};
+use skein_protocol::payload::{Arrivals, Assignment, PHASE_AVOID, Plan, set_tag};
+use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime, Vec2};
 use std::collections::BTreeMap;
+
+/// What a plan for a set is made of.
+struct Survey<'a> {
+    routes: Routes,
+    /// The ways of each member, one a route.
+    ways: Vec<Vec<Trip>>,
+    /// The parts of members who have one already.
+    kept: Vec<Option<&'a Assignment>>,
+}
+
+impl Survey<'_> {
+    /// The route of a member that has no choice: who flies one already, or is past the gate, or joins a queue that is
+    /// already flying.
+    fn settled(&self, members: &[Member], i: usize) -> Option<usize> {
+        match self.kept[i] {
+            Some(part) if usize::from(part.route) < self.routes.count() => Some(usize::from(part.route)),
+            _ if members[i].position.x >= self.routes.gate_x_m() => Some(shortest(&self.ways[i])),
+            _ if self.kept.iter().any(Option::is_some) => Some(shortest(&self.ways[i])),
+            _ => None,
+        }
+    }
+
+    /// Arrivals of a member, s from now; with a settled route, that alone.
+    fn arrivals_s(&self, members: &[Member], i: usize) -> Vec<f64> {
+        let settled = self.settled(members, i);
+        let open = |route: usize| settled.is_none_or(|settled| settled == route);
+        self.ways[i]
+            .iter()
+            .enumerate()
+            .map(|(route, way)| if open(route) { way.arrival_s } else { f64::INFINITY })
+            .collect()
+    }
+}
+
+/// A grouping of the members: the route of each and its place in the queue there, and when the last one passes.
+struct Grouping {
+    chosen: Vec<usize>,
+    ranks: Vec<u16>,
+    predicted_s: f64,
+}
 
 impl Planner {
     /// Divides the members over the routes past a set. Those who fly it already, or are past its gate, keep their way.
-    /// One grouping, or the few that are worth a rehearsal.
-    pub(crate) fn avoid(&self, s: &Situation<'_>, set: &[ObstacleId]) -> Option<Vec<Orders>> {
+    /// One grouping, or the few that are worth a rehearsal; with other groups before the same set, one grouping of all
+    /// of them, once their leaders have said what they know.
+    pub(crate) fn avoid(
+        &mut self,
+        s: &Situation<'_>,
+        set: &[ObstacleId],
+        say: &mut Vec<Arrivals>,
+    ) -> Option<Vec<Orders>> {
+        let survey = self.survey(s, set)?;
+        let others = self.others_before(s, set);
+        let groupings = if others.is_empty() {
+            self.choose(s.members, &survey)?
+        } else {
+            let tag = set_tag(set);
+            let rows = || (0..s.members.len()).map(|i| row(s, &survey, tag, i)).collect();
+            self.council.ask(s.now, tag, rows, say);
+            let table = self.council.answer(s.now, &others, survey.routes.count(), s.delay_s)?;
+            self.council.close(s.now, say);
+            vec![self.choose_jointly(s, &table, &survey)?]
+        };
+        Some(groupings.iter().map(|grouping| self.orders(s, set, &survey, grouping)).collect())
+    }
+
+    fn survey<'a>(&self, s: &Situation<'a>, set: &[ObstacleId]) -> Option<Survey<'a>> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &self.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
         let flight = Flight { speed_mps: self.params.speed_mps, course_y_m: self.params.course_y_m };
         let ways = |m: &Member| trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight);
         let ways: Vec<Vec<Trip>> = s.members.iter().map(ways).collect();
-        let arrivals: Vec<Vec<f64>> = ways.iter().map(|row| row.iter().map(|way| way.arrival_s).collect()).collect();
-        let kept: Vec<Option<&Assignment>> =
-            s.members.iter().map(|m| before.and_then(|p| p.parts.get(&m.id))).collect();
-        let groupings = self.choose(s.members, &routes, &ways, &kept)?;
-        groupings.iter().map(|chosen| self.orders(s, set, &routes, &arrivals, &kept, chosen)).collect()
+        let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(&m.id))).collect();
+        Some(Survey { routes, ways, kept })
     }
 
-    fn orders(
-        &self,
-        s: &Situation<'_>,
-        set: &[ObstacleId],
-        routes: &Routes,
-        arrivals: &[Vec<f64>],
-        kept: &[Option<&Assignment>],
-        chosen: &[usize],
-    ) -> Option<Orders> {
-        let ranks = ranks(chosen, arrivals, kept);
-        let groups = groups(s, chosen, kept, &overlapping(s.ledger, set));
-        let predicted_s = self.table(arrivals, routes.count())?.assigned(chosen).ok()?.makespan_s;
+    /// The rows of a set that is planned for: what its members do.
+    pub(crate) fn standing(&self, s: &Situation<'_>, planned: &PlannedSet) -> Vec<Arrivals> {
+        let Some(survey) = self.survey(s, &planned.ids) else { return Vec::new() };
+        (0..s.members.len()).map(|i| row(s, &survey, planned.tag, i)).collect()
+    }
+
+    fn orders(&self, s: &Situation<'_>, set: &[ObstacleId], survey: &Survey<'_>, grouping: &Grouping) -> Orders {
+        let Grouping { chosen, ranks, predicted_s } = grouping;
+        let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
+        let groups = groups(s, chosen, &survey.kept, replan);
         let plan = Plan {
-            predicted_s,
-            routes: routes.count() as u32,
+            predicted_s: *predicted_s,
+            routes: survey.routes.count() as u32,
             ..self.plan(s, PHASE_AVOID, set, Vec2::new(f64::INFINITY, 0.0))
         };
         let part = |(i, m): (usize, &Member)| {
             let mine = s.ledger.obeyed().and_then(|orders| orders.parts.get(&m.id));
             let assignment = Assignment {
                 id: plan.id,
+                scope: s.scope,
                 group: groups[i],
                 drone: m.id,
-                leader: front(s.members, &groups, groups[i]),
+                leader: self.params.front(s.members, &groups, groups[i]),
                 slot_m: mine.map_or([0.0; 2], |part| part.slot_m),
-                arrival_s: arrivals[i][chosen[i]],
+                arrival_s: survey.ways[i][chosen[i]].arrival_s,
                 route: chosen[i] as u16,
                 rank: ranks[i],
                 reserved: 0,
             };
             (m.id, assignment)
         };
-        Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
+        Orders { plan, parts: s.members.iter().enumerate().map(part).collect() }
     }
 
-    /// The route of each member, in one or several groupings.
-    fn choose(
-        &self,
-        members: &[Member],
-        routes: &Routes,
-        ways: &[Vec<Trip>],
-        kept: &[Option<&Assignment>],
-    ) -> Option<Vec<Vec<usize>>> {
-        let settled = |i: usize| match kept[i] {
-            Some(part) if usize::from(part.route) < routes.count() => Some(usize::from(part.route)),
-            _ if members[i].position.x >= routes.gate_x_m() => Some(shortest(&ways[i])),
-            // Whoever joins a queue that is already flying takes its own shortest way.
-            _ if kept.iter().any(Option::is_some) => Some(shortest(&ways[i])),
-            _ => None,
-        };
+    /// One or several groupings of the members alone.
+    fn choose(&self, members: &[Member], survey: &Survey<'_>) -> Option<Vec<Grouping>> {
+        let (routes, ways) = (&survey.routes, &survey.ways);
+        let settled = |i: usize| survey.settled(members, i);
+        let arrivals: Vec<Vec<f64>> = ways.iter().map(|row| row.iter().map(|way| way.arrival_s).collect()).collect();
         let free: Vec<usize> = (0..members.len()).filter(|&i| settled(i).is_none()).collect();
-        let rows: Vec<Vec<f64>> = free.iter().map(|&i| ways[i].iter().map(|way| way.arrival_s).collect()).collect();
+        let rows: Vec<Vec<f64>> = free.iter().map(|&i| arrivals[i].clone()).collect();
         let table = self.table(&rows, routes.count())?;
         let splits = match self.params.strategy {
             Strategy::Rehearsed => {
@@ -89,12 +138,34 @@ impl Planner {
             }
             Strategy::ShortestPath | Strategy::Fixed { .. } => vec![table.shortest()],
         };
+        let all = self.table(&arrivals, routes.count())?;
         let grouping = |split: Split| {
             let mut chosen: Vec<usize> = (0..members.len()).map(|i| settled(i).unwrap_or(0)).collect();
             free.iter().zip(split.routes).for_each(|(&i, route)| chosen[i] = route);
-            chosen
+            let kept: Vec<Option<u16>> = survey.kept.iter().map(|part| part.map(|part| part.rank)).collect();
+            let ranks = ranks(&chosen, &arrivals, &kept);
+            Some(Grouping { predicted_s: all.assigned(&chosen).ok()?.makespan_s, chosen, ranks })
         };
-        Some(splits.into_iter().map(grouping).collect())
+        splits.into_iter().map(grouping).collect()
+    }
+
+    /// The one grouping of all drones in `table`, of which the members' part is taken: every leader that knows the same
+    /// rows comes to the same.
+    fn choose_jointly(&self, s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>) -> Option<Grouping> {
+        let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
+        let union = self.table(&arrivals, survey.routes.count())?;
+        let split = if self.params.strategy == Strategy::ShortestPath { union.shortest() } else { union.split() };
+        let own = |drone: DroneId| s.members.binary_search_by_key(&drone, |m| m.id).ok();
+        let kept: Vec<Option<u16>> =
+            table.iter().map(|row| own(row.drone).and_then(|i| survey.kept[i]).map(|part| part.rank)).collect();
+        let places = ranks(&split.routes, &arrivals, &kept);
+        let (mut chosen, mut ranks) = (vec![0; s.members.len()], vec![0; s.members.len()]);
+        for (row, (route, rank)) in table.iter().zip(split.routes.iter().zip(places)) {
+            if let Some(i) = own(row.drone) {
+                (chosen[i], ranks[i]) = (*route, rank);
+            }
+        }
+        Some(Grouping { chosen, ranks, predicted_s: split.makespan_s - s.now.since(SimTime::ZERO) })
     }
 
     /// `None` only for arrivals that are no numbers, which finite positions do not have.
@@ -156,6 +227,12 @@ fn neighbouring(counts: &[usize], drones: usize) -> Vec<Vec<usize>> {
     all
 }
 
+/// What other leaders are told of a member.
+fn row(s: &Situation<'_>, survey: &Survey<'_>, tag: u32, i: usize) -> Arrivals {
+    let arrivals_s = survey.arrivals_s(s.members, i);
+    council::row(s.now, s.ballot, s.scope, s.members[i].id, tag, &arrivals_s)
+}
+
 /// The sets before `routes` that a member has still to leave, with its route past each.
 fn earlier_legs<'a>(ledger: &'a Ledger, member: &Member, routes: &Routes) -> Vec<(&'a Routes, usize)> {
     let leg = |p: &'a PlannedSet| {
@@ -166,15 +243,10 @@ fn earlier_legs<'a>(ledger: &'a Ledger, member: &Member, routes: &Routes) -> Vec
     ledger.sets().iter().filter_map(leg).collect()
 }
 
-/// Planned sets that share an obstacle with `set`: the parts that a new plan for it replaces.
-fn overlapping<'a>(ledger: &'a Ledger, set: &[ObstacleId]) -> Vec<&'a PlannedSet> {
-    ledger.sets().iter().filter(|p| p.ids.iter().any(|id| set.contains(id))).collect()
-}
-
 /// Place of each member in the queue of its route: those with a place keep their order, the others follow by arrival.
-fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<&Assignment>]) -> Vec<u16> {
+fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<u16>]) -> Vec<u16> {
     let mut order: Vec<usize> = (0..chosen.len()).collect();
-    let place = |i: usize| kept[i].map_or(u16::MAX, |part| part.rank);
+    let place = |i: usize| kept[i].unwrap_or(u16::MAX);
     let arrival = |i: usize| arrivals[i][chosen[i]];
     order.sort_by(|&a, &b| place(a).cmp(&place(b)).then(arrival(a).total_cmp(&arrival(b))).then(a.cmp(&b)));
     let mut next: BTreeMap<usize, u16> = BTreeMap::new();
@@ -187,21 +259,22 @@ fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<&Assignment>]) 
     ranks
 }
 
-/// The group of each member: what it was split from, and which of the routes that its kin take, counted from the left.
-fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], replaced: &[&PlannedSet]) -> Vec<GroupId> {
-    let current = |id| s.ledger.obeyed().and_then(|o| o.parts.get(&id)).map_or(GroupId::ALL, |part| part.group);
-    let parent = |m: &Member| match replaced.iter().find_map(|p| p.parts.get(&m.id)) {
-        Some(part) => part.group.parent(),
-        None => current(m.id),
-    };
-    let parents: Vec<GroupId> = s.members.iter().map(parent).collect();
+/// The group of each member: its own, split by which of the routes its kin take, counted from the left. Whoever is of no
+/// part of the scope joins it. A plan that replaces another one splits nobody who stays on one route with all its kin.
+fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], replan: bool) -> Vec<GroupId> {
+    let parents: Vec<GroupId> =
+        s.members.iter().map(|m| if s.scope.contains(m.group) { m.group } else { s.scope }).collect();
     let child = |i: usize| {
         let mut taken: Vec<usize> =
             (0..chosen.len()).filter(|&j| parents[j] == parents[i]).map(|j| chosen[j]).collect();
         taken.sort_unstable_by(|a, b| b.cmp(a));
         taken.dedup();
+        if replan && taken.len() == 1 {
+            return parents[i];
+        }
         let number = taken.iter().position(|&route| route == chosen[i]).unwrap_or(0) + 1;
         parents[i].child(u8::try_from(number).unwrap_or(u8::MAX))
     };
-    (0..chosen.len()).map(|i| kept[i].map_or_else(|| child(i), |part| part.group)).collect()
+    let keeps = |i: usize| kept[i].map(|part| part.group).filter(|group| s.scope.contains(*group));
+    (0..chosen.len()).map(|i| keeps(i).unwrap_or_else(|| child(i))).collect()
 }

@@ -1,22 +1,27 @@
 //! Who leads: a sans-IO machine. The member closest to the destination claims; a term is a ballot, ordered
-//! lexicographically; the highest ballot heard of is obeyed. Closeness decides elections only: a healthy leader is not
-//! deposed by being overtaken.
+//! lexicographically, for a group: the term's scope. Of all terms whose scope holds its own group a drone obeys the
+//! highest it has heard of. Closeness decides elections only: a healthy leader is not deposed by being overtaken.
 //!
 //! Uniqueness of a leader for a ballot holds by construction: a ballot names its claimant, and the launcher gives each
 //! start of a process an incarnation of its own.
 
-use skein_protocol::payload::{LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, Leadership};
+use skein_protocol::payload::{
+    LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, LEADERSHIP_YIELD, Leadership,
+};
 use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
+
+/// A round that is farther than this above all rounds heard of is no honest one: rounds rise by one at a time.
+const FARTHEST_ROUND: u32 = 1 << 20;
 
 /// Periods and time-outs.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectionParams {
     /// A leader says that it lives this often, s.
     pub heartbeat_period_s: f64,
-    /// A leader that is silent for so long is given up, s.
+    /// A leader that is silent for so long is missed, s.
     pub leader_timeout_s: f64,
-    /// How long the closest member listens before it claims, s; the next one waits as much longer, and so on, so that
-    /// one claim reaches all before the next is due.
+    /// How long the closest member waits for objections before it claims, s; the next one waits as much longer, and so
+    /// on, so that one claim reaches all before the next is due.
     pub wait_s: f64,
 }
 
@@ -25,8 +30,21 @@ pub struct ElectionParams {
 pub enum Input {
     /// A message about leading was heard.
     Heard(Leadership),
-    /// A leader's plan or beacon was heard: as good as a heartbeat of this term.
-    Sign(Ballot),
+    /// Something was heard that the leader of this term said: as good as a heartbeat.
+    Sign {
+        /// The term.
+        ballot: Ballot,
+        /// The group it is for.
+        scope: GroupId,
+        /// Whether it was said to this drone by name: then it is for this drone, whatever its group is.
+        named: bool,
+    },
+    /// This drone is in this group from now on.
+    Joined(GroupId),
+    /// Lead this group, whoever led before.
+    Claim(GroupId),
+    /// Ask another member to take over; nothing unless this drone leads.
+    Yield(DroneId),
     /// Time went on; `closer` living members are closer to the destination than this drone.
     Tick {
         /// How many, not counting the leader whose silence started the election.
@@ -37,17 +55,23 @@ pub enum Input {
 }
 
 /// The machine of one drone.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Election {
     me: DroneId,
     incarnation: u32,
-    params: ElectionParams,
+    heartbeat_period_s: f64,
+    leader_timeout_s: f64,
+    wait_s: f64,
+    group: GroupId,
     obeyed: Ballot,
+    scope: GroupId,
     highest_round: u32,
     leads: bool,
     /// Last sign of life of the leader, or the start.
     heard: SimTime,
     next_heartbeat: SimTime,
+    /// When it asked who has heard of the leader it misses.
+    probed: Option<SimTime>,
 }
 
 impl Election {
@@ -57,12 +81,17 @@ impl Election {
         Self {
             me,
             incarnation,
-            params,
+            heartbeat_period_s: params.heartbeat_period_s,
+            leader_timeout_s: params.leader_timeout_s,
+            wait_s: params.wait_s,
+            group: GroupId::ALL,
             obeyed: Ballot::NONE,
+            scope: GroupId::ALL,
             highest_round: 0,
             leads: false,
             heard: now,
             next_heartbeat: now,
+            probed: None,
         }
     }
 
@@ -78,6 +107,18 @@ impl Election {
         self.obeyed
     }
 
+    /// The group that the term is for.
+    #[must_use]
+    pub fn scope(&self) -> GroupId {
+        self.scope
+    }
+
+    /// The group this drone is in: the scope, or split from it.
+    #[must_use]
+    pub fn group(&self) -> GroupId {
+        self.group
+    }
+
     /// Whether it leads, or the leader it obeys gave a sign of life within `patience_s`.
     #[must_use]
     pub fn has_leader(&self, now: SimTime, patience_s: f64) -> bool {
@@ -87,37 +128,74 @@ impl Election {
     /// When the machine next wants a [`Input::Tick`], if nothing is heard until then.
     #[must_use]
     pub fn next_deadline(&self, closer: usize, patience_s: f64) -> SimTime {
-        if self.leads {
-            return self.next_heartbeat;
+        match self.probed {
+            _ if self.leads => self.next_heartbeat,
+            Some(probed) => probed.after(self.wait_s * (closer + 1) as f64),
+            None if self.obeyed.is_some() => self.heard.after(patience_s.max(self.leader_timeout_s)),
+            None => self.heard.after(self.wait_s * (closer + 1) as f64),
         }
-        let silence = if self.obeyed.is_some() { patience_s.max(self.params.leader_timeout_s) } else { 0.0 };
-        self.heard.after(silence + self.params.wait_s * (closer + 1) as f64)
     }
 
     /// Takes an input; returns what is to be said, if anything. `epoch` is the number of the last plan this drone made
     /// or obeys, told along with a heartbeat.
     pub fn handle(&mut self, now: SimTime, epoch: u32, input: Input) -> Option<Leadership> {
         match input {
-            Input::Heard(message) => {
-                self.hear(now, message.ballot);
+            Input::Heard(message) => self.hear(now, epoch, &message),
+            Input::Sign { ballot, scope, named } => {
+                self.sign(now, ballot, scope, named);
                 None
             }
-            Input::Sign(ballot) => {
-                self.hear(now, ballot);
+            Input::Joined(group) => {
+                self.group = group;
                 None
             }
+            Input::Claim(scope) => self.claim(now, scope),
+            Input::Yield(heir) => self.leads.then(|| self.message(LEADERSHIP_YIELD, now, epoch, heir)),
             Input::Tick { closer, patience_s } => self.tick(now, epoch, closer, patience_s),
         }
     }
 
-    fn hear(&mut self, now: SimTime, ballot: Ballot) {
+    fn hear(&mut self, now: SimTime, epoch: u32, message: &Leadership) -> Option<Leadership> {
+        let ballot = message.ballot;
+        match message.kind {
+            LEADERSHIP_PROBE => {
+                let heard = if self.leads { now } else { self.heard };
+                let news = ballot == self.obeyed && heard.since(message.stamp) >= self.heartbeat_period_s;
+                news.then(|| self.message(LEADERSHIP_OBJECTION, heard, epoch, DroneId::NONE))
+            }
+            LEADERSHIP_OBJECTION => {
+                if ballot == self.obeyed && message.stamp > self.heard && message.stamp <= now {
+                    self.heard = message.stamp;
+                    self.probed = None;
+                }
+                None
+            }
+            LEADERSHIP_YIELD if message.heir == self.me && ballot == self.obeyed => self.claim(now, self.scope),
+            _ => {
+                self.sign(now, ballot, message.group, false);
+                None
+            }
+        }
+    }
+
+    fn sign(&mut self, now: SimTime, ballot: Ballot, scope: GroupId, named: bool) {
+        if ballot.round > self.highest_round.saturating_add(FARTHEST_ROUND) {
+            return;
+        }
         self.highest_round = self.highest_round.max(ballot.round);
-        if ballot > self.obeyed {
+        if ballot > self.obeyed && (named || scope.contains(self.group)) {
             self.obeyed = ballot;
+            self.scope = scope;
             self.leads = false;
         }
-        if ballot == self.obeyed {
+        // Its group was split without it: whoever leads a part will take it in, and what it led is no more.
+        let parted = scope != self.group && self.group.contains(scope);
+        if parted && ballot > self.obeyed {
+            self.leads = false;
+        }
+        if ballot == self.obeyed || parted {
             self.heard = now;
+            self.probed = None;
         }
     }
 
@@ -125,99 +203,36 @@ impl Election {
         if now < self.next_deadline(closer, patience_s) {
             return None;
         }
-        let kind = if self.leads { LEADERSHIP_HEARTBEAT } else { LEADERSHIP_CLAIM };
-        if !self.leads {
-            // A round at the very top cannot be raised: then nobody claims any more, and the drones fly on by themselves.
-            let round = self.highest_round.checked_add(1)?;
-            self.highest_round = round;
-            self.obeyed = Ballot { round, incarnation: self.incarnation, claimant: self.me };
-            self.leads = true;
+        if self.leads {
+            self.heard = now;
+            self.next_heartbeat = now.after(self.heartbeat_period_s);
+            return Some(self.message(LEADERSHIP_HEARTBEAT, now, epoch, DroneId::NONE));
         }
+        if self.obeyed.is_some() && self.probed.is_none() {
+            self.probed = Some(now);
+            return Some(self.message(LEADERSHIP_PROBE, self.heard, epoch, DroneId::NONE));
+        }
+        let scope = if self.scope.contains(self.group) { self.scope } else { self.group };
+        self.claim(now, scope)
+    }
+
+    /// A round at the very top cannot be raised: then nobody claims any more, and the drones fly on by themselves.
+    fn claim(&mut self, now: SimTime, scope: GroupId) -> Option<Leadership> {
+        let round = self.highest_round.checked_add(1)?;
+        self.highest_round = round;
+        self.obeyed = Ballot { round, incarnation: self.incarnation, claimant: self.me };
+        self.scope = scope;
+        self.leads = true;
         self.heard = now;
-        self.next_heartbeat = now.after(self.params.heartbeat_period_s);
-        Some(Leadership { stamp: now, ballot: self.obeyed, kind, group: GroupId::ALL, epoch, reserved: 0 })
+        self.probed = None;
+        self.next_heartbeat = now.after(self.heartbeat_period_s);
+        Some(self.message(LEADERSHIP_CLAIM, now, 0, DroneId::NONE))
+    }
+
+    fn message(&self, kind: u32, stamp: SimTime, epoch: u32, heir: DroneId) -> Leadership {
+        Leadership { stamp, ballot: self.obeyed, kind, group: self.scope, epoch, heir }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PARAMS: ElectionParams = ElectionParams { heartbeat_period_s: 0.2, leader_timeout_s: 1.0, wait_s: 0.2 };
-
-    fn at(seconds: f64) -> SimTime {
-        SimTime::from_secs(seconds)
-    }
-
-    fn machine(id: u32) -> Election {
-        Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO)
-    }
-
-    /// Ticks a drone every 20 ms until it says something.
-    fn until_said(drone: &mut Election, from_s: f64, closer: usize) -> (f64, Leadership) {
-        (0..500)
-            .map(|i| from_s + f64::from(i) * 0.02)
-            .find_map(|t| drone.handle(at(t), 0, Input::Tick { closer, patience_s: 1.0 }).map(|said| (t, said)))
-            .expect("says something within ten seconds")
-    }
-
-    #[test]
-    fn the_closest_claims_first_and_the_next_only_if_it_hears_nothing() {
-        let (first, claim) = until_said(&mut machine(5), 0.0, 0);
-        let mut second = machine(3);
-        assert!((0.2..0.24).contains(&first));
-        second.handle(at(first + 0.02), 0, Input::Heard(claim));
-        assert!(!second.leads() && second.obeyed() == claim.ballot);
-        let (alone, _) = until_said(&mut machine(3), 0.0, 1);
-        assert!((0.4..0.44).contains(&alone));
-    }
-
-    #[test]
-    fn two_claims_settle_on_the_higher_ballot() {
-        let (mut a, mut b) = (machine(1), machine(2));
-        let (_, claim_a) = until_said(&mut a, 0.0, 0);
-        let (_, claim_b) = until_said(&mut b, 0.0, 0);
-        a.handle(at(0.3), 0, Input::Heard(claim_b));
-        b.handle(at(0.3), 0, Input::Heard(claim_a));
-        assert!(!a.leads() && b.leads());
-        assert_eq!(a.obeyed(), b.obeyed());
-    }
-
-    #[test]
-    fn a_silent_leader_is_replaced_by_a_higher_round_and_steps_down_when_it_wakes() {
-        let (mut old, mut heir) = (machine(1), machine(2));
-        let (t, claim) = until_said(&mut old, 0.0, 0);
-        heir.handle(at(t), 0, Input::Heard(claim));
-        let (later, next) = until_said(&mut heir, t, 0);
-        assert!(later >= t + PARAMS.leader_timeout_s + PARAMS.wait_s - 0.021 && next.ballot > claim.ballot);
-        old.handle(at(later), 0, Input::Heard(next));
-        assert!(!old.leads());
-    }
-
-    #[test]
-    fn heartbeats_and_plans_keep_a_leader_in_office() {
-        let (mut leader, mut member) = (machine(1), machine(2));
-        let (mut t, mut said) = until_said(&mut leader, 0.0, 3);
-        for _ in 0..20 {
-            member.handle(at(t), 0, Input::Heard(said));
-            (t, said) = until_said(&mut leader, t + 0.02, 3);
-            assert!(
-                member.handle(at(t), 0, Input::Tick { closer: 0, patience_s: 1.0 }).is_none()
-                    && member.has_leader(at(t), 1.0)
-            );
-        }
-        for step in 1..10 {
-            let now = at(t + f64::from(step) * 0.9);
-            member.handle(now, 0, Input::Sign(said.ballot));
-            assert!(member.has_leader(now, 1.0));
-        }
-    }
-
-    #[test]
-    fn the_greatest_round_neither_panics_nor_wraps() {
-        let mut drone = machine(1);
-        let top = Ballot { round: u32::MAX, incarnation: u32::MAX, claimant: DroneId(9) };
-        drone.handle(at(0.0), 0, Input::Sign(top));
-        assert!(drone.handle(at(60.0), 0, Input::Tick { closer: 0, patience_s: 1.0 }).is_none() && !drone.leads());
-    }
-}
+mod tests;

@@ -5,7 +5,7 @@ use crate::obstacles::{Obstacles, set_ids};
 use crate::routes::{RouteParams, Routes};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, set_tag};
-use skein_protocol::{DroneId, ObstacleId, PlanStamp};
+use skein_protocol::{DroneId, GroupId, ObstacleId, PlanStamp};
 use std::collections::BTreeMap;
 
 /// A plan and everybody's part in it, as its leader made it.
@@ -26,6 +26,8 @@ pub struct PlannedSet {
     pub tag: u32,
     /// Under which plan the parts were given.
     pub stamp: PlanStamp,
+    /// The group that the plan was for.
+    pub scope: GroupId,
     /// The ways past it.
     pub routes: Routes,
     /// Everybody's part, as far as it was heard.
@@ -42,6 +44,8 @@ pub struct Ledger {
     plan: Option<Plan>,
     parts: BTreeMap<DroneId, Assignment>,
     obeyed: Option<Orders>,
+    /// The plan that split the group whose leader made the plan it obeys, if that one came from another leader.
+    origin: Option<Orders>,
     sets: Vec<PlannedSet>,
 }
 
@@ -57,6 +61,7 @@ impl Ledger {
             plan: None,
             parts: BTreeMap::new(),
             obeyed: None,
+            origin: None,
             sets: Vec::new(),
         }
     }
@@ -71,6 +76,13 @@ impl Ledger {
     #[must_use]
     pub fn obeyed(&self) -> Option<&Orders> {
         self.obeyed.as_ref()
+    }
+
+    /// The plan that made this drone's group, of a wider group's leader; repeated to those who missed it by whoever leads
+    /// a part of that group now.
+    #[must_use]
+    pub fn origin(&self) -> Option<&Orders> {
+        self.origin.as_ref()
     }
 
     /// The stamp it obeys; the default, lower than any, before the first.
@@ -105,6 +117,12 @@ impl Ledger {
         digest.bytes(bytemuck::bytes_of(part)).word(u64::from(orders.plan.phase));
         digest.bytes(bytemuck::cast_slice(set_ids(&orders.plan.set, orders.plan.set_count)));
         digest.value().max(1)
+    }
+
+    /// The group this drone is in.
+    #[must_use]
+    pub fn group(&self) -> GroupId {
+        self.part().map_or(GroupId::ALL, |part| part.group)
     }
 
     /// Hears a plan. Older ones are ignored.
@@ -163,11 +181,17 @@ impl Ledger {
             let routes = Routes::new(&shapes, &self.params);
             self.sets.retain(|set| !set.ids.iter().any(|id| ids.contains(id)));
             let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.clone());
-            self.sets.push(PlannedSet { ids, tag, stamp: plan.id, routes, parts });
+            self.sets.push(PlannedSet { ids, tag, stamp: plan.id, scope: plan.group, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));
         } else {
             self.sets.clear();
         }
-        self.obeyed = Some(Orders { plan, parts: self.parts.clone() });
+        let before = self.obeyed.replace(Orders { plan, parts: self.parts.clone() });
+        match before {
+            Some(before) if before.plan.group != plan.group => {
+                self.origin = before.plan.group.contains(plan.group).then_some(before);
+            }
+            _ => {}
+        }
     }
 }

@@ -2,9 +2,11 @@
 
 mod avoid;
 pub mod cost;
+pub mod council;
 pub mod election;
 mod exchange;
 pub mod geometry;
+pub mod leading;
 pub mod ledger;
 pub mod membership;
 pub mod obstacles;
@@ -14,4 +16,5 @@ pub mod routes;
 pub mod slots;
 pub mod split;
 pub mod string;
+pub mod talk;
 pub mod tps;

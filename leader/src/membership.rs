@@ -25,6 +25,8 @@ struct Peer {
 pub struct Peers {
     drones: u32,
     timeout_s: f64,
+    /// Running mean of the time that beacons were on the air, s.
+    delay_s: f64,
     last: BTreeMap<DroneId, Peer>,
 }
 
@@ -32,7 +34,7 @@ impl Peers {
     /// Peers among `drones` drones; one that is silent for `timeout_s`, or much longer than usual, counts as gone.
     #[must_use]
     pub fn new(drones: u32, timeout_s: f64) -> Self {
-        Self { drones, timeout_s, last: BTreeMap::new() }
+        Self { drones, timeout_s, delay_s: 0.0, last: BTreeMap::new() }
     }
 
     /// Takes a beacon. One that is older than what is known, from the future, or of nobody in the swarm is ignored.
@@ -44,7 +46,14 @@ impl Peers {
         if (pose.incarnation, pose.stamp) > (known.pose.incarnation, known.pose.stamp) {
             let gap_s = known.gap_s + NOVELTY * (now.since(known.heard) - known.gap_s);
             *known = Peer { pose, heard: now, gap_s };
+            self.delay_s += NOVELTY * (now.since(pose.stamp) - self.delay_s);
         }
+    }
+
+    /// How long a beacon is on the air, s: a running mean.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
     }
 
     /// Forgets a peer.
@@ -108,8 +117,10 @@ mod tests {
             queue: Default::default(),
             obeyed: Default::default(),
             group: Default::default(),
+            term: Default::default(),
             incarnation: 1,
             flags: 0,
+            reserved: 0,
         }
     }
 

@@ -25,13 +25,16 @@ pub struct Obstacles {
     known: BTreeMap<ObstacleId, Known>,
     passed: BTreeMap<ObstacleId, BTreeSet<DroneId>>,
     drones: u32,
+    reach_m: f64,
+    sets: Vec<Vec<ObstacleId>>,
 }
 
 impl Obstacles {
-    /// Nothing known, in a swarm of `drones`.
+    /// Nothing known, in a swarm of `drones`; obstacles whose extents along the flight are closer than `reach_m` belong
+    /// to one set.
     #[must_use]
-    pub fn new(drones: u32) -> Self {
-        Self { drones, ..Self::default() }
+    pub fn new(drones: u32, reach_m: f64) -> Self {
+        Self { drones, reach_m, ..Self::default() }
     }
 
     /// Learns of an obstacle; true if it is new.
@@ -40,6 +43,7 @@ impl Obstacles {
             return false;
         }
         self.known.insert(id, Known { shape, witness, since: now });
+        self.sets = self.cluster();
         true
     }
 
@@ -81,10 +85,27 @@ impl Obstacles {
         ids.iter().map(|&id| self.get(id).map(|known| (id, known.shape))).collect()
     }
 
-    /// The obstacle sets, in flight order: obstacles whose extents along the flight are closer than `reach_m` belong
-    /// together. Ids ascending; a set has at most [`MAX_SET`] obstacles, the farther ones of a larger set form the next.
+    /// Whether a drone there is past all obstacles of a set: it said so, or it is beyond the exit.
     #[must_use]
-    pub fn sets(&self, reach_m: f64) -> Vec<Vec<ObstacleId>> {
+    pub fn is_past(&self, drone: DroneId, x_m: f64, set: &[ObstacleId], exit_x_m: f64) -> bool {
+        x_m >= exit_x_m || set.iter().all(|&id| self.has_passed(drone, id))
+    }
+
+    /// Where a set is left: its rear edge and `beyond_m`, m.
+    #[must_use]
+    pub fn exit_x_m(&self, set: &[ObstacleId], beyond_m: f64) -> f64 {
+        let rear = set.iter().filter_map(|&id| self.get(id)).map(|known| known.shape.bounds().1.x);
+        rear.fold(f64::NEG_INFINITY, f64::max) + beyond_m
+    }
+
+    /// The obstacle sets, in flight order. Ids ascending; a set has at most [`MAX_SET`] obstacles, the farther ones of a
+    /// larger set form the next.
+    #[must_use]
+    pub fn sets(&self) -> &[Vec<ObstacleId>] {
+        &self.sets
+    }
+
+    fn cluster(&self) -> Vec<Vec<ObstacleId>> {
         let mut extents: Vec<(f64, f64, ObstacleId)> =
             self.iter().map(|(id, known)| (known.shape.bounds().0.x, known.shape.bounds().1.x, id)).collect();
         extents.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
@@ -92,7 +113,7 @@ impl Obstacles {
         let mut rear = f64::NEG_INFINITY;
         for (front, end, id) in extents {
             match sets.last_mut() {
-                Some(set) if front < rear + reach_m && set.len() < MAX_SET => set.push(id),
+                Some(set) if front < rear + self.reach_m && set.len() < MAX_SET => set.push(id),
                 _ => {
                     sets.push(vec![id]);
                     rear = f64::NEG_INFINITY;
@@ -131,18 +152,19 @@ mod tests {
 
     #[test]
     fn obstacles_closer_than_the_reach_form_a_set() {
-        let mut obstacles = Obstacles::new(4);
+        let mut obstacles = Obstacles::new(4, 40.0);
         for (id, x) in [(3, 100.0), (1, 140.0), (2, 300.0)] {
             assert!(obstacles.learn(SimTime::ZERO, ObstacleId(id), disc(x), DroneId(0)));
         }
         assert!(!obstacles.learn(SimTime::ZERO, ObstacleId(3), disc(0.0), DroneId(0)));
-        assert_eq!(obstacles.sets(40.0), vec![vec![ObstacleId(1), ObstacleId(3)], vec![ObstacleId(2)]]);
-        assert_eq!(obstacles.sets(20.0).len(), 3);
+        assert_eq!(obstacles.sets(), [vec![ObstacleId(1), ObstacleId(3)], vec![ObstacleId(2)]]);
+        obstacles.learn(SimTime::ZERO, ObstacleId(0), disc(220.0), DroneId(0));
+        assert_eq!(obstacles.sets().len(), 3);
     }
 
     #[test]
     fn what_nobody_knows_cannot_be_passed() {
-        let mut obstacles = Obstacles::new(4);
+        let mut obstacles = Obstacles::new(4, 40.0);
         obstacles.learn(SimTime::ZERO, ObstacleId(1), disc(0.0), DroneId(0));
         let (set, set_count) = set_array(&[ObstacleId(1), ObstacleId(9)]);
         let message = Passed { stamp: SimTime::ZERO, set_count, set, reserved: 0 };

@@ -1,13 +1,14 @@
 //! What a leader decides: when to plan, and for whom. Paper, Algorithms 1, 3 and 5. Everything it knows came by its own
 //! senses or by messages.
 
-use crate::ledger::{Ledger, Orders};
+use crate::council::Council;
+use crate::ledger::{Ledger, Orders, PlannedSet};
 use crate::obstacles::{Obstacles, set_array};
 use crate::reform::Reform;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
 use skein_protocol::formation::Shape;
-use skein_protocol::payload::{PHASE_AVOID, Plan};
+use skein_protocol::payload::{Arrivals, PHASE_AVOID, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
 
 /// How a leader chooses among the groupings.
@@ -94,6 +95,8 @@ pub struct Member {
     pub speed_mps: f64,
     /// Its velocity, m/s.
     pub velocity: Vec2,
+    /// The group it is in.
+    pub group: GroupId,
 }
 
 /// What a leader knows when it decides.
@@ -103,8 +106,14 @@ pub struct Situation<'a> {
     pub now: SimTime,
     /// Its term.
     pub ballot: Ballot,
+    /// The group that it leads.
+    pub scope: GroupId,
     /// The living members, itself included, by id.
     pub members: &'a [Member],
+    /// Living drones of other groups, by id.
+    pub others: &'a [Member],
+    /// How long a message is on the air, s.
+    pub delay_s: f64,
     /// Where silent drones may hang in the air, m.
     pub silent: &'a [Vec2],
     /// Known obstacles.
@@ -118,6 +127,7 @@ pub struct Situation<'a> {
 pub struct Planner {
     pub(crate) params: PlannerParams,
     pub(crate) reform: Reform,
+    pub(crate) council: Council,
 }
 
 /// What is to be decided.
@@ -131,46 +141,70 @@ enum Need {
 }
 
 impl Planner {
-    /// A planner that has decided nothing yet.
+    /// A planner that has decided nothing yet, in a swarm of `drones`; questions are repeated every `repeat_s`.
     #[must_use]
-    pub fn new(params: PlannerParams) -> Self {
-        Self { params, reform: Reform::default() }
+    pub fn new(params: PlannerParams, drones: u32, repeat_s: f64) -> Self {
+        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s) }
+    }
+
+    /// Hears when a drone of another group can be where.
+    pub fn hear(&mut self, now: SimTime, row: &Arrivals) {
+        self.council.hear(now, row);
     }
 
     /// New orders, if there is something to decide: one, or alternatives to rehearse, by the paper's rule the first.
-    pub fn decide(&mut self, s: &Situation<'_>) -> Vec<Orders> {
+    /// What other leaders are to be asked or told goes into `say`.
+    pub fn decide(&mut self, s: &Situation<'_>, say: &mut Vec<Arrivals>) -> Vec<Orders> {
+        if let Some(planned) = self.council.asked(s.now).and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag)) {
+            say.extend(self.standing(s, planned));
+        }
         match self.need(s) {
             Need::Plan(set) => {
                 let since = self.learnt(s, &set);
                 let due = s.now.since(since) >= self.params.debounce_s;
-                due.then(|| self.avoid(s, &set)).flatten().unwrap_or_default()
+                due.then(|| self.avoid(s, &set, say)).flatten().unwrap_or_default()
             }
-            Need::Wait => Vec::new(),
-            Need::Formation => self.formation(s).into_iter().collect(),
+            Need::Formation if s.scope == GroupId::ALL => self.formation(s).into_iter().collect(),
+            Need::Wait | Need::Formation => Vec::new(),
         }
     }
 
-    /// The first set, in flight order, that somebody still has to pass and that is not planned for in this term.
+    /// Whether some of these drones still have an obstacle set to pass.
+    pub fn has_ahead<'m>(&self, obstacles: &Obstacles, mut drones: impl Iterator<Item = &'m Member>) -> bool {
+        let sets: Vec<_> = obstacles.sets().iter().map(|set| (set, self.exit_x_m(obstacles, set))).collect();
+        drones.any(|m| sets.iter().any(|(set, exit_x_m)| !obstacles.is_past(m.id, m.position.x, set, *exit_x_m)))
+    }
+
+    /// The first set, in flight order, that somebody still has to pass and that is not planned for in this term. A group
+    /// that is split leaves that to the leaders of its parts.
     fn need(&self, s: &Situation<'_>) -> Need {
+        let split = s.members.iter().any(|m| m.group != s.scope && s.scope.contains(m.group));
         let mut need = Need::Formation;
-        for set in s.obstacles.sets(2.0 * self.params.routes.planning_distance_m) {
-            let exit_x_m = self.exit_x_m(s.obstacles, &set);
-            let mut waiting = s.members.iter().filter(|m| !is_past(s.obstacles, &set, exit_x_m, m)).peekable();
+        for set in s.obstacles.sets() {
+            let exit_x_m = self.exit_x_m(s.obstacles, set);
+            let past = |m: &Member| s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
+            let mut waiting = s.members.iter().filter(|m| !past(m)).peekable();
             if waiting.peek().is_none() {
                 continue;
             }
-            let planned = s.ledger.sets().iter().find(|p| p.ids == set && p.stamp.ballot == s.ballot);
-            if !planned.is_some_and(|p| waiting.all(|m| p.parts.contains_key(&m.id))) {
-                return Need::Plan(set);
+            let mut planned = s.ledger.sets().iter().filter(|p| p.ids == *set && holds(p, s));
+            if !split && !planned.next().is_some_and(|p| waiting.all(|m| p.parts.contains_key(&m.id))) {
+                return Need::Plan(set.clone());
             }
             need = Need::Wait;
         }
         need
     }
 
-    fn exit_x_m(&self, obstacles: &Obstacles, set: &[ObstacleId]) -> f64 {
-        let rear = set.iter().filter_map(|&id| obstacles.get(id)).map(|known| known.shape.bounds().1.x);
-        rear.fold(f64::NEG_INFINITY, f64::max) + self.params.routes.planning_distance_m
+    pub(crate) fn exit_x_m(&self, obstacles: &Obstacles, set: &[ObstacleId]) -> f64 {
+        obstacles.exit_x_m(set, self.params.routes.planning_distance_m)
+    }
+
+    /// Drones of other groups that still have to pass a set.
+    pub(crate) fn others_before(&self, s: &Situation<'_>, set: &[ObstacleId]) -> Vec<DroneId> {
+        let exit_x_m = self.exit_x_m(s.obstacles, set);
+        let before = |m: &&Member| !s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
+        s.others.iter().filter(before).map(|m| m.id).collect()
     }
 
     /// When the newest obstacle of a set was learnt that no plan holds yet; the start if all are planned for already
@@ -194,7 +228,7 @@ impl Planner {
         Plan {
             stamp: s.now,
             id: PlanStamp { ballot: s.ballot, epoch },
-            group: GroupId::ALL,
+            group: s.scope,
             phase,
             members: s.members.len() as u32,
             anchor_m: if phase == PHASE_AVOID { [0.0; 2] } else { anchor.into() },
@@ -210,13 +244,17 @@ impl Planner {
     }
 }
 
-fn is_past(obstacles: &Obstacles, set: &[ObstacleId], exit_x_m: f64, member: &Member) -> bool {
-    member.position.x >= exit_x_m || set.iter().all(|&id| obstacles.has_passed(member.id, id))
+/// Whether a plan for a set was made in this term, or by the leader of the group that this one was split from.
+fn holds(planned: &PlannedSet, s: &Situation<'_>) -> bool {
+    planned.stamp.ballot == s.ballot || (planned.scope != s.scope && planned.scope.contains(s.scope))
 }
 
-/// Who leads a group: its member closest to the destination; ties: the lower id.
-pub(crate) fn front(members: &[Member], groups: &[GroupId], group: GroupId) -> DroneId {
-    let of_group = members.iter().zip(groups).filter(|(_, g)| **g == group).map(|(m, _)| m);
-    let first = of_group.reduce(|best, m| if m.position.x > best.position.x { m } else { best });
-    first.map_or(DroneId::NONE, |m| m.id)
+impl PlannerParams {
+    /// Who leads a group: its member closest to the destination; ties: the lower id.
+    pub(crate) fn front(&self, members: &[Member], groups: &[GroupId], group: GroupId) -> DroneId {
+        let of_group = members.iter().zip(groups).filter(|(_, g)| **g == group).map(|(m, _)| m);
+        let distance_m = |m: &Member| self.destination.distance_m(m.position);
+        let first = of_group.reduce(|best, m| if distance_m(m) < distance_m(best) { m } else { best });
+        first.map_or(DroneId::NONE, |m| m.id)
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::geometry::nearest;
 use crate::ledger::Orders;
-use crate::planner::{Destination, Member, Planner, Situation, front};
+use crate::planner::{Destination, Member, Planner, Situation};
 use crate::slots;
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
 use skein_protocol::{GroupId, SimTime, Vec2};
@@ -76,14 +76,14 @@ impl Planner {
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let taken = slots::assign_by(self.params.reformation, &positions, &places).ok()?;
         let plan = self.plan(s, phase, &[], anchor);
-        let group = |id| s.ledger.obeyed().and_then(|o| o.parts.get(&id)).map_or(GroupId::ALL, |part| part.group);
-        let groups: Vec<GroupId> = s.members.iter().map(|m| group(m.id)).collect();
+        let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, s.members)).collect();
         let part = |(i, m): (usize, &Member)| {
             let assignment = Assignment {
                 id: plan.id,
+                scope: s.scope,
                 group: groups[i],
                 drone: m.id,
-                leader: front(s.members, &groups, groups[i]),
+                leader: self.params.front(s.members, &groups, groups[i]),
                 slot_m: shape[taken[i]].into(),
                 arrival_s: 0.0,
                 route: NO_ROUTE,
@@ -118,6 +118,16 @@ impl Planner {
         }
         anchor
     }
+}
+
+/// The group a member stays in; an orphan, of no group while others are split, joins the one of the nearest member.
+fn group_of(member: &Member, members: &[Member]) -> GroupId {
+    if member.group != GroupId::ALL {
+        return member.group;
+    }
+    let near = |m: &&Member| (m.position - member.position).norm_squared();
+    let split = members.iter().filter(|m| m.group != GroupId::ALL);
+    split.min_by(|a, b| near(a).total_cmp(&near(b)).then(a.id.cmp(&b.id))).map_or(GroupId::ALL, |m| m.group)
 }
 
 /// The shape with wider gaps, about its own centre: whoever is shut out finds a way in, and when the ranks close again

@@ -94,6 +94,12 @@ impl GroupId {
         Self(path)
     }
 
+    /// Whether `other` is this group or was split from it.
+    #[must_use]
+    pub fn contains(self, other: Self) -> bool {
+        self.0[..self.depth()] == other.0[..self.depth()]
+    }
+
     /// The group this one was split from; the whole swarm for itself.
     #[must_use]
     pub fn parent(self) -> Self {
@@ -136,5 +142,12 @@ mod tests {
         assert_eq!(GroupId::ALL.child(1).child(2).parent(), GroupId::ALL.child(1));
         assert_eq!(GroupId::ALL.parent(), GroupId::ALL);
         assert_eq!(GroupId::ALL.child(12).to_string(), "N[12]");
+    }
+
+    #[test]
+    fn a_group_contains_itself_and_what_it_was_split_into() {
+        let (one, two) = (GroupId::ALL.child(1), GroupId::ALL.child(2));
+        assert!(GroupId::ALL.contains(one.child(2)) && one.contains(one.child(2)) && one.contains(one));
+        assert!(!one.contains(two) && !one.contains(GroupId::ALL) && !one.child(2).contains(one));
     }
 }

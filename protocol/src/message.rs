@@ -1,7 +1,7 @@
 //! What drones say. Soft state: repeated until superseded, idempotent, safe to lose, repeat and reorder.
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
-use crate::payload::{self, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -21,14 +21,16 @@ pub enum Topic {
     Plan = 4,
     /// [`Assignment`].
     Assignment = 5,
+    /// [`Arrivals`].
+    Arrivals = 6,
     /// [`Passed`].
     Passed = 7,
 }
 
 impl Topic {
     /// All topics, in wire order.
-    pub const ALL: [Self; 6] =
-        [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Passed];
+    pub const ALL: [Self; 7] =
+        [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Arrivals, Self::Passed];
 
     /// The topic with this number on the wire.
     #[must_use]
@@ -50,6 +52,8 @@ pub enum Message {
     Plan(Plan),
     /// One drone's part in it.
     Assignment(Assignment),
+    /// When one member of a group can be at the next gate.
+    Arrivals(Arrivals),
     /// Who is through which set.
     Passed(Passed),
 }
@@ -81,6 +85,7 @@ impl Message {
             Self::Leadership(_) => Topic::Leadership,
             Self::Plan(_) => Topic::Plan,
             Self::Assignment(_) => Topic::Assignment,
+            Self::Arrivals(_) => Topic::Arrivals,
             Self::Passed(_) => Topic::Passed,
         }
     }
@@ -94,6 +99,7 @@ impl Message {
             Self::Leadership(payload) => bytemuck::bytes_of(payload),
             Self::Plan(payload) => bytemuck::bytes_of(payload),
             Self::Assignment(payload) => bytemuck::bytes_of(payload),
+            Self::Arrivals(payload) => bytemuck::bytes_of(payload),
             Self::Passed(payload) => bytemuck::bytes_of(payload),
         };
         let mut frame = Frame {
@@ -120,6 +126,7 @@ impl Message {
             Topic::Leadership => Self::Leadership(read(frame)?),
             Topic::Plan => Self::Plan(read(frame)?),
             Topic::Assignment => Self::Assignment(read(frame)?),
+            Topic::Arrivals => Self::Arrivals(read(frame)?),
             Topic::Passed => Self::Passed(read(frame)?),
         };
         message.check()?;
@@ -139,7 +146,7 @@ impl Message {
                 p.queue.iter().try_for_each(|place| finite(&[place.remaining_m], "remaining path"))
             }
             Self::Obstacle(o) => o.shape.check().map_err(|_| DecodeError::Field("shape")),
-            Self::Leadership(l) => below(l.kind.wrapping_sub(1), 2, "kind of leadership"),
+            Self::Leadership(l) => below(l.kind.wrapping_sub(1), 5, "kind of leadership"),
             Self::Plan(p) => {
                 finite(&p.anchor_m, "anchor")?;
                 finite(&p.anchor_mps, "anchor velocity")?;
@@ -152,6 +159,11 @@ impl Message {
             Self::Assignment(a) => {
                 finite(&a.slot_m, "slot")?;
                 finite(&[a.arrival_s], "arrival")
+            }
+            Self::Arrivals(a) => {
+                below(a.routes, payload::MAX_ROUTES as u32 + 1, "route count")?;
+                let never = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
+                if a.gate_s.iter().any(never) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
             }
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
         }

@@ -7,12 +7,15 @@ use crate::time::SimTime;
 use bytemuck::{Pod, Zeroable};
 
 /// Version of all layouts in this module. A frame of another version is refused.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 
 /// Most obstacles of one set.
 pub const MAX_SET: usize = 32;
 
-/// [`Pose::flags`]: the drone believes it leads its group.
+/// Most routes past one set: one more than obstacles.
+pub const MAX_ROUTES: usize = MAX_SET + 1;
+
+/// [`Pose::flags`]: the drone believes it leads, in the term [`Pose::term`].
 pub const POSE_LEADS: u32 = 1;
 
 /// A place in the queue past one obstacle set.
@@ -54,10 +57,14 @@ pub struct Pose {
     pub obeyed: PlanStamp,
     /// Its group.
     pub group: GroupId,
+    /// The term it obeys, or leads in.
+    pub term: Ballot,
     /// Of its process.
     pub incarnation: u32,
     /// [`POSE_LEADS`].
     pub flags: u32,
+    /// Always 0.
+    pub reserved: u32,
 }
 
 /// An obstacle that somebody sensed, for those who cannot.
@@ -77,22 +84,29 @@ pub const LEADERSHIP_CLAIM: u32 = 1;
 /// [`Leadership::kind`]: the source leads and is alive.
 pub const LEADERSHIP_HEARTBEAT: u32 = 2;
 
-/// A claim to lead, or a leader's heartbeat.
+/// [`Leadership::kind`]: the source misses the leader of this term and asks who has heard of it since the stamp.
+pub const LEADERSHIP_PROBE: u32 = 3;
+/// [`Leadership::kind`]: the source heard of this term's leader, at the stamp the last time: the answer to a probe.
+pub const LEADERSHIP_OBJECTION: u32 = 4;
+/// [`Leadership::kind`]: the source leads and asks the drone in [`Leadership::heir`] to take over.
+pub const LEADERSHIP_YIELD: u32 = 5;
+
+/// A claim to lead, a leader's heartbeat, and what is said about a leader that is missed or yields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Leadership {
-    /// When it was said.
+    /// When it was said; of a probe and an objection, when its source last heard of the leader.
     pub stamp: SimTime,
     /// The term.
     pub ballot: Ballot,
-    /// [`LEADERSHIP_CLAIM`] or [`LEADERSHIP_HEARTBEAT`].
+    /// A `LEADERSHIP_…`.
     pub kind: u32,
     /// The group it is about.
     pub group: GroupId,
     /// Number of the last plan made in this term; 0 if none.
     pub epoch: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// Who is asked to take over; [`DroneId::NONE`] unless yielding.
+    pub heir: DroneId,
 }
 
 /// [`Plan::phase`]: fly in formation, the anchor moves on.
@@ -142,7 +156,9 @@ pub struct Plan {
 pub struct Assignment {
     /// The plan it belongs to.
     pub id: PlanStamp,
-    /// The group the drone is in under this plan.
+    /// The group that the plan is for.
+    pub scope: GroupId,
+    /// The group the drone is in under this plan: the scope or split from it.
     pub group: GroupId,
     /// Whom it is for.
     pub drone: DroneId,
@@ -162,6 +178,32 @@ pub struct Assignment {
 
 /// [`Assignment::route`] of a drone that has no obstacle to pass.
 pub const NO_ROUTE: u16 = u16::MAX;
+
+/// [`Arrivals::flags`]: the source waits for the rows of the other groups before it decides.
+pub const ARRIVALS_ASK: u32 = 1;
+
+/// When one member of the source's group can be at the gate of an obstacle set, for the leaders of the groups that have
+/// the same set ahead: all of them split the union of the rows.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Arrivals {
+    /// When the row was made.
+    pub stamp: SimTime,
+    /// The source's term.
+    pub ballot: Ballot,
+    /// Whose row it is.
+    pub drone: DroneId,
+    /// The group that the source leads.
+    pub group: GroupId,
+    /// Short name of the set: [`set_tag`].
+    pub set: u32,
+    /// Routes in use below, from right to left, at most [`MAX_ROUTES`].
+    pub routes: u32,
+    /// [`ARRIVALS_ASK`].
+    pub flags: u32,
+    /// Along each route, seconds from the stamp to the gate in free flight; infinite: not that way; negative past it.
+    pub gate_s: [f32; MAX_ROUTES],
+}
 
 /// The source is past these obstacles: beyond the rear edge and the planning distance.
 #[repr(C)]

@@ -1,7 +1,7 @@
 //! What a drone hands back in a tick: its actuators' command, what it obeys, and the tick's tally. Wire and clock, not
 //! a message path: no other drone reads it.
 
-use crate::ids::{GroupId, PlanStamp};
+use crate::ids::{Ballot, GroupId, PlanStamp};
 use crate::radio::DROP_REASONS;
 use bytemuck::{Pod, Zeroable};
 
@@ -43,8 +43,8 @@ pub struct Slot {
     pub rank: u16,
     /// How long the step took, ns of wall time; no part of the digest. 0 in the inline runtime.
     pub step_ns: u32,
-    /// Always 0.
-    pub reserved: [u32; 3],
+    /// The term it obeys, or leads in.
+    pub term: Ballot,
 }
 
 /// Bins of [`LinkStats`]' histograms, one tick wide; the last also holds all that is longer.

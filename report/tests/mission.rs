@@ -94,6 +94,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
     };
     let part = |drone: u32| Assignment {
         id: STAMP,
+        scope: GroupId::ALL,
         group: GroupId::ALL.child(1),
         drone: DroneId(drone),
         leader: DroneId(if drone == 2 { 2 } else { 3 }),

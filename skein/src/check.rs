@@ -61,7 +61,8 @@ fn services(shards: usize) -> Vec<String> {
 fn sets(scenario: &Scenario) -> Result<Vec<SetPlan>, Failure> {
     let shapes = scenario.shapes().map_err(Failure::usage)?;
     let planner = mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO).planner;
-    let mut obstacles = Obstacles::new(scenario.formation.drones);
+    let reach_m = 2.0 * planner.routes.planning_distance_m;
+    let mut obstacles = Obstacles::new(scenario.formation.drones, reach_m);
     for (shape, id) in shapes.iter().zip(0..) {
         obstacles.learn(SimTime::ZERO, ObstacleId(id), *shape, DroneId(0));
     }
@@ -69,5 +70,5 @@ fn sets(scenario: &Scenario) -> Result<Vec<SetPlan>, Failure> {
         let routes = Routes::new(&obstacles.shapes(&ids).unwrap_or_default(), &planner.routes);
         SetPlan { obstacles: ids, routes: routes.count(), gate_x_m: routes.gate_x_m() }
     };
-    Ok(obstacles.sets(2.0 * planner.routes.planning_distance_m).into_iter().map(plan).collect())
+    Ok(obstacles.sets().iter().cloned().map(plan).collect())
 }

@@ -49,7 +49,7 @@ impl Decisions {
 
     /// Tells that a drone takes up or lays down leading.
     pub fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut Log) {
-        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.led, slot.obeyed.ballot));
+        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.led, slot.term));
         let before = std::mem::replace(&mut self.0[drone.index()].leading, leads);
         if before == leads {
             return;
@@ -158,6 +158,7 @@ mod tests {
     fn assignment(id: PlanStamp, drone: u32, route: u16) -> AirFrame {
         on_air(Message::Assignment(Assignment {
             id,
+            scope: GroupId::ALL,
             group: GroupId::ALL.child(1),
             drone: DroneId(drone),
             leader: DroneId(2),
@@ -207,9 +208,9 @@ mod tests {
     #[test]
     fn leading_is_told_when_it_begins_changes_and_ends() {
         let (mut decisions, mut log) = (Decisions::new(8), Log::default());
-        let leads = Slot { flags: SLOT_LEADS, obeyed: stamp(1, 1), ..Slot::default() };
+        let leads = Slot { flags: SLOT_LEADS, term: stamp(1, 1).ballot, obeyed: stamp(1, 1), ..Slot::default() };
         let next_plan = Slot { obeyed: stamp(1, 2), ..leads };
-        let next_term = Slot { obeyed: stamp(2, 1), ..leads };
+        let next_term = Slot { term: stamp(2, 1).ballot, ..leads };
         for slot in [leads, next_plan, next_term, Slot::default()] {
             decisions.follow_slot(DroneId(2), &slot, SimTime::ZERO, &mut log);
         }

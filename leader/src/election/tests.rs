@@ -1,0 +1,181 @@
+use super::*;
+
+const PARAMS: ElectionParams = ElectionParams { heartbeat_period_s: 0.2, leader_timeout_s: 1.0, wait_s: 0.2 };
+const N: GroupId = GroupId::ALL;
+
+fn at(seconds: f64) -> SimTime {
+    SimTime::from_secs(seconds)
+}
+
+fn machine(id: u32) -> Election {
+    Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO)
+}
+
+fn ballot(round: u32, claimant: u32) -> Ballot {
+    Ballot { round, incarnation: 1, claimant: DroneId(claimant) }
+}
+
+fn tick(drone: &mut Election, now_s: f64, closer: usize) -> Option<Leadership> {
+    drone.handle(at(now_s), 0, Input::Tick { closer, patience_s: 1.0 })
+}
+
+fn sign(drone: &mut Election, now_s: f64, ballot: Ballot, scope: GroupId, named: bool) {
+    drone.handle(at(now_s), 0, Input::Sign { ballot, scope, named });
+}
+
+/// Ticks a drone every 20 ms until it says something of this kind.
+fn until_said(drone: &mut Election, from_s: f64, closer: usize, kind: u32) -> (f64, Leadership) {
+    (0..500)
+        .map(|i| from_s + f64::from(i) * 0.02)
+        .find_map(|t| tick(drone, t, closer).filter(|said| said.kind == kind).map(|said| (t, said)))
+        .expect("says something within ten seconds")
+}
+
+fn claim(drone: &mut Election, from_s: f64, closer: usize) -> (f64, Leadership) {
+    until_said(drone, from_s, closer, LEADERSHIP_CLAIM)
+}
+
+#[test]
+fn the_closest_claims_first_and_the_next_only_if_it_hears_nothing() {
+    let (first, said) = claim(&mut machine(5), 0.0, 0);
+    let mut second = machine(3);
+    assert!((0.2..0.24).contains(&first));
+    second.handle(at(first + 0.02), 0, Input::Heard(said));
+    assert!(!second.leads() && second.obeyed() == said.ballot);
+    let (alone, _) = claim(&mut machine(3), 0.0, 1);
+    assert!((0.4..0.44).contains(&alone));
+}
+
+#[test]
+fn two_claims_settle_on_the_higher_ballot() {
+    let (mut a, mut b) = (machine(1), machine(2));
+    let (_, said_a) = claim(&mut a, 0.0, 0);
+    let (_, said_b) = claim(&mut b, 0.0, 0);
+    a.handle(at(0.3), 0, Input::Heard(said_b));
+    b.handle(at(0.3), 0, Input::Heard(said_a));
+    assert!(!a.leads() && b.leads());
+    assert_eq!(a.obeyed(), b.obeyed());
+}
+
+#[test]
+fn a_silent_leader_is_asked_for_and_replaced_and_steps_down_when_it_wakes() {
+    let (mut old, mut heir) = (machine(1), machine(2));
+    let (t, said) = claim(&mut old, 0.0, 0);
+    heir.handle(at(t), 0, Input::Heard(said));
+    let (asked, probe) = until_said(&mut heir, t, 0, LEADERSHIP_PROBE);
+    assert!(asked >= t + PARAMS.leader_timeout_s - 1e-9 && (probe.ballot, probe.stamp) == (said.ballot, at(t)));
+    let (later, next) = claim(&mut heir, asked + 0.02, 0);
+    assert!(later >= asked + PARAMS.wait_s - 1e-9 && next.ballot > said.ballot);
+    old.handle(at(later), 0, Input::Heard(next));
+    assert!(!old.leads());
+}
+
+#[test]
+fn whoever_heard_of_the_leader_objects_to_a_claim() {
+    let (mut leader, mut deaf, mut other) = (machine(1), machine(2), machine(3));
+    let (t, said) = claim(&mut leader, 0.0, 0);
+    deaf.handle(at(t), 0, Input::Heard(said));
+    sign(&mut other, t + 0.9, said.ballot, N, false);
+    let (asked, probe) = until_said(&mut deaf, t, 0, LEADERSHIP_PROBE);
+    let objection = other.handle(at(asked), 0, Input::Heard(probe)).expect("it heard of the leader since");
+    assert_eq!((objection.kind, objection.stamp), (LEADERSHIP_OBJECTION, at(t + 0.9)));
+    let (mut told, mut untold) = (deaf.clone(), deaf);
+    told.handle(at(asked + 0.02), 0, Input::Heard(objection));
+    assert!((1..80).all(|i| tick(&mut told, asked + 0.02 + 0.01 * f64::from(i), 0).is_none()));
+    assert!(claim(&mut untold, asked, 0).0 < asked + 0.25);
+    // What is no news is not told, nor is anything about another term.
+    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { stamp: at(t + 0.9), ..probe })).is_none());
+    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { ballot: ballot(9, 9), ..probe })).is_none());
+    // The leader itself answers that it lives.
+    assert_eq!(leader.handle(at(asked), 0, Input::Heard(probe)).map(|said| said.stamp), Some(at(asked)));
+}
+
+#[test]
+fn an_objection_counts_for_what_it_knows_and_not_for_the_future() {
+    let mut drone = machine(2);
+    sign(&mut drone, 0.0, ballot(1, 1), N, false);
+    let objection = |stamp| {
+        let kind = LEADERSHIP_OBJECTION;
+        Input::Heard(Leadership { stamp, ballot: ballot(1, 1), kind, group: N, epoch: 0, heir: DroneId::NONE })
+    };
+    drone.handle(at(1.0), 0, objection(at(60.0)));
+    assert!(!drone.has_leader(at(1.1), 1.0));
+    drone.handle(at(1.0), 0, objection(at(0.5)));
+    assert!(drone.has_leader(at(1.5), 1.0) && !drone.has_leader(at(1.6), 1.0));
+}
+
+#[test]
+fn heartbeats_and_plans_keep_a_leader_in_office() {
+    let (mut leader, mut member) = (machine(1), machine(2));
+    let (mut t, mut said) = claim(&mut leader, 0.0, 3);
+    for _ in 0..20 {
+        member.handle(at(t), 0, Input::Heard(said));
+        (t, said) = until_said(&mut leader, t + 0.02, 3, LEADERSHIP_HEARTBEAT);
+        assert!(tick(&mut member, t, 0).is_none() && member.has_leader(at(t), 1.0));
+    }
+    for step in 1..10 {
+        let now = t + f64::from(step) * 0.9;
+        sign(&mut member, now, said.ballot, N, false);
+        assert!(member.has_leader(at(now), 1.0));
+    }
+}
+
+#[test]
+fn a_leader_that_yields_is_followed_by_its_heir_at_once() {
+    let (mut leader, mut heir, mut third) = (machine(1), machine(2), machine(3));
+    let (t, said) = claim(&mut leader, 0.0, 0);
+    heir.handle(at(t), 0, Input::Heard(said));
+    third.handle(at(t), 0, Input::Heard(said));
+    let yields = leader.handle(at(t + 0.1), 0, Input::Yield(DroneId(2))).expect("it leads");
+    assert!(third.handle(at(t + 0.12), 0, Input::Heard(yields)).is_none() && !third.leads());
+    let next = heir.handle(at(t + 0.12), 0, Input::Heard(yields)).expect("the heir claims");
+    assert!(heir.leads() && leader.leads());
+    leader.handle(at(t + 0.14), 0, Input::Heard(next));
+    assert!(!leader.leads() && leader.obeyed() == heir.obeyed());
+    assert!(heir.clone().handle(at(t + 0.2), 0, Input::Heard(yields)).is_none(), "said twice, it is over");
+}
+
+#[test]
+fn a_term_is_for_the_groups_in_its_scope() {
+    let (one, two) = (N.child(1), N.child(2));
+    let mut drone = machine(3);
+    sign(&mut drone, 0.0, ballot(1, 0), N, false);
+    drone.handle(at(0.1), 0, Input::Joined(one.child(1)));
+    sign(&mut drone, 0.2, ballot(3, 7), two, false);
+    assert_eq!(drone.obeyed(), ballot(1, 0));
+    sign(&mut drone, 0.3, ballot(2, 4), one, false);
+    assert_eq!((drone.obeyed(), drone.scope()), (ballot(2, 4), one));
+    sign(&mut drone, 0.4, ballot(4, 7), two, true);
+    assert_eq!((drone.obeyed(), drone.scope()), (ballot(4, 7), two), "an order by name adopts it");
+    sign(&mut drone, 0.5, ballot(5, 0), N, false);
+    assert_eq!((drone.obeyed(), drone.scope()), (ballot(5, 0), N));
+}
+
+#[test]
+fn whoever_missed_the_split_waits_to_be_taken_in_and_leads_no_more() {
+    let mut leader = machine(1);
+    claim(&mut leader, 0.0, 0);
+    sign(&mut leader, 0.5, ballot(4, 2), N.child(1), false);
+    assert!(!leader.leads());
+    for i in 1..50 {
+        let now = 0.5 + 0.2 * f64::from(i);
+        assert!(tick(&mut leader, now, 0).is_none());
+        sign(&mut leader, now, ballot(4, 2), N.child(1), false);
+    }
+    assert!(claim(&mut leader, 10.4, 0).1.ballot.round > 4, "with nobody left it leads itself");
+}
+
+#[test]
+fn the_greatest_round_neither_panics_nor_wraps_nor_wins() {
+    let mut drone = machine(1);
+    let top = Ballot { round: u32::MAX, incarnation: u32::MAX, claimant: DroneId(9) };
+    sign(&mut drone, 0.0, top, N, true);
+    assert!(!drone.obeyed().is_some() && claim(&mut drone, 0.0, 0).1.ballot == ballot(1, 1));
+    let mut high = Election { highest_round: u32::MAX, ..machine(1) };
+    sign(&mut high, 0.0, top, N, false);
+    assert!(
+        high.obeyed() == top
+            && (0..100)
+                .all(|i| tick(&mut high, 60.0 + f64::from(i), 0).is_none_or(|said| said.kind == LEADERSHIP_PROBE))
+    );
+}
