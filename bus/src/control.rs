@@ -17,7 +17,7 @@ use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
 /// Raised with every change of the layout, and of `Slot` or `LinkStats`.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 /// Bound on drones and cores that an attached segment may announce.
 const MAX_COUNT: usize = 1 << 16;
 /// Looks before sleeping, if every process has a core of its own.

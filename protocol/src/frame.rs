@@ -34,6 +34,8 @@ pub struct AirFrame {
     pub sequence: u32,
     /// True position of the sender when it sent, m.
     pub position_m: [f64; 2],
+    /// How long it waited for the channel and took it, ns; [`crate::radio::NEVER_AIRED`] if it was not sent at all.
+    pub queue_ns: u64,
     /// What was sent.
     pub frame: Frame,
 }

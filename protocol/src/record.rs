@@ -139,8 +139,10 @@ pub struct Spread {
 pub struct Totals {
     /// Frames sent.
     pub sent: u64,
-    /// Messages heard, over all receivers.
+    /// Messages heard, over all receivers, each counted once.
     pub delivered: u64,
+    /// Messages heard for the second time, over all receivers.
+    pub duplicates: u64,
     /// Not heard, by [`crate::radio::DropReason`] in its order.
     pub dropped: [u64; crate::radio::DROP_REASONS],
     /// From sending to hearing.

@@ -29,8 +29,10 @@ pub struct Slot {
     pub group: GroupId,
     /// The group it leads, with [`SLOT_LEADS`].
     pub led: GroupId,
-    /// Number of messages heard in this tick.
+    /// Number of messages heard in this tick, each counted once.
     pub heard: u32,
+    /// Number of messages heard in this tick for the second time.
+    pub duplicates: u32,
     /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
     /// [`SLOT_LEADS`], [`SLOT_QUEUED`].
@@ -45,6 +47,8 @@ pub struct Slot {
     pub step_ns: u32,
     /// The term it obeys, or leads in.
     pub term: Ballot,
+    /// Always 0.
+    pub reserved: [u32; 14],
 }
 
 /// Bins of [`LinkStats`]' histograms, one tick wide; the last also holds all that is longer.
@@ -54,8 +58,10 @@ pub const STAT_BINS: usize = 256;
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LinkStats {
-    /// Messages heard.
+    /// Messages heard, each counted once.
     pub heard: u64,
+    /// Messages heard for the second time.
+    pub duplicates: u64,
     /// Frames that could not be decoded.
     pub malformed: u64,
     /// Frames refused, by [`crate::radio::DropReason`].
@@ -69,7 +75,7 @@ pub struct LinkStats {
     /// Age of each known peer's pose, sampled at every beacon of one's own.
     pub age_bins: [u32; STAT_BINS],
     /// Always 0.
-    pub reserved: [u64; 6],
+    pub reserved: [u64; 4],
 }
 
 impl Default for LinkStats {
@@ -95,6 +101,7 @@ impl LinkStats {
     /// Adds another drone's counts.
     pub fn merge(&mut self, other: &Self) {
         self.heard += other.heard;
+        self.duplicates += other.duplicates;
         self.malformed += other.malformed;
         self.delay_max = self.delay_max.max(other.delay_max);
         self.age_max = self.age_max.max(other.age_max);

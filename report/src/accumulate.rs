@@ -283,13 +283,14 @@ fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
 fn messages(counts: &Counts, totals: Option<&Totals>) -> Messages {
     let Some(totals) = totals else {
         let (dropped, delay_s, age_s) = Default::default();
-        return Messages { sent: counts.sent, delivered: counts.heard, dropped, delay_s, age_s };
+        return Messages { sent: counts.sent, delivered: counts.heard, duplicates: None, dropped, delay_s, age_s };
     };
-    let [loss, burst, range, partition, deaf, malformed] = totals.dropped.map(Some);
+    let [loss, burst, range, partition, deaf, malformed, queue] = totals.dropped.map(Some);
     Messages {
         sent: totals.sent,
         delivered: totals.delivered,
-        dropped: Dropped { loss, burst, range, partition, deaf, malformed },
+        duplicates: Some(totals.duplicates),
+        dropped: Dropped { loss, burst, range, partition, deaf, malformed, queue },
         delay_s: spread(&totals.delay_s),
         age_s: spread(&totals.age_s),
     }

@@ -212,8 +212,10 @@ impl From<Ballot> for Term {
 pub struct Messages {
     /// Frames sent.
     pub sent: u64,
-    /// Messages heard, over all receivers.
+    /// Messages heard, over all receivers, each counted once.
     pub delivered: u64,
+    /// Messages heard for the second time, over all receivers.
+    pub duplicates: Option<u64>,
     /// Not heard, by reason.
     pub dropped: Dropped,
     /// From sending to hearing.
@@ -237,6 +239,8 @@ pub struct Dropped {
     pub deaf: Option<u64>,
     /// Not to be decoded.
     pub malformed: Option<u64>,
+    /// Waited too long for the channel.
+    pub queue: Option<u64>,
 }
 
 /// A range of counted times, s; null if nothing was counted.

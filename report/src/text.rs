@@ -144,6 +144,7 @@ fn leading(summary: &Summary) -> String {
 fn messages(summary: &Summary) -> String {
     let messages = &summary.messages;
     let mut text = format!("{} sent, {} heard", messages.sent, messages.delivered);
+    text.extend(messages.duplicates.filter(|&count| count > 0).map(|count| format!(", {count} of them twice")));
     let dropped = &messages.dropped;
     let reasons = [
         ("loss", dropped.loss),
@@ -152,6 +153,7 @@ fn messages(summary: &Summary) -> String {
         ("partition", dropped.partition),
         ("deaf", dropped.deaf),
         ("malformed", dropped.malformed),
+        ("queue", dropped.queue),
     ];
     for (reason, count) in reasons {
         text.extend(count.filter(|&count| count > 0).map(|count| format!(", {count} dropped ({reason})")));

@@ -110,6 +110,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         source: DroneId(0),
         sequence: sequence as u32,
         position_m: [0.0; 2],
+        queue_ns: 0,
         frame: message.encode(),
     };
     // Said when it is made, and repeated with another time stamp.
@@ -156,7 +157,8 @@ fn end() -> RunEvent {
     let totals = Totals {
         sent: 10,
         delivered: 30,
-        dropped: [1, 2, 3, 4, 5, 6],
+        duplicates: 8,
+        dropped: [1, 2, 3, 4, 5, 6, 7],
         delay_s: Spread { mean: Some(0.02), p50: Some(0.02), p99: Some(0.04), max: Some(0.04) },
         rejected_commands: 1,
         wall_s: 2.0,
@@ -259,7 +261,7 @@ fn the_worlds_last_word_counts() {
         (Some(2.0), Some(5.0), Some(200.0))
     );
     assert_eq!((summary.messages.sent, summary.messages.delivered, summary.rejected_commands), (10, 30, Some(1)));
-    assert_eq!((summary.messages.dropped.burst, summary.messages.dropped.malformed), (Some(2), Some(6)));
+    assert_eq!((summary.messages.dropped.burst, summary.messages.dropped.queue), (Some(2), Some(7)));
     assert_eq!((summary.messages.delay_s.p99, summary.messages.age_s.max), (Some(0.04), None));
     assert_eq!(summary.digest.as_deref(), Some("0000000000000b1f"));
     let steps = summary.step_us.unwrap();
@@ -308,7 +310,8 @@ const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s tick
     metrics.union metrics.connectivity elections leaders[].t_s leaders[].group leaders[].ballot.round \
     leaders[].ballot.incarnation leaders[].ballot.claimant leaders[].leader split_brain_s failover_s messages.sent \
     messages.delivered messages.dropped.loss messages.dropped.burst messages.dropped.range messages.dropped.partition \
-    messages.dropped.deaf messages.dropped.malformed messages.delay_s.mean messages.delay_s.p50 messages.delay_s.p99 \
+    messages.dropped.deaf messages.dropped.malformed messages.dropped.queue messages.duplicates \
+    messages.delay_s.mean messages.delay_s.p50 messages.delay_s.p99 \
     messages.delay_s.max messages.age_s.mean messages.age_s.p50 messages.age_s.p99 messages.age_s.max faults[].t_s \
     faults[].kind faults[].target faults[].scheduled deadline_misses step_us.p50 step_us.p99 step_us.max digest";
 
@@ -381,8 +384,8 @@ reached after 10.00 s: the formation is closed and every invariant held
   energy        3.000 kJ; 2.000 kJ until passed, 1.600 kJ of it since detection
   distances     at least: drones 30.00 m, obstacles 5.00 m
   leading       1 election; led again after a leader's death: 0.50 s
-  messages      10 sent, 30 heard, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
-5 dropped (deaf), 6 dropped (malformed); delay 20 ms, p99 40 ms
+  messages      10 sent, 30 heard, 8 of them twice, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
+5 dropped (deaf), 6 dropped (malformed), 7 dropped (queue); delay 20 ms, p99 40 ms
   fault         6.10 s: kill, drone 3 (not scheduled; signal 9)
   speed         2.00 s of wall time, 5.0 × real time; a drone's step 20 µs, p99 20 µs
   digest        0000000000000b1f

@@ -4,7 +4,7 @@ use skein_agent::{Heard, Pilot};
 use skein_protocol::digest::Digest;
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::frame::{AirFrame, Frame};
-use skein_protocol::radio::{DropReason, Link, Radio, Verdict};
+use skein_protocol::radio::{DropReason, Radio, Verdict};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime, Tick, Vec2};
 use std::cmp::Ordering;
@@ -14,12 +14,14 @@ use std::collections::BinaryHeap;
 #[derive(Clone, Copy, Debug)]
 struct Pending {
     due: SimTime,
+    /// Whether it was delivered before.
+    again: bool,
     frame: AirFrame,
 }
 
 impl Pending {
-    fn key(&self) -> (SimTime, DroneId, u32) {
-        (self.due, self.frame.source, self.frame.sequence)
+    fn key(&self) -> (SimTime, DroneId, u32, bool) {
+        (self.due, self.frame.source, self.frame.sequence, self.again)
     }
 }
 
@@ -55,6 +57,7 @@ pub struct Cockpit {
     frames: Vec<Frame>,
     ages: Vec<f64>,
     frames_total: u64,
+    duplicates: u32,
     dropped: [u32; skein_protocol::radio::DROP_REASONS],
 }
 
@@ -73,6 +76,7 @@ impl Cockpit {
             frames: Vec::new(),
             ages: Vec::new(),
             frames_total: 0,
+            duplicates: 0,
             dropped: Default::default(),
         }
     }
@@ -85,12 +89,12 @@ impl Cockpit {
         let tick_ns = (self.dt_s * 1e9).round() as i64;
         let me = self.me;
         for frame in down.frames.iter().filter(|frame| frame.source != me) {
-            let link =
-                Link { source: frame.source, destination: self.me, topic: frame.frame.kind, sequence: frame.sequence };
-            let sent = SimTime(frame.tick as i64 * tick_ns);
-            match self.radio.verdict(link, here - frame.position(), sent) {
+            match self.radio.fate(frame, me, here, tick_ns) {
                 Verdict::Drop(reason) => self.drop_frame(reason, stats),
-                Verdict::Deliver(due) => self.pending.push(Pending { due, frame: *frame }),
+                Verdict::Deliver { due, again } => {
+                    self.pending.push(Pending { due, again: false, frame: *frame });
+                    self.pending.extend(again.map(|due| Pending { due, again: true, frame: *frame }));
+                }
             }
         }
     }
@@ -106,7 +110,8 @@ impl Cockpit {
         self.frames_total += self.frames.len() as u64;
         self.count_ages(&senses, stats);
         *slot = Slot {
-            heard: self.heard.len() as u32,
+            heard: self.heard.len() as u32 - self.duplicates,
+            duplicates: std::mem::take(&mut self.duplicates),
             heard_hash,
             dropped: std::mem::take(&mut self.dropped),
             frames_total: self.frames_total,
@@ -116,19 +121,25 @@ impl Cockpit {
         &self.frames
     }
 
-    /// Takes what is due, in the order (due, source, sequence).
+    /// Takes what is due, in the order (due, source, sequence), a second copy after the first.
     fn deliver(&mut self, tick: Tick, now: SimTime, stats: &mut LinkStats) -> u64 {
         self.heard.clear();
         let mut digest = Digest::default();
         while self.pending.peek().is_some_and(|next| next.due <= now) {
-            let Some(Pending { frame, .. }) = self.pending.pop() else { break };
+            let Some(Pending { frame, again, .. }) = self.pending.pop() else { break };
             match Message::decode(&frame.frame) {
                 Ok(message) => {
                     digest.word(u64::from(frame.source.0)).word(u64::from(frame.sequence));
                     digest.bytes(&frame.frame.payload[..frame.frame.len as usize]);
-                    stats.delay(tick.saturating_sub(frame.tick));
+                    if again {
+                        self.duplicates += 1;
+                        stats.duplicates += 1;
+                    } else {
+                        stats.delay(tick.saturating_sub(frame.tick));
+                    }
                     self.heard.push(Heard { source: frame.source, message });
                 }
+                Err(_) if again => {}
                 Err(_) => {
                     stats.malformed += 1;
                     self.drop_frame(DropReason::Malformed, stats);

@@ -216,6 +216,8 @@ pub(crate) fn lengths(schema: &Json) -> String {
     let items = match kind(&schema["items"]) {
         "array" => format!("arrays, each {}", lengths(&schema["items"])),
         "number" => "numbers".to_owned(),
+        "integer" => "whole numbers".to_owned(),
+        _ if words(&schema["items"]).is_some() => "words".to_owned(),
         _ => "tables".to_owned(),
     };
     match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {

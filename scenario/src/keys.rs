@@ -2,6 +2,7 @@
 //! JSON schema, which makes the checks and the key reference.
 
 use crate::obstacle::Obstacle;
+use crate::radio::RadioKeys;
 use crate::strategy::Strategy;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -268,21 +269,6 @@ impl Default for Sensors {
     fn default() -> Self {
         Self { detection_range_m: 90.0, ranging: true }
     }
-}
-
-/// What the air does to frames.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RadioKeys {
-    /// Time on the air; a frame takes one tick at least.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub delay_s: f64,
-    /// Probability that a receiver does not hear a frame, independent for each frame and receiver.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub loss: f64,
-    /// Greatest distance at which a frame is heard; absent: no limit.
-    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
-    pub range_m: Option<f64>,
 }
 
 /// Distances kept from obstacles and in queues.

@@ -1,6 +1,6 @@
 //! TOML → a checked [`Scenario`]. Pure: text in, scenario out; reading files is the caller's.
 //!
-//! The types in `keys`, `obstacle` and `strategy` are the one source of truth: schemars makes the JSON [`schema`] of
+//! The types in `keys`, `obstacle`, `radio` and `strategy` are the one source of truth: schemars makes the JSON [`schema`] of
 //! their doc comments, ranges and defaults; the checks walk the text against that schema, and [`markdown`] prints it as
 //! the key reference `docs/scenario.md`.
 
@@ -11,6 +11,7 @@ mod near;
 mod node;
 mod obstacle;
 mod parse;
+mod radio;
 mod reference;
 mod resolved;
 mod rules;
@@ -19,9 +20,10 @@ mod strategy;
 pub use error::{Issue, ScenarioErrors};
 pub use keys::{
     Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
-    Protocol, RadioKeys, Reformation, Scenario, Sensors, Time,
+    Protocol, Reformation, Scenario, Sensors, Time,
 };
 pub use obstacle::Obstacle;
 pub use parse::Source;
+pub use radio::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
 pub use reference::{Key, keys, markdown, schema};
 pub use strategy::{Strategy, StrategyError};

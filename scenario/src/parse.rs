@@ -4,6 +4,7 @@ use crate::check::{Complaint, check};
 use crate::error::{Issue, Lines, ScenarioErrors};
 use crate::keys::Scenario;
 use crate::node::{Data, Node, Place};
+use crate::radio;
 use crate::reference::schema;
 use crate::rules::{self, Broken};
 use std::ops::Range;
@@ -91,11 +92,12 @@ impl<'a> Text<'a> {
     }
 
     fn finish(&self, root: &Node, mut issues: Vec<Issue>) -> Result<Scenario, ScenarioErrors> {
-        let (json, complaints) = check(root, &schema());
+        let (mut json, complaints) = check(root, &schema());
         issues.extend(complaints.iter().map(|c: &Complaint| self.issue(&c.place, &c.key, &c.message)));
         if !issues.is_empty() {
             return Err(self.errors(issues));
         }
+        radio::fill_preset(&mut json);
         let mut scenario: Scenario = serde_json::from_value(json)
             .map_err(|error| self.errors(vec![self.issue(&root.place, "", &error.to_string())]))?;
         issues.extend(self.resolve(root, &mut scenario));

@@ -55,9 +55,11 @@ fn collect(table: &Json, path: &str, keys: &mut Vec<Key>) {
         let variants = schema["items"]["oneOf"].as_array().into_iter().flatten();
         let before = keys.len();
         variants.filter_map(|v| Some((v, tag(v)?.1))).for_each(|(v, word)| collect(v, &format!("{path}.{word}"), keys));
-        match kind(schema) {
+        let here = present(schema);
+        match kind(here) {
             _ if keys.len() > before => {}
-            "object" => collect(schema, &path, keys),
+            "object" => collect(here, &path, keys),
+            "array" if kind(&here["items"]) == "object" => collect(&here["items"], &path, keys),
             _ => keys.push(key(path, schema, is_required(table, name))),
         }
     }
@@ -84,8 +86,16 @@ fn key(path: String, schema: &Json, required: bool) -> Key {
 
 /// The unit that a key's name ends with; indices behind it are skipped.
 pub(crate) fn unit(path: &str) -> Option<&'static str> {
-    const ENDINGS: [(&str, &str); 6] =
-        [("_mps2", "m/s²"), ("_mps", "m/s"), ("_per_s", "1/s"), ("_rad", "rad"), ("_s", "s"), ("_m", "m")];
+    const ENDINGS: [(&str, &str); 8] = [
+        ("_bps", "bit/s"),
+        ("_db", "dB"),
+        ("_mps2", "m/s²"),
+        ("_mps", "m/s"),
+        ("_per_s", "1/s"),
+        ("_rad", "rad"),
+        ("_s", "s"),
+        ("_m", "m"),
+    ];
     let name = path.rsplit('.').find(|step| step.parse::<usize>().is_err())?;
     ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
 }
@@ -124,6 +134,8 @@ fn array_values(schema: &Json) -> String {
     let items = present(&schema["items"]);
     match kind(items) {
         "array" => format!("{count} × [{}]", array_values(items)),
+        "integer" => format!("{count} whole numbers {}", range(items)),
+        _ if words(items).is_some() => format!("{count} of {}", values(items)),
         _ => format!("{count} numbers {}", range(items)),
     }
 }
@@ -157,17 +169,28 @@ A scenario is a TOML file. SI units, angles in radians; world frame x = flight d
 ";
 
 fn heading(page: &mut String, schema: &Json, table: &str) {
-    let (title, about) = match table.split_once('.') {
-        None if table.is_empty() => ("At the top".to_owned(), String::new()),
-        None => (format!("`[{table}]`"), text(&schema["properties"][table])),
-        Some((list, word)) => {
-            let variants = schema["properties"][list]["items"]["oneOf"].as_array().into_iter().flatten();
-            let about = variants.filter(|v| tag(v).is_some_and(|(_, w)| w == word)).map(text).collect();
-            (format!("`[[{list}]]` with shape = \"{word}\""), about)
-        }
-    };
+    let (title, about) =
+        if table.is_empty() { ("At the top".to_owned(), String::new()) } else { titled(schema, table) };
     let about = if about.is_empty() { about } else { format!("{about}\n\n") };
     let _ = write!(page, "\n## {title}\n\n{about}| key | unit | values | default | meaning |\n|---|---|---|---|---|\n");
+}
+
+/// A table as it is written, and what it is: `[time]`, `[[radio.rule]]`, `[[obstacle]]` with its variant's word.
+fn titled(schema: &Json, table: &str) -> (String, String) {
+    let (mut at, mut about, mut name) = (schema, String::new(), Vec::new());
+    for step in table.split('.') {
+        let variants = at["items"]["oneOf"].as_array().into_iter().flatten();
+        if let Some((variant, (key, word))) = variants.filter_map(|v| Some((v, tag(v)?))).find(|(_, (_, w))| *w == step)
+        {
+            return (format!("`[[{}]]` with {key} = \"{word}\"", name.join(".")), text(variant));
+        }
+        let inner = if kind(at) == "array" { &at["items"] } else { at };
+        about = text(&inner["properties"][step]);
+        at = present(&inner["properties"][step]);
+        name.push(step);
+    }
+    let name = name.join(".");
+    (if kind(at) == "array" { format!("`[[{name}]]`") } else { format!("`[{name}]`") }, about)
 }
 
 fn text(schema: &Json) -> String {

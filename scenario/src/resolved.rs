@@ -3,7 +3,6 @@
 use crate::keys::{FormationShape, Scenario};
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
-use skein_protocol::radio::Radio;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
 /// Standard gravity as the paper has it, m/s².
@@ -45,12 +44,6 @@ impl Scenario {
     /// [`ShapeError`], never from a scenario that [`Scenario::parse`] or [`Scenario::from_json`] made.
     pub fn shapes(&self) -> Result<Vec<ConvexShape>, ShapeError> {
         self.obstacles.iter().map(crate::Obstacle::shape).collect()
-    }
-
-    /// What the air does to frames, keyed by the scenario's seed.
-    #[must_use]
-    pub fn radio(&self) -> Radio {
-        Radio { seed: self.seed, delay_s: self.radio.delay_s, loss: self.radio.loss, range_m: self.radio.range_m }
     }
 
     /// The stopping distance at nominal speed, m: E2 = E4 + E3 = v·t_c + v²/(2 g c_d), where g·c_d is no more than the

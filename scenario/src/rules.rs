@@ -28,6 +28,7 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
     rules.strategy();
     rules.spacing();
     rules.obstacles();
+    rules.broken.extend(crate::radio::broken(scenario));
     rules.broken
 }
 

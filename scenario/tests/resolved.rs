@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::radio::Radio;
 use skein_scenario::{Failsafe, Scenario, Source, Strategy, schema};
 
 const SOURCE: Source<'_> = Source { name: "s.toml", stem: "my mission" };
@@ -20,7 +21,8 @@ fn the_least_scenario_has_the_papers_defaults() {
     assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
     assert!((s.stopping_distance_m() - 10.0).abs() < 1e-9);
     assert_eq!(s.starts(), Shape::NestedV.slots(8, 35.0));
-    assert_eq!((s.radio().seed, s.radio().range_m, s.faults.failsafe), (1, None, Failsafe::Hover));
+    assert_eq!((s.radio(), s.channel()), (Radio { seed: 1, ..Radio::default() }, None));
+    assert_eq!(s.faults.failsafe, Failsafe::Hover);
     assert!(s.shapes().unwrap().is_empty());
 }
 
@@ -39,7 +41,8 @@ fn overrides_are_toml_or_else_words() {
     let s = parse(text, &sets);
     assert_eq!(s.strategy, Strategy::Fixed { left: 5, right: 3 });
     assert_eq!(s.shapes().unwrap()[0].centre(), Vec2::new(300.0, 21.0));
-    assert_eq!((s.radio().delay_s, s.radio().range_m, s.radio().seed), (0.2, Some(500.0), i64::MAX as u64));
+    let Radio { seed, air, .. } = s.radio();
+    assert_eq!((air.delay.mean_s, air.range.map(|range| range.half_m), seed), (0.2, Some(500.0), i64::MAX as u64));
     assert_eq!(s.faults.failsafe, Failsafe::Land);
     assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
 }

@@ -2,6 +2,7 @@
 
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::radio::Channel;
 use skein_protocol::shape::ShapeError;
 use thiserror::Error;
 
@@ -56,6 +57,8 @@ pub struct WorldParams {
     pub detection_range_m: f64,
     /// Neighbours within this distance are sensed, m; `None`: no ranging.
     pub ranging_m: Option<f64>,
+    /// The channel that all drones share; `None`: its bandwidth is no limit.
+    pub channel: Option<Channel>,
     /// What a drone does whose process is gone.
     pub failsafe: Failsafe,
     /// When the mission is over.
@@ -82,6 +85,9 @@ pub enum WorldError {
         /// What it is.
         value: f64,
     },
+    /// The channel's bit rate is not positive.
+    #[error("the channel has {0} bit/s, expected more than 0")]
+    Rate(f64),
     /// A start is not finite.
     #[error("drone {0} starts at a position or with a velocity that is not finite")]
     Start(usize),
@@ -105,7 +111,7 @@ impl WorldParams {
     /// Checks what a world relies on.
     ///
     /// # Errors
-    /// [`WorldError::Tick`], [`WorldError::Parameter`].
+    /// [`WorldError::Tick`], [`WorldError::Rate`], [`WorldError::Parameter`].
     pub fn check(&self) -> Result<(), WorldError> {
         if self.dt_ns <= 0 {
             return Err(WorldError::Tick(self.dt_ns));
@@ -122,6 +128,10 @@ impl WorldParams {
             ("arrival_error_m", self.arrival_error_m),
             ("spacing_m", self.spacing_m),
         ];
+        let rate = self.channel.map_or(1.0, |channel| channel.rate_bps);
+        if rate.is_nan() || rate <= 0.0 {
+            return Err(WorldError::Rate(rate));
+        }
         let bad = named.into_iter().find(|(_, value)| value.is_nan() || *value < 0.0);
         bad.map_or(Ok(()), |(name, value)| Err(WorldError::Parameter { name, value }))
     }
@@ -136,6 +146,8 @@ mod tests {
     fn bad_parameters_are_named() {
         assert_eq!(params().check(), Ok(()));
         assert_eq!(WorldParams { dt_ns: 0, ..params() }.check(), Err(WorldError::Tick(0)));
+        let channel = Some(Channel { seed: 1, rate_bps: 0.0, limit_s: 1.0 });
+        assert_eq!(WorldParams { channel, ..params() }.check(), Err(WorldError::Rate(0.0)));
         let error = WorldParams { clearance_m: -1.0, ..params() }.check().unwrap_err();
         assert_eq!(error.to_string(), "clearance_m is -1, expected a number of at least 0");
         assert!(WorldParams { ranging_m: Some(f64::NAN), ..params() }.check().is_err());

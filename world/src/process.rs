@@ -40,7 +40,8 @@ impl Process {
     /// Its last command goes on; it heard nothing in this tick.
     pub fn hold(&mut self) {
         self.answer = Answer::Late;
-        self.slot = Slot { heard: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
+        self.slot =
+            Slot { heard: 0, duplicates: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
     }
 
     /// The number of the next frame, from 0; it goes on over restarts.

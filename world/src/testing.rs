@@ -21,6 +21,7 @@ pub(crate) fn params() -> WorldParams {
         planning_distance_m: 20.0,
         detection_range_m: 115.0,
         ranging_m: Some(66.0),
+        channel: None,
         failsafe: Failsafe::Hover,
         end: End::Hold { stop_x_m: 1e9 },
         arrival_error_m: 0.8,

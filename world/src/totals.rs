@@ -16,6 +16,7 @@ pub(crate) fn close(counted: &Totals, stats: &LinkStats, dt_s: f64, wall_s: f64)
 /// Adds what a drone heard and did not hear in a tick.
 pub(crate) fn tally(counted: &mut Totals, slot: &Slot) {
     counted.delivered += u64::from(slot.heard);
+    counted.duplicates += u64::from(slot.duplicates);
     counted.dropped.iter_mut().zip(slot.dropped).for_each(|(sum, dropped)| *sum += u64::from(dropped));
 }
 
@@ -68,8 +69,8 @@ mod tests {
     #[test]
     fn drops_add_up_by_reason() {
         let mut counted = Totals::default();
-        let slot = Slot { heard: 2, dropped: [1, 0, 0, 4, 0, 0], ..Slot::default() };
+        let slot = Slot { heard: 2, duplicates: 1, dropped: [1, 0, 0, 4, 0, 0, 5], ..Slot::default() };
         (0..3).for_each(|_| tally(&mut counted, &slot));
-        assert_eq!((counted.delivered, counted.dropped), (6, [3, 0, 0, 12, 0, 0]));
+        assert_eq!((counted.delivered, counted.duplicates, counted.dropped), (6, 3, [3, 0, 0, 12, 0, 0, 15]));
     }
 }

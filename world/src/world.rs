@@ -18,10 +18,15 @@ use crate::totals;
 use skein_protocol::digest::Digest;
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
+use skein_protocol::radio::{DropReason, Queue};
 use skein_protocol::record::{DroneRow, FaultKind, Happening, Outcome, RecordHead, RecordView, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
+
+/// The first so many drop counters are in every digest. Duplicates and later reasons are in it only where they count, so
+/// that a mission without them keeps the digest it had before there were any.
+const ALWAYS_FOLDED: usize = DropReason::Queue as usize;
 
 /// The truth of one mission.
 #[derive(Clone)]
@@ -44,6 +49,8 @@ pub struct World {
     folded: Vec<u8>,
     /// Frames sent in this tick.
     sent: Vec<AirFrame>,
+    /// What they wait in for the channel.
+    queue: Option<Queue>,
     down: Downlink,
     head: RecordHead,
     rows: Vec<DroneRow>,
@@ -75,6 +82,7 @@ impl World {
             digest: Digest::default(),
             folded: Vec::new(),
             sent: Vec::new(),
+            queue: params.channel.map(Queue::new),
             down: Downlink::default(),
             head: RecordHead::default(),
             rows: Vec::new(),
@@ -121,7 +129,8 @@ impl World {
     pub fn take_frames(&mut self, id: DroneId, frames: &[Frame]) {
         let Some(body) = self.bodies.get(id.index()).filter(|body| body.alive) else { return };
         let (tick, position_m, process) = (self.tick, body.position.into(), &mut self.processes[id.index()]);
-        let stamp = |&frame| AirFrame { tick, source: id, sequence: process.next_sequence(), position_m, frame };
+        let stamp =
+            |&frame| AirFrame { tick, source: id, sequence: process.next_sequence(), position_m, queue_ns: 0, frame };
         self.sent.extend(frames.iter().map(stamp));
         self.totals.sent += frames.len() as u64;
     }
@@ -158,6 +167,9 @@ impl World {
     pub fn advance(&mut self) {
         self.sent.sort_by_key(|sent| (sent.source, sent.sequence));
         let (opening, end) = (self.now(), self.time_of(self.tick + 1));
+        if let Some(queue) = &mut self.queue {
+            queue.pass(opening, &mut self.sent);
+        }
         self.follow_processes(opening);
         self.move_bodies();
         self.survey();
@@ -308,8 +320,12 @@ impl World {
             word(u64::from(body.alive));
             if body.alive {
                 word(u64::from(process.slot.heard));
-                process.slot.dropped.iter().for_each(|&count| word(u64::from(count)));
+                process.slot.dropped[..ALWAYS_FOLDED].iter().for_each(|&count| word(u64::from(count)));
                 word(process.slot.heard_hash);
+                let later = std::iter::once(&process.slot.duplicates).chain(&process.slot.dropped[ALWAYS_FOLDED..]);
+                later.zip(1u64..).filter(|(count, _)| **count > 0).for_each(|(&count, which)| {
+                    word(which << 32 | u64::from(count));
+                });
             }
         }
         self.digest.bytes(&self.folded);

@@ -46,7 +46,7 @@ pub const METRICS: [Metric; 17] = [
     of_all("messages_delivered", "messages delivered", |s, _| Some(s.messages.delivered as f64)),
     of_all("messages_lost", "messages lost", |s, _| {
         let d = &s.messages.dropped;
-        let counts = [d.loss, d.burst, d.range, d.partition, d.deaf, d.malformed];
+        let counts = [d.loss, d.burst, d.range, d.partition, d.deaf, d.malformed, d.queue];
         Some(counts.into_iter().flatten().sum::<u64>() as f64)
     }),
 ];

@@ -260,6 +260,8 @@ fn equal_runs_have_equal_digests_and_one_bit_makes_another() {
     assert_ne!(plain, digest_with(|slot| slot.heard_hash ^= 1));
     assert_ne!(plain, digest_with(|slot| slot.heard += 1));
     assert_ne!(plain, digest_with(|slot| slot.dropped[4] += 1));
+    let later = [digest_with(|slot| slot.duplicates += 1), digest_with(|slot| slot.dropped[6] += 1)];
+    assert!(later[0] != plain && later[1] != plain && later[0] != later[1], "{later:?}");
     assert_ne!(plain, digest_with(|slot| slot.acceleration_mps2[1] = f64::from_bits((-0.2f64).to_bits() ^ 1 << 20)));
 }
 

@@ -1,0 +1,74 @@
+//! The bandwidth that all drones share: frames queue for the channel before they are on the air.
+
+use crate::frame::{AirFrame, FRAME_PAYLOAD};
+use crate::time::SimTime;
+use xxhash_rust::xxh3::xxh3_64_with_seed;
+
+/// [`AirFrame::queue_ns`] of a frame that never was on the air: it would have waited longer than the limit.
+pub const NEVER_AIRED: u64 = u64::MAX;
+
+/// Bytes of a frame before its payload: kind, version, length.
+const HEAD_BYTES: u64 = 8;
+
+/// A channel of finite bandwidth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel {
+    /// Key of the order in which drones get the channel in a tick.
+    pub seed: u64,
+    /// Bit rate that is left for frames, bit/s; positive.
+    pub rate_bps: f64,
+    /// A frame that would wait longer than this for the channel is not sent, s.
+    pub limit_s: f64,
+}
+
+impl Channel {
+    /// How long a frame takes the channel, ns.
+    #[must_use]
+    pub fn airtime_ns(&self, frame: &AirFrame) -> u64 {
+        let bytes = HEAD_BYTES + u64::from(frame.frame.len).min(FRAME_PAYLOAD as u64);
+        (bytes as f64 * 8e9 / self.rate_bps).round() as u64
+    }
+}
+
+/// A channel and the frames that wait for it.
+#[derive(Clone, Debug)]
+pub struct Queue {
+    channel: Channel,
+    /// When the channel is free again.
+    free: SimTime,
+    order: Vec<usize>,
+}
+
+impl Queue {
+    /// An empty queue.
+    #[must_use]
+    pub fn new(channel: Channel) -> Self {
+        Self { channel, free: SimTime::ZERO, order: Vec::new() }
+    }
+
+    /// Queues all frames of one tick, sent at `sent`, behind those of earlier ticks: sets how long each waits and takes
+    /// the channel. Who comes first in a tick is drawn, one drone's frames stay in their order.
+    pub fn pass(&mut self, sent: SimTime, frames: &mut [AirFrame]) {
+        let seed = self.channel.seed;
+        self.order.clear();
+        self.order.extend(0..frames.len());
+        self.order.sort_by_cached_key(|&index| {
+            let AirFrame { tick, source, sequence, .. } = frames[index];
+            let key =
+                (u128::from(tick) << 64) | (u128::from(source.0) << 32) | u128::from(u32::from_le_bytes(*b"queu"));
+            (xxh3_64_with_seed(&key.to_le_bytes(), seed), source, sequence)
+        });
+        let limit_ns = SimTime::ZERO.after(self.channel.limit_s).0;
+        for &index in &self.order {
+            let frame = &mut frames[index];
+            let start = self.free.max(sent);
+            let airtime_ns = self.channel.airtime_ns(frame);
+            if start - sent > limit_ns {
+                frame.queue_ns = NEVER_AIRED;
+                continue;
+            }
+            self.free = start + i64::try_from(airtime_ns).unwrap_or(i64::MAX);
+            frame.queue_ns = (self.free - sent).unsigned_abs();
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The radio between sending and hearing: whether a frame is heard, when, and how often. A pure, keyed function without
+//! shared generator or memory, so that it does not matter which process asks first, and that any verdict can be looked up
+//! afterwards. `docs/radio.md` has the models with their formulas.
+
+mod air;
+mod burst;
+mod channel;
+mod key;
+mod rule;
+
+pub use air::{Air, Delay, DelayModel, Range};
+pub use burst::{BLOCK_BURSTS, Burst, Scope};
+pub use channel::{Channel, NEVER_AIRED, Queue};
+pub use rule::Rule;
+
+use crate::Vec2;
+use crate::frame::AirFrame;
+use crate::ids::DroneId;
+use crate::message::Topic;
+use crate::record::RecordView;
+use crate::time::SimTime;
+use key::Draws;
+use serde::{Deserialize, Serialize};
+
+/// Number of [`DropReason`]s.
+pub const DROP_REASONS: usize = 7;
+
+/// Why a frame was not heard.
+#[repr(usize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DropReason {
+    /// Lost on its own.
+    Loss = 0,
+    /// Lost in a burst.
+    Burst = 1,
+    /// Out of range.
+    Range = 2,
+    /// Between two sides of a partition.
+    Partition = 3,
+    /// The receiver is deaf, or the sender mute.
+    Deaf = 4,
+    /// It could not be decoded.
+    Malformed = 5,
+    /// It would have waited too long for the channel.
+    Queue = 6,
+}
+
+impl DropReason {
+    /// All reasons, in the order of their counters.
+    pub const ALL: [Self; DROP_REASONS] =
+        [Self::Loss, Self::Burst, Self::Range, Self::Partition, Self::Deaf, Self::Malformed, Self::Queue];
+}
+
+/// What the air does to frames between any two drones. The default is ideal: nothing is lost, a frame takes one tick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Radio {
+    /// Key of all verdicts.
+    pub seed: u64,
+    /// What the air does where no rule says otherwise.
+    pub air: Air,
+    /// How different the directions of a link are, from 0: one has its delay and its loss multiplied, the other
+    /// divided, by a factor drawn for each pair of drones, log-uniformly from 1 to 1 + this.
+    pub asymmetry: f64,
+    /// Where the air is another. Of several rules about one frame the last counts.
+    pub rules: Vec<Rule>,
+}
+
+/// Which frame, from whom, to whom.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// Who sent it.
+    pub source: DroneId,
+    /// Whose radio asks.
+    pub destination: DroneId,
+    /// The frame's kind as it stands on the wire.
+    pub topic: u16,
+    /// Running number of the source's frames.
+    pub sequence: u32,
+}
+
+impl Link {
+    /// A frame and one of its receivers.
+    #[must_use]
+    pub fn of(frame: &AirFrame, destination: DroneId) -> Self {
+        Self { source: frame.source, destination, topic: frame.frame.kind, sequence: frame.sequence }
+    }
+
+    /// The topic, if the kind is known.
+    #[must_use]
+    pub fn topic(&self) -> Option<Topic> {
+        Topic::from_wire(self.topic)
+    }
+}
+
+/// What becomes of a frame at one receiver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Not heard.
+    Drop(DropReason),
+    /// Heard.
+    Deliver {
+        /// In the first tick at or after this instant.
+        due: SimTime,
+        /// And once more, not before that, in the first tick at or after this one.
+        again: Option<SimTime>,
+    },
+}
+
+impl Radio {
+    /// What becomes of a frame that went on the air at `aired` and flew over `path` (from sender to receiver, m).
+    #[must_use]
+    pub fn verdict(&self, link: Link, path: Vec2, aired: SimTime) -> Verdict {
+        let air = self.air_of(link);
+        let chance = |purpose| Draws::of_frame(self.seed, link, purpose).unit();
+        if let Some(range) = air.range {
+            let heard = range.heard(path.norm_squared());
+            if heard < 1.0 && chance(b"rnge") >= heard {
+                return Verdict::Drop(DropReason::Range);
+            }
+        }
+        if let Some(burst) = air.burst
+            && burst.rages(self.seed, link, aired)
+            && chance(b"lstb") < burst.loss
+        {
+            return Verdict::Drop(DropReason::Burst);
+        }
+        let factor = self.factor(link);
+        if air.loss > 0.0 && chance(b"loss") < air.loss * factor {
+            return Verdict::Drop(DropReason::Loss);
+        }
+        let arrival = |purpose| aired.after(factor * air.delay.draw(Draws::of_frame(self.seed, link, purpose)));
+        let due = arrival(b"dely");
+        if air.duplicate > 0.0 && chance(b"dupl") < air.duplicate {
+            let copy = arrival(b"copy");
+            return Verdict::Deliver { due: due.min(copy), again: Some(due.max(copy)) };
+        }
+        Verdict::Deliver { due, again: None }
+    }
+
+    /// What becomes of a frame, as the world stamped it, at a receiver that is `here` (m) one tick after it was sent.
+    #[must_use]
+    pub fn fate(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Verdict {
+        if frame.queue_ns == NEVER_AIRED {
+            return Verdict::Drop(DropReason::Queue);
+        }
+        let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
+        let aired = sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX);
+        self.verdict(Link::of(frame, receiver), here - frame.position(), aired)
+    }
+
+    /// Looks up what became of every frame in a tick's record, at every other drone that was alive at the tick's end.
+    /// What is dropped for other reasons than the radio's (a partition, a deaf receiver) is not known here.
+    pub fn fates<'a>(
+        &'a self,
+        record: RecordView<'a>,
+        dt_ns: i64,
+    ) -> impl Iterator<Item = (&'a AirFrame, DroneId, Verdict)> + 'a {
+        let receivers = (0u32..).map(DroneId).zip(record.rows).filter(|(_, row)| row.alive());
+        receivers.flat_map(move |(receiver, row)| {
+            let others = record.frames.iter().filter(move |frame| frame.source != receiver);
+            others.map(move |frame| (frame, receiver, self.fate(frame, receiver, row.position_m.into(), dt_ns)))
+        })
+    }
+
+    fn air_of(&self, link: Link) -> &Air {
+        self.rules.iter().rev().find(|rule| rule.covers(link)).map_or(&self.air, |rule| &rule.air)
+    }
+
+    /// By what delay and loss of this direction are multiplied; the other direction's factor is its inverse.
+    #[must_use]
+    pub fn factor(&self, link: Link) -> f64 {
+        if self.asymmetry <= 0.0 {
+            return 1.0;
+        }
+        let (low, high) = (link.source.min(link.destination), link.source.max(link.destination));
+        let part = 2.0 * Draws::of_pair(self.seed, [low, high], 0, b"asym").unit() - 1.0;
+        let part = if link.source == low { part } else { -part };
+        libm::pow(1.0 + self.asymmetry, part)
+    }
+}

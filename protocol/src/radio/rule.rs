@@ -1,0 +1,30 @@
+//! Another air for some topics, some senders, some receivers.
+
+use super::{Air, Link};
+use crate::ids::DroneId;
+use crate::message::Topic;
+use std::collections::BTreeSet;
+
+/// Another air for the frames that it is about: those that meet all of its conditions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rule {
+    /// Of these topics; `None`: of all.
+    pub topics: Option<BTreeSet<Topic>>,
+    /// Sent by these drones; `None`: by all.
+    pub from: Option<BTreeSet<DroneId>>,
+    /// At these receivers; `None`: at all.
+    pub to: Option<BTreeSet<DroneId>>,
+    /// What the air does to them.
+    pub air: Air,
+}
+
+impl Rule {
+    /// Whether it is about this frame. A frame of an unknown kind has no topic.
+    #[must_use]
+    pub fn covers(&self, link: Link) -> bool {
+        let among = |set: &Option<BTreeSet<DroneId>>, id| set.as_ref().is_none_or(|set| set.contains(&id));
+        among(&self.from, link.source)
+            && among(&self.to, link.destination)
+            && self.topics.as_ref().is_none_or(|set| link.topic().is_some_and(|topic| set.contains(&topic)))
+    }
+}

@@ -1,0 +1,340 @@
+//! The radio against its models: rates, means, deviations, lengths. Seeds are fixed, so that nothing here depends on
+//! chance; each statistic is within five standard errors of what its model says, which a wrong model is not.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+use skein_protocol::message::Topic;
+use skein_protocol::radio::{
+    Air, BLOCK_BURSTS, Burst, Delay, DelayModel, DropReason, Link, Radio, Range, Rule, Scope, Verdict,
+};
+use skein_protocol::{DroneId, SimTime, Vec2};
+use std::collections::BTreeSet;
+
+/// Standard errors that a statistic may be off.
+const ERRORS: f64 = 5.0;
+/// Frames of one experiment.
+const MANY: u32 = 40_000;
+/// Time between two frames, s: that of pose beacons.
+const PERIOD_S: f64 = 0.1;
+
+fn link(source: u32, destination: u32, sequence: u32) -> Link {
+    Link { source: DroneId(source), destination: DroneId(destination), topic: Topic::Pose as u16, sequence }
+}
+
+fn radio(air: Air) -> Radio {
+    Radio { seed: 3, air, ..Radio::default() }
+}
+
+/// The verdicts on frames of one link, one every [`PERIOD_S`], over `path_m`.
+fn verdicts(radio: &Radio, (source, destination): (u32, u32), path_m: f64) -> Vec<Verdict> {
+    let at = |sequence| SimTime::from_secs(f64::from(sequence) * PERIOD_S);
+    (0..MANY).map(|s| radio.verdict(link(source, destination, s), Vec2::new(path_m, 0.0), at(s))).collect()
+}
+
+/// Which of them were dropped for this reason.
+fn dropped(verdicts: &[Verdict], reason: DropReason) -> Vec<bool> {
+    verdicts.iter().map(|verdict| *verdict == Verdict::Drop(reason)).collect()
+}
+
+fn rate(hits: &[bool]) -> f64 {
+    hits.iter().filter(|hit| **hit).count() as f64 / hits.len() as f64
+}
+
+/// Time on the air of what was delivered, s.
+fn delays(radio: &Radio, pair: (u32, u32)) -> Vec<f64> {
+    let sent = |sequence: usize| SimTime::from_secs(sequence as f64 * PERIOD_S);
+    let delay = |(sequence, verdict): (usize, Verdict)| match verdict {
+        Verdict::Deliver { due, .. } => Some(due.since(sent(sequence))),
+        Verdict::Drop(_) => None,
+    };
+    verdicts(radio, pair, 0.0).into_iter().enumerate().filter_map(delay).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Central moment.
+fn moment(values: &[f64], order: i32) -> f64 {
+    let centre = mean(values);
+    values.iter().map(|value| (value - centre).powi(order)).sum::<f64>() / values.len() as f64
+}
+
+#[track_caller]
+fn assert_near(what: &str, found: f64, wanted: f64, standard_error: f64) {
+    let off = (found - wanted).abs() / standard_error;
+    assert!(off < ERRORS, "{what}: {found}, the model says {wanted} ± {standard_error}: {off:.1} standard errors off");
+}
+
+/// A share of `count` independent draws.
+#[track_caller]
+fn assert_rate(what: &str, found: f64, wanted: f64, count: f64) {
+    assert_near(what, found, wanted, (wanted * (1.0 - wanted) / count).sqrt());
+}
+
+/// Mean and variance, by the standard errors that the sample's own fourth moment gives.
+#[track_caller]
+fn assert_moments(what: &str, values: &[f64], wanted_mean: f64, wanted_variance: f64) {
+    let (count, variance) = (values.len() as f64, moment(values, 2));
+    assert_near(what, mean(values), wanted_mean, (variance / count).sqrt());
+    let error = ((moment(values, 4) - variance * variance) / count).sqrt();
+    assert_near(what, variance, wanted_variance, error);
+}
+
+#[test]
+fn an_ideal_radio_delivers_once_and_at_once() {
+    let verdict = Radio::default().verdict(link(0, 1, 0), Vec2::new(1e6, 0.0), SimTime(5));
+    assert_eq!(verdict, Verdict::Deliver { due: SimTime(5), again: None });
+}
+
+#[test]
+fn verdicts_are_keyed_not_drawn_in_turn() {
+    let air = Air {
+        delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.05 },
+        loss: 0.3,
+        burst: Some(Burst { share: 0.2, length_s: 0.5, loss: 1.0, scope: Scope::Link }),
+        range: Some(Range { half_m: 100.0, shadowing_db: 6.0, exponent: 2.0 }),
+        duplicate: 0.2,
+    };
+    let radio = Radio { asymmetry: 1.0, ..radio(air) };
+    let ask = |s| radio.verdict(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s)));
+    let forward: Vec<_> = (0..200).map(ask).collect();
+    let mut backward: Vec<_> = (0..200).rev().map(ask).collect();
+    backward.reverse();
+    assert_eq!(forward, backward);
+    let other = Radio { seed: 4, ..radio.clone() };
+    let differ = (0..200)
+        .filter(|&s| other.verdict(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s))) != ask(s));
+    assert!(differ.count() > 100, "another seed is another air");
+}
+
+/// What a fixed delay and Bernoulli losses gave before there were other models: digests of such missions rest on it.
+#[test]
+fn a_plain_loss_stays_as_it_was() {
+    let radio = Radio { seed: 9, air: Air { loss: 0.5, ..Air::default() }, ..Radio::default() };
+    let lost: String = (0..32)
+        .map(|s| match radio.verdict(link(2, 3, s), Vec2::zeros(), SimTime::ZERO) {
+            Verdict::Drop(DropReason::Loss) => 'x',
+            _ => '.',
+        })
+        .collect();
+    assert_eq!(lost, "..x.x...xxxx.x......x.x..x...xx.");
+}
+
+#[test]
+fn loss_has_its_rate_on_every_link_and_no_memory() {
+    let radio = radio(Air { loss: 0.2, ..Air::default() });
+    for pair in [(0, 1), (1, 0), (6, 7)] {
+        let lost = dropped(&verdicts(&radio, pair, 0.0), DropReason::Loss);
+        assert_rate("loss", rate(&lost), 0.2, f64::from(MANY));
+        let twice: Vec<bool> = lost.windows(2).map(|pair| pair[0] && pair[1]).collect();
+        assert_rate("two losses in turn", rate(&twice), 0.04, f64::from(MANY) / 2.0);
+    }
+}
+
+#[test]
+fn links_are_independent_of_each_other() {
+    let burst = Burst { share: 0.3, length_s: 0.2, loss: 1.0, scope: Scope::Direction };
+    let airs = [Air { loss: 0.3, ..Air::default() }, Air { burst: Some(burst), ..Air::default() }];
+    for (air, reason) in airs.into_iter().zip([DropReason::Loss, DropReason::Burst]) {
+        let radio = radio(air);
+        let [one, back, other] = [(0, 1), (1, 0), (0, 2)].map(|pair| dropped(&verdicts(&radio, pair, 0.0), reason));
+        for second in [&back, &other] {
+            let both: Vec<bool> = one.iter().zip(second).map(|(a, b)| *a && *b).collect();
+            // A burst of two periods in the mean leaves about a quarter as many independent frames.
+            assert_rate("both", rate(&both), 0.09, f64::from(MANY) / 4.0);
+        }
+    }
+}
+
+#[test]
+fn delays_have_the_moments_of_their_models() {
+    let (mean_s, jitter_s) = (0.2, 0.08);
+    for model in [DelayModel::Uniform, DelayModel::Gamma] {
+        let values = delays(&radio(Air { delay: Delay { model, mean_s, jitter_s }, ..Air::default() }), (0, 1));
+        assert_moments(&format!("{model:?}"), &values, mean_s, jitter_s * jitter_s);
+        assert!(values.iter().all(|value| *value >= 0.0));
+        let skew = moment(&values, 3) / moment(&values, 2).powf(1.5);
+        // Uniform: 0. Gamma: 2 / √shape = 2 σ / m.
+        let wanted = if model == DelayModel::Gamma { 2.0 * jitter_s / mean_s } else { 0.0 };
+        assert!((skew - wanted).abs() < 0.1, "{model:?}: skewness {skew}, wanted {wanted}");
+    }
+    // A long tail: shape 1/4.
+    let delay = Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.2 };
+    assert_moments("long tail", &delays(&radio(Air { delay, ..Air::default() }), (0, 1)), 0.1, 0.04);
+    let fixed = Delay { model: DelayModel::Fixed, mean_s: 0.25, jitter_s: 0.0 };
+    assert!(delays(&radio(Air { delay: fixed, ..Air::default() }), (0, 1)).iter().all(|value| *value == 0.25));
+    let reach = 3f64.sqrt() * 0.08;
+    let uniform = Delay { model: DelayModel::Uniform, mean_s, jitter_s };
+    let values = delays(&radio(Air { delay: uniform, ..Air::default() }), (0, 1));
+    assert!(values.iter().all(|value| (value - mean_s).abs() <= reach + 1e-9), "uniform stays within √3 deviations");
+}
+
+#[test]
+fn a_normal_delay_is_cut_at_zero() {
+    let of = |mean_s, jitter_s| {
+        let delay = Delay { model: DelayModel::Normal, mean_s, jitter_s };
+        delays(&radio(Air { delay, ..Air::default() }), (0, 1))
+    };
+    // Far from zero it is the whole bell: a share of 0.6827 within one deviation.
+    let values = of(1.0, 0.1);
+    assert_moments("normal", &values, 1.0, 0.01);
+    let within: Vec<bool> = values.iter().map(|value| (value - 1.0).abs() < 0.1).collect();
+    assert_rate("within one deviation", rate(&within), 0.682_689, f64::from(MANY));
+    // Around zero the half of it that is left: mean σ √(2/π), variance σ² (1 − 2/π).
+    let two_over_pi = 2.0 / std::f64::consts::PI;
+    assert_moments("half a bell", &of(0.0, 0.1), 0.1 * two_over_pi.sqrt(), 0.01 * (1.0 - two_over_pi));
+}
+
+/// Looks at bursts in steps of a twentieth of their mean length: the states, and the lengths of the bursts seen, s.
+fn bursts_s(burst: Burst) -> (Vec<bool>, Vec<f64>) {
+    let step_s = burst.length_s / 20.0;
+    let at = |step: u32| burst.rages(5, link(0, 1, 0), SimTime::from_secs(f64::from(step) * step_s));
+    let states: Vec<bool> = (0..400_000).map(at).collect();
+    let runs = states.chunk_by(|a, b| a == b).filter(|run| run[0]);
+    let lengths = runs.map(|run| run.len() as f64 * step_s).collect();
+    (states, lengths)
+}
+
+#[test]
+fn bursts_have_their_share_and_their_mean_length() {
+    for (share, length_s) in [(0.1, 0.5), (0.5, 2.0), (0.8, 0.1)] {
+        let (states, lengths) = bursts_s(Burst { share, length_s, loss: 1.0, scope: Scope::Direction });
+        let count = lengths.len() as f64;
+        // The time shares of n cycles of two exponential stays.
+        assert_near("share", rate(&states), share, share * (1.0 - share) * (2.0 / count).sqrt());
+        // The chance that the next look finds no burst: pauses shorter than a step are missed.
+        let leaves = (1.0 - share) * -f64::exp_m1(-1.0 / (20.0 * (1.0 - share)));
+        let seen_s = length_s / 20.0 / leaves;
+        assert_near("length", mean(&lengths), seen_s, moment(&lengths, 2).sqrt() / count.sqrt());
+        // Geometric, as a memoryless stay is: this is its variance.
+        assert_moments("lengths", &lengths, seen_s, seen_s * seen_s * (1.0 - leaves));
+    }
+}
+
+#[test]
+fn a_block_begins_with_a_draw_of_its_own() {
+    let burst = Burst { share: 0.3, length_s: 1.0, loss: 1.0, scope: Scope::Direction };
+    let block_s = BLOCK_BURSTS * burst.length_s;
+    assert_eq!(burst.block_s(), block_s);
+    let at = |seconds| burst.rages(5, link(0, 1, 0), SimTime::from_secs(seconds));
+    let around = |edge_s: f64| (at(edge_s - 1e-6), at(edge_s));
+    let edges: Vec<(bool, bool)> = (1..4000).map(|block| around(f64::from(block) * block_s)).collect();
+    let both: Vec<bool> = edges.iter().map(|(before, after)| *before && *after).collect();
+    assert_rate("bursts on both sides of an edge", rate(&both), 0.09, edges.len() as f64);
+    let within: Vec<(bool, bool)> = (1..4000).map(|block| around((f64::from(block) + 0.5) * block_s)).collect();
+    assert!(within.iter().all(|(before, after)| before == after), "within a block the state holds for a microsecond");
+}
+
+#[test]
+fn bursts_befall_whom_they_should() {
+    let burst = |scope| Burst { share: 0.4, length_s: 0.3, loss: 1.0, scope };
+    let states = |scope, pair| -> Vec<bool> {
+        let air = Air { burst: Some(burst(scope)), ..Air::default() };
+        dropped(&verdicts(&radio(air), pair, 0.0), DropReason::Burst)
+    };
+    assert_ne!(states(Scope::Direction, (0, 1)), states(Scope::Direction, (1, 0)));
+    assert_eq!(states(Scope::Link, (0, 1)), states(Scope::Link, (1, 0)));
+    assert_ne!(states(Scope::Link, (0, 1)), states(Scope::Link, (0, 2)));
+    assert_eq!(states(Scope::Swarm, (0, 1)), states(Scope::Swarm, (7, 3)));
+    // A burst that loses seven in ten, and a quiet time that loses one in ten, each with its reason.
+    let partly = Burst { loss: 0.7, ..burst(Scope::Direction) };
+    let verdicts = verdicts(&radio(Air { burst: Some(partly), loss: 0.1, ..Air::default() }), (0, 1), 0.0);
+    // A burst of three periods in the mean leaves about a sixth as many independent frames.
+    assert_rate("in bursts", rate(&dropped(&verdicts, DropReason::Burst)), 0.28, f64::from(MANY) / 6.0);
+    assert_rate("alone", rate(&dropped(&verdicts, DropReason::Loss)), 0.072, f64::from(MANY) / 6.0);
+    for (share, wanted) in [(0.0, 0.0), (1.0, 1.0)] {
+        let always = Air { burst: Some(Burst { share, ..burst(Scope::Link) }), ..Air::default() };
+        assert_eq!(rate(&dropped(&self::verdicts(&radio(always), (0, 1), 0.0), DropReason::Burst)), wanted);
+    }
+}
+
+#[test]
+fn a_hard_range_ends_at_its_distance() {
+    let radio = radio(Air { range: Some(Range { half_m: 100.0, shadowing_db: 0.0, exponent: 2.0 }), ..Air::default() });
+    let at = |x| radio.verdict(link(0, 1, 0), Vec2::new(x, 0.0), SimTime::ZERO);
+    assert_eq!(at(100.0), Verdict::Deliver { due: SimTime::ZERO, again: None });
+    assert_eq!(at(100.1), Verdict::Drop(DropReason::Range));
+}
+
+#[test]
+fn a_gradual_range_follows_the_path_loss() {
+    let range = Range { half_m: 100.0, shadowing_db: 6.0, exponent: 3.0 };
+    let radio = radio(Air { range: Some(range), ..Air::default() });
+    // A deviation of the shadowing is a factor of 10^(6 / 30) in distance; the bell's tails beyond -2 … 2 deviations.
+    for (deviations, heard) in [(-2.0, 0.977_25), (-1.0, 0.841_345), (0.0, 0.5), (1.0, 0.158_655), (2.0, 0.022_75)] {
+        let path_m = 100.0 * 10f64.powf(0.2 * deviations);
+        let lost = dropped(&verdicts(&radio, (0, 1), path_m), DropReason::Range);
+        assert_rate("out of range", rate(&lost), 1.0 - heard, f64::from(MANY));
+    }
+    assert!(range.heard(0.0) == 1.0 && range.heard(1e12) < 1e-9);
+}
+
+#[test]
+fn copies_come_later_and_as_often_as_told() {
+    let delay = Delay { model: DelayModel::Uniform, mean_s: 0.5, jitter_s: 0.1 };
+    let verdicts = verdicts(&radio(Air { delay, loss: 0.5, duplicate: 0.15, ..Air::default() }), (0, 1), 0.0);
+    let heard = verdicts.iter().filter_map(|verdict| match *verdict {
+        Verdict::Deliver { due, again } => Some((due, again)),
+        Verdict::Drop(_) => None,
+    });
+    let heard: Vec<(SimTime, Option<SimTime>)> = heard.collect();
+    let twice: Vec<bool> = heard.iter().map(|(_, again)| again.is_some()).collect();
+    assert_rate("copies of what is heard", rate(&twice), 0.15, heard.len() as f64);
+    let gaps: Vec<f64> = heard.iter().filter_map(|(due, again)| Some(again.as_ref()?.since(*due))).collect();
+    assert!(gaps.iter().all(|gap| *gap >= 0.0));
+    // Two draws from a width of 2√3 σ are a third of it apart in the mean.
+    let width = 2.0 * 3f64.sqrt() * 0.1;
+    assert_near("gap", mean(&gaps), width / 3.0, (moment(&gaps, 2) / gaps.len() as f64).sqrt());
+}
+
+#[test]
+fn jitter_reorders_and_a_fixed_delay_does_not() {
+    let overtaken = |model, jitter_s| -> Vec<bool> {
+        let values = delays(&radio(Air { delay: Delay { model, mean_s: 1.0, jitter_s }, ..Air::default() }), (0, 1));
+        values.windows(2).map(|pair| pair[1] + PERIOD_S < pair[0]).collect()
+    };
+    // Two normal delays differ by more than a period: Q(0.1 / (0.1 √2)) = 0.239 75.
+    assert_rate("overtaken", rate(&overtaken(DelayModel::Normal, 0.1)), 0.239_75, f64::from(MANY) / 2.0);
+    assert_eq!(rate(&overtaken(DelayModel::Fixed, 0.0)), 0.0);
+}
+
+#[test]
+fn the_two_directions_of_a_link_are_inversely_better_and_worse() {
+    let delay = Delay { model: DelayModel::Fixed, mean_s: 0.2, jitter_s: 0.0 };
+    let radio = Radio { asymmetry: 1.5, ..radio(Air { loss: 0.2, delay, ..Air::default() }) };
+    let pairs = (0..100).flat_map(|a| (a + 1..100).map(move |b| (a, b)));
+    let logs: Vec<f64> = pairs.map(|(a, b)| radio.factor(link(a, b, 0)).ln() / 2.5f64.ln()).collect();
+    assert_moments("log of the factor", &logs, 0.0, 1.0 / 3.0);
+    assert!(logs.iter().all(|log| log.abs() <= 1.0));
+    for pair in [(0, 1), (1, 0), (4, 2)] {
+        let factor = radio.factor(link(pair.0, pair.1, 0));
+        assert!((factor * radio.factor(link(pair.1, pair.0, 77)) - 1.0).abs() < 1e-12);
+        let lost = dropped(&verdicts(&radio, pair, 0.0), DropReason::Loss);
+        assert_rate("loss", rate(&lost), 0.2 * factor, f64::from(MANY));
+        assert!(delays(&radio, pair).iter().all(|delay| (delay - 0.2 * factor).abs() < 1e-8));
+    }
+    assert_eq!(Radio { asymmetry: 0.0, ..radio }.factor(link(0, 1, 0)), 1.0);
+}
+
+#[test]
+fn the_last_rule_about_a_frame_counts() {
+    let rule = |topics: &[Topic], to: &[u32], delay_s| Rule {
+        topics: (!topics.is_empty()).then(|| topics.iter().copied().collect::<BTreeSet<_>>()),
+        from: None,
+        to: (!to.is_empty()).then(|| to.iter().copied().map(DroneId).collect::<BTreeSet<_>>()),
+        air: Air { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..Air::default() },
+    };
+    let rules = vec![rule(&[Topic::Pose, Topic::Plan], &[], 1.0), rule(&[], &[3], 2.0)];
+    let radio = Radio { rules, ..Radio::default() };
+    let due_s = |topic: u16, destination| match radio.verdict(
+        Link { topic, ..link(0, destination, 0) },
+        Vec2::zeros(),
+        SimTime::ZERO,
+    ) {
+        Verdict::Deliver { due, .. } => due.secs(),
+        Verdict::Drop(reason) => panic!("{reason:?}"),
+    };
+    let (pose, assignment, unknown) = (Topic::Pose as u16, Topic::Assignment as u16, 99);
+    assert_eq!([due_s(pose, 1), due_s(assignment, 1), due_s(unknown, 1)], [1.0, 0.0, 0.0]);
+    assert_eq!([due_s(pose, 3), due_s(assignment, 3), due_s(unknown, 3)], [2.0, 2.0, 2.0]);
+}

@@ -1,0 +1,129 @@
+//! `[radio]`: presets, what overrides them, rules, and what is refused.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+use skein_protocol::message::Topic;
+use skein_protocol::radio::{Air, Burst, Channel, Delay, DelayModel, Link, Radio, Range, Scope};
+use skein_protocol::{DroneId, Vec2};
+use skein_scenario::{Preset, Scenario, Source};
+
+const SOURCE: Source<'_> = Source { name: "r.toml", stem: "r" };
+
+fn try_parse(radio: &str, sets: &[(&str, &str)]) -> Result<Scenario, String> {
+    let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let text = format!("seed = 7\n[formation]\n[radio]\n{radio}");
+    Scenario::parse(&text, SOURCE, &sets).map_err(|errors| errors.to_string())
+}
+
+fn parse(radio: &str, sets: &[(&str, &str)]) -> Scenario {
+    try_parse(radio, sets).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+fn link(source: u32, destination: u32, topic: Topic) -> Link {
+    Link { source: DroneId(source), destination: DroneId(destination), topic: topic as u16, sequence: 0 }
+}
+
+#[test]
+fn every_key_gets_to_the_radio() {
+    let s = parse(
+        "delay_s = 0.1\njitter_s = 0.02\ndelay_model = \"gamma\"\nloss = 0.1\nrange_m = 300\nshadowing_db = 4\n\
+         path_loss_exponent = 2.5\nduplicate = 0.05\nasymmetry = 0.5\nrate_bps = 1e6\nqueue_limit_s = 0.5\n\
+         burst = { share = 0.2, length_s = 0.3, loss = 0.9, scope = \"link\" }",
+        &[],
+    );
+    let air = Air {
+        delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.02 },
+        loss: 0.1,
+        burst: Some(Burst { share: 0.2, length_s: 0.3, loss: 0.9, scope: Scope::Link }),
+        range: Some(Range { half_m: 300.0, shadowing_db: 4.0, exponent: 2.5 }),
+        duplicate: 0.05,
+    };
+    assert_eq!(s.radio(), Radio { seed: 7, air, asymmetry: 0.5, rules: Vec::new() });
+    assert_eq!(s.channel(), Some(Channel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
+}
+
+#[test]
+fn presets_are_filled_in_and_overridden_key_by_key() {
+    assert_eq!(parse("preset = \"ideal\"", &[]).radio(), parse("", &[]).radio());
+    for name in ["ideal", "wifi", "mesh-lossy", "lte", "jammed", "satellite"] {
+        let s = parse(&format!("preset = \"{name}\""), &[]);
+        let again = Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap();
+        assert_eq!(again, s, "what a preset has set is written out");
+        let json = Scenario::from_json(&serde_json::to_value(&s).unwrap(), SOURCE).unwrap();
+        assert_eq!(json, s);
+    }
+    let wifi = parse("preset = \"wifi\"\nloss = 0.5", &[("radio.jitter_s", "0")]);
+    assert_eq!((wifi.radio.preset, wifi.radio.loss, wifi.radio.jitter_s), (Some(Preset::Wifi), 0.5, 0.0));
+    assert_eq!((wifi.radio.range_m, wifi.radio.delay_s), (Some(300.0), 0.005));
+    let jammed = parse("preset = \"jammed\"\nburst.share = 0.9", &[]).radio.burst.unwrap();
+    assert_eq!((jammed.share, jammed.length_s, jammed.loss), (0.9, 1.0, 0.95), "a table is filled in, too");
+    let set = parse("", &[("radio.preset", "satellite"), ("radio.delay_s", "1")]);
+    assert_eq!((set.radio.delay_s, set.radio.rate_bps), (1.0, Some(256e3)));
+}
+
+#[test]
+fn the_last_rule_about_a_frame_counts_and_keeps_the_rest() {
+    let s = parse(
+        "loss = 0.1\ndelay_s = 0.2\nburst = { share = 0.5 }\n\
+         [[radio.rule]]\ntopics = [\"pose\", \"assignment\"]\nloss = 0.5\nburst = { share = 0 }\n\
+         [[radio.rule]]\nfrom = [0, 1]\nto = [2]\ndelay_s = 1",
+        &[],
+    );
+    let radio = s.radio();
+    assert!(radio.rules[0].covers(link(0, 1, Topic::Pose)) && !radio.rules[0].covers(link(0, 1, Topic::Plan)));
+    assert!(radio.rules[1].covers(link(1, 2, Topic::Plan)));
+    assert!(!radio.rules[1].covers(link(2, 1, Topic::Plan)) && !radio.rules[1].covers(link(1, 3, Topic::Plan)));
+    let of = |rule: usize| (radio.rules[rule].air.loss, radio.rules[rule].air.delay.mean_s);
+    assert_eq!((of(0), of(1)), ((0.5, 0.2), (0.1, 1.0)));
+    assert_eq!(radio.rules[0].air.burst.map(|burst| burst.share), Some(0.0));
+    assert_eq!(radio.rules[1].air.burst, radio.air.burst);
+    assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
+    // Heard at once, if at all, where no rule adds a delay: both rules are about this frame.
+    let due = radio.verdict(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO);
+    let last_rule = Radio { air: radio.rules[1].air, rules: Vec::new(), ..radio };
+    assert_eq!(due, last_rule.verdict(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO));
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_its_place() {
+    let refused = [
+        ("preset = \"wfi\"", "r.toml:4:10: radio.preset: found \"wfi\", expected one of \"ideal\", \"wifi\""),
+        ("jitter_s = 0.1", "r.toml:4:12: radio.jitter_s: found 0.1 s, expected 0 s with radio.delay_model = \"fixed\""),
+        (
+            "delay_s = 0.1\njitter_s = 0.1\ndelay_model = \"uniform\"",
+            "r.toml:5:12: radio.jitter_s: found 0.1 s, expected at most radio.delay_s / √3",
+        ),
+        ("jitter_s = 0.1\ndelay_model = \"gamma\"", "r.toml:4:12: radio.delay_s: found 0 s, expected more than 0 s"),
+        ("shadowing_db = 3", "r.toml:4:16: radio.range_m: is missing: radio.shadowing_db = 3 dB"),
+        ("shadowing_db = 31", "radio.shadowing_db: found 31, expected a number from 0 to 30 (dB)"),
+        ("rate_bps = 0", "radio.rate_bps: found 0, expected a number above 0, at most 1000000000000 (bit/s)"),
+        ("burst = { share = 1 }", "r.toml:4:19: radio.burst.share: found 1, expected a number from 0 to 0.99"),
+        (
+            "burst = { scope = \"all\" }",
+            "radio.burst.scope: found \"all\", expected one of \"direction\", \"link\", \"swarm\"",
+        ),
+        ("burst = 0.3", "radio.burst: found 0.3, expected a table"),
+        ("bursts = 0.3", "radio.bursts: unknown key"),
+        (
+            "[[radio.rule]]\ntopics = [\"poses\"]",
+            "r.toml:5:11: radio.rule.0.topics.0: found \"poses\", expected one of \"pose\"",
+        ),
+        ("[[radio.rule]]\ntopics = []", "radio.rule.0.topics: found an array of 0, expected an array of 1 to 16 words"),
+        ("[[radio.rule]]\nto = [0]", "r.toml:4:1: radio.rule.0: sets nothing: expected delay_s"),
+        (
+            "[[radio.rule]]\nloss = 1\nfrom = [0, 8]",
+            "r.toml:6:12: radio.rule.0.from.1: found drone 8, expected one below formation.drones = 8",
+        ),
+        (
+            "[[radio.rule]]\njitter_s = 1",
+            "r.toml:5:12: radio.rule.0.jitter_s: found 1 s, expected 0 s with radio.rule.0.delay_model",
+        ),
+        ("rule = { loss = 1 }", "radio.rule: found a table, expected an array"),
+    ];
+    for (radio, wanted) in refused {
+        let message = try_parse(radio, &[]).unwrap_err();
+        assert!(message.contains(wanted), "{radio:?}: no {wanted:?} in\n{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+    let message = try_parse("preset = \"wifi\"", &[("radio.delay_s", "0")]).unwrap_err();
+    assert!(message.starts_with("--set radio.delay_s=0: radio.delay_s: found 0 s"), "{message}");
+}
