@@ -2,6 +2,7 @@
 
 use crate::Vec2;
 use crate::ids::DroneId;
+use crate::sides::Cuts;
 use crate::time::Tick;
 use bytemuck::{Pod, Zeroable};
 
@@ -34,6 +35,8 @@ pub struct AirFrame {
     pub sequence: u32,
     /// True position of the sender when it sent, m.
     pub position_m: [f64; 2],
+    /// The sender's radio when it sent.
+    pub cuts: Cuts,
     /// What was sent.
     pub frame: Frame,
 }

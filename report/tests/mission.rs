@@ -109,6 +109,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         source: DroneId(0),
         sequence: sequence as u32,
         position_m: [0.0; 2],
+        cuts: Default::default(),
         frame: message.encode(),
     };
     // Said when it is made, and repeated with another time stamp.

@@ -85,6 +85,10 @@ impl Cockpit {
         let tick_ns = (self.dt_s * 1e9).round() as i64;
         let me = self.me;
         for frame in down.frames.iter().filter(|frame| frame.source != me) {
+            if let Some(reason) = own.cut_off(frame) {
+                self.drop_frame(reason, stats);
+                continue;
+            }
             let link =
                 Link { source: frame.source, destination: self.me, topic: frame.frame.kind, sequence: frame.sequence };
             let sent = SimTime(frame.tick as i64 * tick_ns);

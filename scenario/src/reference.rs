@@ -58,6 +58,7 @@ fn collect(table: &Json, path: &str, keys: &mut Vec<Key>) {
         match kind(schema) {
             _ if keys.len() > before => {}
             "object" => collect(schema, &path, keys),
+            "array" if kind(&schema["items"]) == "object" => collect(&schema["items"], &path, keys),
             _ => keys.push(key(path, schema, is_required(table, name))),
         }
     }
@@ -107,6 +108,9 @@ fn values(schema: &Json) -> String {
     if let Some(words) = words(schema) {
         return words.iter().map(|w| format!("`\"{w}\"`")).collect::<Vec<_>>().join(", ");
     }
+    if schema["format"] == "sides" {
+        return format!("`\"halves\"`, or {}", array_values(&schema["anyOf"][1]));
+    }
     if let Some(word) = schema["const"].as_str() {
         return format!("`\"{word}\"`");
     }
@@ -124,6 +128,7 @@ fn array_values(schema: &Json) -> String {
     let items = present(&schema["items"]);
     match kind(items) {
         "array" => format!("{count} × [{}]", array_values(items)),
+        "integer" => format!("{count} whole numbers {}", range(items)),
         _ => format!("{count} numbers {}", range(items)),
     }
 }
@@ -159,7 +164,10 @@ A scenario is a TOML file. SI units, angles in radians; world frame x = flight d
 fn heading(page: &mut String, schema: &Json, table: &str) {
     let (title, about) = match table.split_once('.') {
         None if table.is_empty() => ("At the top".to_owned(), String::new()),
-        None => (format!("`[{table}]`"), text(&schema["properties"][table])),
+        None => match kind(&schema["properties"][table]) {
+            "array" => (format!("`[[{table}]]`"), text(&schema["properties"][table]["items"])),
+            _ => (format!("`[{table}]`"), text(&schema["properties"][table])),
+        },
         Some((list, word)) => {
             let variants = schema["properties"][list]["items"]["oneOf"].as_array().into_iter().flatten();
             let about = variants.filter(|v| tag(v).is_some_and(|(_, w)| w == word)).map(text).collect();

@@ -2,9 +2,9 @@
 
 use crate::check::quantity;
 use crate::keys::{End, Scenario};
-use crate::near;
 use crate::node::number;
 use crate::strategy::Strategy;
+use crate::{fault_rules, near};
 use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
@@ -28,6 +28,7 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
     rules.strategy();
     rules.spacing();
     rules.obstacles();
+    rules.broken.extend(fault_rules::broken(scenario));
     rules.broken
 }
 

@@ -131,7 +131,14 @@ mod tests {
     }
 
     fn on_air(message: Message) -> AirFrame {
-        AirFrame { tick: 0, source: DroneId(2), sequence: 0, position_m: [0.0; 2], frame: message.encode() }
+        AirFrame {
+            tick: 0,
+            source: DroneId(2),
+            sequence: 0,
+            position_m: [0.0; 2],
+            cuts: Default::default(),
+            frame: message.encode(),
+        }
     }
 
     fn plan(id: PlanStamp, phase: u32) -> AirFrame {
