@@ -19,6 +19,7 @@ pub mod params;
 pub mod pilot;
 pub mod program;
 pub mod queue;
+mod reaction;
 pub mod rehearsal;
 pub mod safety;
 pub mod swarm_pilot;

@@ -93,6 +93,11 @@ impl Safety {
         Self { params, planes: Vec::new(), program: Program::default(), trusted: Vec::new(), trusting: Vec::new() }
     }
 
+    /// Margins for another t_c from now on, s.
+    pub fn set_reaction_time(&mut self, reaction_time_s: f64) {
+        self.params.reaction_time_s = reaction_time_s;
+    }
+
     /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles and
     /// neighbours that cannot evade come first.
     pub fn filter(

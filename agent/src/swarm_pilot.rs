@@ -5,6 +5,7 @@ use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::{Ahead, ahead_of, queue_speed};
+use crate::reaction::Reaction;
 use crate::rehearsal::{MOST_MEMBERS, Rehearsal};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::way::{OwnWay, Way};
@@ -14,7 +15,6 @@ use skein_leader::routes::Routes;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, QueuePlace, set_tag};
 use skein_protocol::{Message, SimTime, Vec2};
-use std::collections::VecDeque;
 
 /// With a reaction time t_c, the velocity gain is at most this over t_c: a higher one oscillates.
 const GAIN_BY_REACTION: f64 = 0.4;
@@ -32,7 +32,7 @@ pub struct SwarmPilot {
     pub(crate) leading: Leading,
     pub(crate) way: Way,
     safety: Safety,
-    delayed: VecDeque<Vec2>,
+    reaction: Reaction,
     escape: Escape,
     rehearsal: Option<Rehearsal>,
     silent: Vec<Vec2>,
@@ -44,12 +44,11 @@ impl SwarmPilot {
     /// A drone that has just started and knows nothing but its parameters.
     #[must_use]
     pub fn new(params: PilotParams) -> Self {
-        let reaction_ticks = (params.braking.reaction_time_s / params.dt_s).round() as usize;
         Self {
             leading: Leading::new(&params.leading()),
             way: Way::new(params.me, params.planner.course_y_m),
             safety: Safety::new(params.safety),
-            delayed: VecDeque::from(vec![Vec2::zeros(); reaction_ticks]),
+            reaction: Reaction::new(params.braking.reaction_time_s, params.dt_s),
             escape: Escape::default(),
             rehearsal: None,
             silent: Vec::new(),
@@ -196,6 +195,9 @@ impl SwarmPilot {
 
 impl Pilot for SwarmPilot {
     fn step(&mut self, senses: &Senses<'_>, heard: &[Heard], say: &mut Vec<Message>) -> Command {
+        let reaction_s = self.reaction.slow_down(senses.extra_reaction_s);
+        (self.params.braking.reaction_time_s, self.params.safety.reaction_time_s) = (reaction_s, reaction_s);
+        self.safety.set_reaction_time(reaction_s);
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for Heard { source, message } in heard {
             self.leading.hear(senses.now, *source, message, say);
@@ -216,8 +218,7 @@ impl Pilot for SwarmPilot {
         let wanted = self.escape.steer(senses.now, senses.velocity, wanted, patience_s, slow_mps);
         self.find_neighbours(senses, &places);
         let safe = self.accelerate(wanted, senses);
-        self.delayed.push_back(safe);
-        let acceleration = self.delayed.pop_front().unwrap_or(safe);
+        let acceleration = self.reaction.delay(safe);
         let command = self.command(acceleration, &places);
         self.leading.speak(senses.now, &own, &places, say);
         command

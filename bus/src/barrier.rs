@@ -256,7 +256,13 @@ impl DroneEnd {
         unsafe { self.control.stats_at(self.drone).as_mut() }
     }
 
+    /// The first tick that this drone may read and answer.
+    #[must_use]
+    pub fn resume_from(&self) -> Tick {
+        Tick::from(self.control.drone(self.drone).resume_from.load(Ordering::SeqCst))
+    }
+
     fn may_answer(&self, seen: u32) -> bool {
-        seen > self.control.drone(self.drone).resume_from.load(Ordering::SeqCst)
+        Tick::from(seen) > self.resume_from()
     }
 }

@@ -84,6 +84,12 @@ impl Control {
         futex::wake_all(&words.done);
     }
 
+    /// Whether a drone's process is marked as dead.
+    #[must_use]
+    pub fn is_dead(&self, drone: usize) -> bool {
+        self.drone(drone).done.load(Ordering::SeqCst) & DEAD != 0
+    }
+
     /// Takes the mark back before a new process is started, which answers from tick `from` on; until then the world
     /// counts the drone as [`Answer::Absent`](crate::Answer::Absent).
     pub fn revive(&self, drone: usize, from: Tick) {

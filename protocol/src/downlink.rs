@@ -6,7 +6,9 @@
 use crate::Vec2;
 use crate::frame::AirFrame;
 use crate::ids::{DroneId, ObstacleId};
+use crate::radio::DropReason;
 use crate::shape::ConvexShape;
+use crate::sides::Cuts;
 use crate::time::{SimTime, Tick};
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
@@ -53,8 +55,21 @@ pub struct SenseHead {
     pub alive: u32,
     /// Incarnation of its process.
     pub incarnation: u32,
-    /// Always 0.
-    pub reserved: [u32; 2],
+    /// Its radio.
+    pub cuts: Cuts,
+    /// Added to its reaction time, s.
+    pub extra_reaction_s: f64,
+}
+
+impl SenseHead {
+    /// Why its radio cannot hear a frame at all, if it cannot.
+    #[must_use]
+    pub fn cut_off(&self, frame: &AirFrame) -> Option<DropReason> {
+        if self.cuts.deaf != 0 || frame.cuts.mute != 0 {
+            return Some(DropReason::Deaf);
+        }
+        self.cuts.sides.apart(frame.cuts.sides).then_some(DropReason::Partition)
+    }
 }
 
 /// An obstacle with a point in a drone's detection range.
@@ -222,6 +237,7 @@ impl<'a> DownlinkView<'a> {
             tick: self.head.tick,
             position: Vec2::from(head.position_m),
             velocity: Vec2::from(head.velocity_mps),
+            extra_reaction_s: head.extra_reaction_s,
             obstacles: range(self.obstacles, head.obstacle_first, head.obstacle_count),
             neighbours: range(self.neighbours, head.neighbour_first, head.neighbour_count),
             shapes: self.shapes,
@@ -240,6 +256,8 @@ pub struct Senses<'a> {
     pub position: Vec2,
     /// Own velocity, m/s.
     pub velocity: Vec2,
+    /// Added to its reaction time, s.
+    pub extra_reaction_s: f64,
     /// Obstacles with a point in detection range.
     pub obstacles: &'a [SensedObstacle],
     /// Neighbours in ranging distance.
@@ -257,7 +275,7 @@ impl<'a> Senses<'a> {
         neighbours: &'a [SensedNeighbour],
         shapes: &'a [SensedShape],
     ) -> Self {
-        Self { now, tick, position, velocity, obstacles, neighbours, shapes }
+        Self { now, tick, position, velocity, extra_reaction_s: 0.0, obstacles, neighbours, shapes }
     }
 
     /// The outline of a sensed obstacle; `None` if the entry points nowhere.

@@ -2,6 +2,7 @@
 
 use crate::Vec2;
 use crate::ids::DroneId;
+use crate::sides::Cuts;
 use crate::time::Tick;
 use bytemuck::{Pod, Zeroable};
 
@@ -36,6 +37,8 @@ pub struct AirFrame {
     pub position_m: [f64; 2],
     /// How long it waited for the channel and took it, ns; [`crate::radio::NEVER_AIRED`] if it was not sent at all.
     pub queue_ns: u64,
+    /// The sender's radio when it sent.
+    pub cuts: Cuts,
     /// What was sent.
     pub frame: Frame,
 }

@@ -8,6 +8,7 @@
 //! | [`ids`], [`time`] | names of drones, groups, terms; simulated time |
 //! | [`message`], [`payload`], [`frame`] | what is said; its layout; the checked frame that carries it |
 //! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
+//! | [`sides`] | who is cut off from whom by script |
 //! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
 //! | [`record`] | what the world tells the recorder |
 //! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
@@ -23,6 +24,7 @@ pub mod payload;
 pub mod radio;
 pub mod record;
 pub mod shape;
+pub mod sides;
 pub mod slot;
 pub mod time;
 

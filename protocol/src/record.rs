@@ -36,6 +36,8 @@ pub const ROW_LEADS: u32 = 2;
 pub const ROW_QUEUED: u32 = 4;
 /// [`DroneRow::flags`]: it missed this tick's deadline, its last command was held (wall clock only).
 pub const ROW_LATE: u32 = 8;
+/// [`DroneRow::flags`]: its process is frozen.
+pub const ROW_FROZEN: u32 = 16;
 
 /// A drone at the end of a tick: the world's truth, and what the drone says it obeys.
 #[repr(C)]
@@ -53,7 +55,7 @@ pub struct DroneRow {
     pub group: GroupId,
     /// The group it leads, with [`ROW_LEADS`].
     pub led: GroupId,
-    /// [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`].
+    /// [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`], [`ROW_FROZEN`].
     pub flags: u32,
     /// A `PHASE_…` of [`crate::payload`].
     pub phase: u32,
@@ -119,6 +121,32 @@ pub enum FaultKind {
     Kill,
     /// It did not answer for five seconds of wall time in lockstep, and was killed.
     Hung,
+    /// The process was stopped, to be continued.
+    Freeze,
+    /// The process was killed, to be replaced by a new one.
+    Restart,
+    /// The drone reacts later.
+    Slow,
+    /// It hears nobody.
+    Deaf,
+    /// Nobody hears it.
+    Mute,
+    /// The air is cut between sets of drones.
+    Partition,
+    /// It senses no obstacles, no neighbours, or neither.
+    Blind,
+    /// Its own position or velocity is told wrong.
+    Noise,
+    /// It is blown about.
+    Wind,
+}
+
+impl FaultKind {
+    /// Whether it ends or stops the drone's process.
+    #[must_use]
+    pub fn stops_process(self) -> bool {
+        matches!(self, Self::Kill | Self::Hung | Self::Freeze | Self::Restart)
+    }
 }
 
 /// A range of counted delays or ages, s.
@@ -226,11 +254,20 @@ pub enum Happening {
     Fault {
         /// What.
         kind: FaultKind,
-        /// Whom.
+        /// Whom; [`DroneId::NONE`]: the whole swarm.
         target: DroneId,
         /// Whether the scenario asked for it.
         scheduled: bool,
         /// What is known of it, for people: the signal, the exit code.
+        detail: String,
+    },
+    /// A scheduled fault is over.
+    FaultOver {
+        /// What.
+        kind: FaultKind,
+        /// Whom; [`DroneId::NONE`]: the whole swarm.
+        target: DroneId,
+        /// What goes on, for people.
         detail: String,
     },
     /// An invariant is broken; said once when it begins.

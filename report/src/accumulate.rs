@@ -134,10 +134,11 @@ impl Accumulator {
                 self.leading.elected(t_s, group, ballot, leader)
             }
             Happening::Fault { kind, target, scheduled, detail } => {
-                if let Some(row) = self.last.get(target.index()) {
+                if let (true, Some(row)) = (kind.stops_process(), self.last.get(target.index())) {
                     self.leading.died(t_s, row);
                 }
-                self.faults.push(FaultEntry { t_s, kind, target: target.0, scheduled, detail });
+                let target = (target != skein_protocol::DroneId::NONE).then_some(target.0);
+                self.faults.push(FaultEntry { t_s, kind, target, scheduled, detail });
             }
             Happening::Violation { kind, drones, value_m } => {
                 self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
@@ -145,8 +146,11 @@ impl Accumulator {
             Happening::End { outcome, reason, totals } => {
                 self.end = Some(End { t_s, outcome, reason, totals: *totals });
             }
-            // What was decided shows in the frames, and laying down in the rows.
-            Happening::Leader { .. } | Happening::Grouping { .. } | Happening::Assigned { .. } => {}
+            // What was decided shows in the frames, laying down in the rows, and that a fault is over in the events.
+            Happening::Leader { .. }
+            | Happening::Grouping { .. }
+            | Happening::Assigned { .. }
+            | Happening::FaultOver { .. } => {}
         }
     }
 

@@ -264,8 +264,8 @@ pub struct FaultEntry {
     /// What.
     #[schemars(with = "String")]
     pub kind: FaultKind,
-    /// Whom.
-    pub target: u32,
+    /// Whom; null: the whole swarm.
+    pub target: Option<u32>,
     /// Whether the scenario asked for it.
     pub scheduled: bool,
     /// What is known of it, in words.

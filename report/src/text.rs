@@ -73,7 +73,8 @@ fn lines(summary: &Summary) -> Vec<(String, String)> {
         let by = if fault.scheduled { "scheduled" } else { "not scheduled" };
         let kind = serde_json::to_value(fault.kind).ok();
         let kind = kind.as_ref().and_then(|kind| kind.as_str()).unwrap_or("fault");
-        line("fault", Some(format!("{:.2} s: {kind}, drone {} ({by}; {})", fault.t_s, fault.target, fault.detail)));
+        let whom = fault.target.map_or_else(|| "the swarm".to_owned(), |drone| format!("drone {drone}"));
+        line("fault", Some(format!("{:.2} s: {kind}, {whom} ({by}; {})", fault.t_s, fault.detail)));
     }
     line("speed", speed(summary));
     line("digest", summary.digest.clone());

@@ -111,6 +111,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         sequence: sequence as u32,
         position_m: [0.0; 2],
         queue_ns: 0,
+        cuts: Default::default(),
         frame: message.encode(),
     };
     // Said when it is made, and repeated with another time stamp.

@@ -3,7 +3,7 @@
 use crate::supervisor::{Launch, ProcessInfo};
 use crate::{Clock, RuntimeError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
 use skein_bus::{Control, Domain, PinMode};
 use skein_protocol::{DroneId, Tick};
 use std::fmt;
@@ -33,6 +33,12 @@ struct Running {
     role: Role,
     child: Child,
     pidfd: OwnedFd,
+}
+
+impl Running {
+    fn is_of(&self, drone: DroneId) -> bool {
+        matches!(self.role, Role::Drone { id, .. } if id == drone)
+    }
 }
 
 /// Processes that were started and not yet reaped.
@@ -115,12 +121,29 @@ impl Children {
 
     /// Kills a drone's process and reaps it; false if there is none.
     pub(crate) fn kill_drone(&mut self, drone: DroneId) -> bool {
-        let of_drone = |r: &Running| matches!(r.role, Role::Drone { id, .. } if id == drone);
-        let Some(place) = self.running.iter().position(of_drone) else { return false };
+        let Some(place) = self.running.iter().position(|running| running.is_of(drone)) else { return false };
         let mut running = self.running.remove(place);
         // It may have ended by itself just now: the wait tells either way.
         let _ = running.child.kill();
         running.child.wait().is_ok()
+    }
+
+    /// Stops a drone's process; true once it is stopped, false if there is none.
+    pub(crate) fn freeze_drone(&self, drone: DroneId) -> bool {
+        let Some(pid) = self.pid_of(drone) else { return false };
+        // Not reaped here, should it have ended: that is the watcher's.
+        let wanted = WaitIdOptions::STOPPED | WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+        let stopped = || waitid(WaitId::Pid(pid), wanted).ok().flatten().is_some_and(|status| status.stopped());
+        kill_process(pid, Signal::STOP).is_ok() && stopped()
+    }
+
+    /// Lets a drone's process go on; false if there is none.
+    pub(crate) fn resume_drone(&self, drone: DroneId) -> bool {
+        self.pid_of(drone).is_some_and(|pid| kill_process(pid, Signal::CONT).is_ok())
+    }
+
+    fn pid_of(&self, drone: DroneId) -> Option<Pid> {
+        self.running.iter().find(|running| running.is_of(drone)).map(|running| Pid::from_child(&running.child))
     }
 
     pub(crate) fn kill_all(&mut self) {

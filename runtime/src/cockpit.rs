@@ -89,6 +89,10 @@ impl Cockpit {
         let tick_ns = (self.dt_s * 1e9).round() as i64;
         let me = self.me;
         for frame in down.frames.iter().filter(|frame| frame.source != me) {
+            if let Some(reason) = own.cut_off(frame) {
+                self.drop_frame(reason, stats);
+                continue;
+            }
             match self.radio.fate(frame, me, here, tick_ns) {
                 Verdict::Drop(reason) => self.drop_frame(reason, stats),
                 Verdict::Deliver { due, again } => {

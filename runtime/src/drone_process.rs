@@ -123,6 +123,10 @@ impl Drone {
     fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
         let started = Instant::now();
         while let Some(sample) = self.hears.receive()? {
+            if sample.tick() < self.barrier.resume_from() {
+                // Sent while this process was stopped: nobody heard it.
+                continue;
+            }
             let down = DownlinkView::parse(sample.bytes())
                 .map_err(|error| RuntimeError::Process(format!("drone {}: {error}", self.id)))?;
             self.cockpit.receive(&down, self.barrier.stats_mut());

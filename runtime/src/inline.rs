@@ -3,16 +3,20 @@
 
 use crate::cockpit::Cockpit;
 use crate::{RunEnd, RuntimeError, mission};
+use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::RecordSink;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
+use skein_world::faults::ProcessOrder;
 use std::time::Instant;
 
 /// One drone and what it answered in the current tick.
 struct Seat {
-    cockpit: Cockpit,
+    /// `None`: its process is gone.
+    cockpit: Option<Cockpit>,
+    frozen: bool,
     slot: Slot,
     frames: Vec<Frame>,
     stats: LinkStats,
@@ -30,7 +34,8 @@ pub fn run(
     let started = Instant::now();
     let mut world = mission::world(scenario)?;
     let seat = |id| Seat {
-        cockpit: mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO),
+        cockpit: Some(mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)),
+        frozen: false,
         slot: Slot::default(),
         frames: Vec::new(),
         stats: LinkStats::default(),
@@ -39,14 +44,11 @@ pub fn run(
     let startup_s = started.elapsed().as_secs_f64();
     let (opened, mut signal, mut sink_error) = (Instant::now(), None, None);
     while world.ended().is_none() {
+        let start = world.now();
+        world.orders().iter().for_each(|&order| carry_out(order, scenario, start, &mut seats));
         let down = world.downlink().view();
-        for seat in &mut seats {
-            seat.cockpit.receive(&down, &mut seat.stats);
-            let frames = seat.cockpit.step(&down, &mut seat.slot, &mut seat.stats);
-            seat.frames.clear();
-            seat.frames.extend_from_slice(frames);
-        }
-        for (seat, id) in seats.iter().zip(0..) {
+        seats.iter_mut().for_each(|seat| seat.answer(&down));
+        for (seat, id) in seats.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
             world.take_slot(DroneId(id), &seat.slot);
             world.take_frames(DroneId(id), &seat.frames);
         }
@@ -63,6 +65,36 @@ pub fn run(
     world.finish(&stats, wall_s);
     keep(sink, &world, &mut sink_error);
     Ok(RunEnd { startup_s, signal, sink_error, failure: None })
+}
+
+impl Seat {
+    /// Whether it has a process, and one that is not stopped.
+    fn flies(&self) -> bool {
+        self.cockpit.is_some() && !self.frozen
+    }
+
+    fn answer(&mut self, down: &DownlinkView<'_>) {
+        let Some(cockpit) = self.cockpit.as_mut().filter(|_| !self.frozen) else { return };
+        cockpit.receive(down, &mut self.stats);
+        let frames = cockpit.step(down, &mut self.slot, &mut self.stats);
+        self.frames.clear();
+        self.frames.extend_from_slice(frames);
+    }
+}
+
+/// Does to a pilot what the process runtime does to a process; `start` is when the tick opens.
+fn carry_out(order: ProcessOrder, scenario: &Scenario, start: SimTime, seats: &mut [Seat]) {
+    match order {
+        ProcessOrder::Kill(id) => {
+            let seat = &mut seats[id.index()];
+            (seat.cockpit, seat.frozen) = (None, false);
+        }
+        ProcessOrder::Freeze(id) => seats[id.index()].frozen = true,
+        ProcessOrder::Resume(id) => seats[id.index()].frozen = false,
+        ProcessOrder::Restart(id, incarnation) => {
+            seats[id.index()].cockpit = Some(mission::cockpit(scenario, id, incarnation, start));
+        }
+    }
 }
 
 /// An error stops the recording, never the mission.

@@ -16,6 +16,7 @@ pub mod drone_process;
 mod error;
 pub mod inline;
 pub mod mission;
+mod plan;
 pub mod supervisor;
 pub mod world_process;
 

@@ -1,7 +1,7 @@
 //! From a scenario to what flies it: the world, the drones' parameters, their cockpits. Both runtimes start here.
 
-use crate::RuntimeError;
 use crate::cockpit::Cockpit;
+use crate::{RuntimeError, plan};
 use skein_agent::danger::Braking;
 use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::SafetyParams;
@@ -57,6 +57,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         arrival_error_m: scenario.mission.arrival_error_m,
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
+        faults: plan::faults(scenario),
     };
     let velocity = Vec2::new(drone.speed_mps, 0.0);
     let starts: Vec<(Vec2, Vec2)> = scenario.starts().into_iter().map(|position| (position, velocity)).collect();

@@ -6,13 +6,14 @@ use crate::drone_process::scenario_path;
 use crate::world_process::DISMISSED;
 use crate::{Clock, RunEnd, RuntimeError, mission};
 use skein_bus::{
-    Control, ControlSpec, Domain, OrderKind, PinMode, RecordRole, RecordSubscriber, Services, WaitMode, WorldState,
-    allowed_cores, raise_file_limit,
+    Control, ControlSpec, Domain, Order, OrderKind, PinMode, RecordRole, RecordSubscriber, Services, WaitMode,
+    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
 };
-use skein_protocol::DroneId;
 use skein_protocol::record::{RecordSink, RecordView};
+use skein_protocol::{DroneId, Tick};
 use skein_scenario::Scenario;
 use std::path::PathBuf;
+use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 /// How a run in processes is started.
@@ -27,7 +28,8 @@ pub struct Launch<'a> {
     pub wait: WaitMode,
     /// The executable that knows the roles `world` and `drone`.
     pub executable: PathBuf,
-    /// Told who is there, once all are ready and before the first tick.
+    /// Told who is there: once all are ready and before the first tick, and again, with those that are gone, when a
+    /// drone got a new process.
     pub on_ready: &'a mut dyn FnMut(&[ProcessInfo]) -> Result<(), String>,
     /// Asked about once a millisecond whether to stop: it gives the signal's number.
     pub interrupted: &'a mut dyn FnMut() -> Option<i32>,
@@ -74,6 +76,10 @@ pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, Runt
     let mut supervisor = Supervisor {
         children: Children::new(&launch, &domain, &control),
         end: RunEnd::default(),
+        domain: &domain,
+        processes: Vec::new(),
+        incarnations: vec![1; drones],
+        world_ended: None,
         control,
         record,
         sink,
@@ -86,16 +92,22 @@ pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, Runt
     Ok(supervisor.end)
 }
 
-struct Supervisor<'l, 's> {
+struct Supervisor<'l, 's, 'd> {
     launch: Launch<'l>,
+    domain: &'d Domain,
     control: Control,
     record: RecordSubscriber,
     sink: &'s mut dyn RecordSink,
     children: Children,
+    /// All that were started.
+    processes: Vec<ProcessInfo>,
+    /// Of each drone's newest process.
+    incarnations: Vec<u32>,
+    world_ended: Option<ExitStatus>,
     end: RunEnd,
 }
 
-impl Supervisor<'_, '_> {
+impl Supervisor<'_, '_, '_> {
     /// Starts everybody, waits until all are ready, tells who is there, and lets the world begin.
     fn start(&mut self, drones: usize) -> Result<(), RuntimeError> {
         self.children.spawn(Role::World, self.launch.clock)?;
@@ -123,9 +135,9 @@ impl Supervisor<'_, '_> {
             }
         }
         self.record.connect()?;
-        let mut processes = vec![ProcessInfo { role: "launcher", id: None, pid: std::process::id() }];
-        processes.extend(self.children.list());
-        (self.launch.on_ready)(&processes).map_err(RuntimeError::Process)?;
+        self.processes.push(ProcessInfo { role: "launcher", id: None, pid: std::process::id() });
+        self.processes.extend(self.children.list());
+        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::Process)?;
         self.control.give_go();
         Ok(())
     }
@@ -134,15 +146,11 @@ impl Supervisor<'_, '_> {
     fn watch(&mut self) {
         let mut asked = None;
         loop {
-            for (role, how) in self.children.wait_any(LOOK) {
-                match role {
-                    Role::Drone { id, .. } => self.control.mark_dead(id.index()),
-                    Role::World => {
-                        self.take_records();
-                        self.end.failure = Some(format!("the world ended in flight: {how}"));
-                        return;
-                    }
-                }
+            self.reap();
+            if let Some(how) = self.world_ended {
+                self.take_records();
+                self.end.failure = Some(format!("the world ended in flight: {how}"));
+                return;
             }
             let finished = self.control.world_state() == WorldState::Finished;
             self.take_records();
@@ -181,14 +189,66 @@ impl Supervisor<'_, '_> {
         }
     }
 
-    fn carry_out_orders(&mut self) {
-        if let Some(order) = self.control.next_order(Duration::ZERO) {
-            let done = order.kind == OrderKind::Kill && self.children.kill_drone(order.drone);
-            if done {
-                self.control.mark_dead(order.drone.index());
+    /// Waits a little for processes to end, and tells the world of drones that have.
+    fn reap(&mut self) {
+        for (role, how) in self.children.wait_any(LOOK) {
+            match role {
+                Role::Drone { id, .. } => self.control.mark_dead(id.index()),
+                Role::World => self.world_ended = Some(how),
             }
-            self.control.answer_order(u32::from(done));
         }
+    }
+
+    /// What the world asks for in a tick. The reply to a restart is the new incarnation, to all else 1; 0 if there is no
+    /// such process.
+    fn carry_out_orders(&mut self) {
+        let Some(Order { kind, drone, tick }) = self.control.next_order(Duration::ZERO) else { return };
+        let reply = match kind {
+            OrderKind::Kill => u32::from(self.kill(drone)),
+            OrderKind::Freeze => {
+                self.control.freeze(drone.index());
+                u32::from(self.children.freeze_drone(drone))
+            }
+            OrderKind::Resume => {
+                self.control.set_resume_from(drone.index(), tick);
+                u32::from(self.children.resume_drone(drone))
+            }
+            OrderKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
+                tracing::error!(%error, "drone {drone} was not started again");
+                0
+            }),
+        };
+        self.control.answer_order(reply);
+    }
+
+    fn kill(&mut self, drone: DroneId) -> bool {
+        let killed = self.children.kill_drone(drone);
+        if killed {
+            self.control.mark_dead(drone.index());
+        }
+        killed
+    }
+
+    /// Starts a new process for a dead drone and waits until it is ready to answer `tick`; gives its incarnation.
+    fn restart(&mut self, id: DroneId, first_tick: Tick) -> Result<u32, RuntimeError> {
+        let drone = id.index();
+        let nobody = || RuntimeError::Process(format!("there is no drone {id}"));
+        let incarnation = self.incarnations.get(drone).ok_or_else(nobody)? + 1;
+        // Its predecessor still has its places in the services.
+        clean_dead_nodes(self.domain)?;
+        self.control.revive(drone, first_tick);
+        self.children.spawn(Role::Drone { id, incarnation, first_tick }, self.launch.clock)?;
+        let limit = Instant::now() + START_LIMIT;
+        while self.control.ready(drone) != Some(incarnation) {
+            self.reap();
+            if self.control.is_dead(drone) || self.world_ended.is_some() || Instant::now() > limit {
+                return Err(RuntimeError::Process("its new process did not get ready".to_owned()));
+            }
+        }
+        self.incarnations[drone] = incarnation;
+        self.processes.extend(self.children.list().filter(|process| process.id == Some(id.0)));
+        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::Process)?;
+        Ok(incarnation)
     }
 
     /// Nobody outlives the run: drones end by themselves when the mission is closed, or are killed.

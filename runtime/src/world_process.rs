@@ -10,6 +10,7 @@ use skein_protocol::DroneId;
 use skein_protocol::record::{FaultKind, RecordHead, RecordView};
 use skein_protocol::slot::LinkStats;
 use skein_world::World;
+use skein_world::faults::ProcessOrder;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -18,8 +19,10 @@ const HUNG: Duration = Duration::from_secs(5);
 /// Stop request of a launcher that has read the whole record.
 pub(crate) const DISMISSED: u32 = u32::MAX;
 const DISMISSAL_LOOK: Duration = Duration::from_millis(1);
-/// The supervisor kills within this.
-const KILL_LIMIT: Duration = Duration::from_secs(5);
+/// The supervisor kills, stops and continues within this.
+const ORDER_LIMIT: Duration = Duration::from_secs(5);
+/// It starts a process within this.
+const RESTART_LIMIT: Duration = Duration::from_secs(30);
 
 /// Runs the world of a swarm until its mission ends.
 ///
@@ -118,6 +121,9 @@ impl Air {
 
     fn tick(&mut self, pacer: Option<&mut Pacer>) -> Result<(), RuntimeError> {
         let tick = self.world.tick();
+        for order in self.world.orders().to_vec() {
+            self.carry_out(order)?;
+        }
         let down = self.world.downlink();
         self.down.send(tick, down.byte_len(), |bytes| down.write_to(bytes))?;
         self.control.open_tick(tick)?;
@@ -127,6 +133,37 @@ impl Air {
         self.take_frames()?;
         self.world.advance();
         self.tell()
+    }
+
+    /// Has the supervisor do what the tick's faults do to processes, and waits until it is done.
+    fn carry_out(&mut self, order: ProcessOrder) -> Result<(), RuntimeError> {
+        let (kind, id) = match order {
+            ProcessOrder::Kill(id) => (OrderKind::Kill, id),
+            ProcessOrder::Freeze(id) => (OrderKind::Freeze, id),
+            ProcessOrder::Resume(id) => (OrderKind::Resume, id),
+            ProcessOrder::Restart(id, _) => (OrderKind::Restart, id),
+        };
+        let limit = if kind == OrderKind::Restart { RESTART_LIMIT } else { ORDER_LIMIT };
+        let reply = self.control.give_order(Order { kind, drone: id, tick: self.world.tick() }, limit)?;
+        let drone = id.index();
+        match order {
+            // Whoever is gone already is as dead as can be.
+            ProcessOrder::Kill(_) => self.answers[drone] = Answer::Dead,
+            ProcessOrder::Freeze(_) => self.answers[drone] = Answer::Absent,
+            // Gone meanwhile: it is found dead in this tick.
+            ProcessOrder::Resume(_) => self.answers[drone] = Answer::Pending,
+            ProcessOrder::Restart(_, incarnation) => {
+                if reply != incarnation {
+                    let what =
+                        format!("drone {id} was not started again: expected incarnation {incarnation}, got {reply}");
+                    return Err(RuntimeError::Process(what));
+                }
+                self.answers[drone] = Answer::Pending;
+                (self.taken[drone], self.due[drone]) = (0, 0);
+                self.connect()?;
+            }
+        }
+        Ok(())
     }
 
     /// Slots of those that answered; those that are gone; those that are late.
@@ -140,16 +177,22 @@ impl Air {
                     self.world.take_slot(id, &slot);
                 }
                 Answer::Late => self.world.hold(id),
-                Answer::Dead => self.world.mark_dead(id, FaultKind::Kill, false, "its process ended unasked"),
+                Answer::Dead => self.mark_dead(drone),
                 Answer::Hung => {
                     let order = Order { kind: OrderKind::Kill, drone: id, tick: self.world.tick() };
-                    self.control.give_order(order, KILL_LIMIT)?;
+                    self.control.give_order(order, ORDER_LIMIT)?;
                     self.world.mark_dead(id, FaultKind::Hung, false, "it did not answer for 5 s and was killed");
                 }
+                // Stopped, and killed by somebody else meanwhile.
+                Answer::Absent if self.control.is_dead(drone) => self.mark_dead(drone),
                 Answer::Pending | Answer::Absent => {}
             }
         }
         Ok(())
+    }
+
+    fn mark_dead(&mut self, drone: usize) {
+        self.world.mark_dead(DroneId(drone as u32), FaultKind::Kill, false, "its process ended unasked");
     }
 
     /// Drains each shard of just what its drones have announced: every further call would look through all of them. Of
@@ -168,7 +211,9 @@ impl Air {
                     return Err(RuntimeError::Process(format!("frames announced on uplink {shard} did not arrive")));
                 };
                 let source = DroneId(sample.header().source);
-                if let Some(taken) = self.taken.get_mut(source.index()) {
+                let current = self.world.incarnation(source) == Some(sample.header().incarnation);
+                // What a process before this one said by the wall clock and nobody fetched is lost with it.
+                if let Some(taken) = self.taken.get_mut(source.index()).filter(|_| current) {
                     *taken += sample.frames().len() as u64;
                     self.world.take_frames(source, sample.frames());
                 }

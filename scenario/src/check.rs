@@ -1,5 +1,6 @@
 //! A tree of values against the generated schema: keys, types, words and ranges, each error with its place.
 
+use crate::faults::FaultTarget;
 use crate::node::{Data, Entry, Node, Place, number};
 use crate::reference::{self, unit};
 use crate::strategy::Strategy;
@@ -41,6 +42,9 @@ impl Walk {
 
     fn value(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
         let schema = present(schema);
+        if schema["format"] == "sides" {
+            return self.sides(node, &schema["anyOf"][1], key);
+        }
         if let Some(words) = words(schema) {
             return self.word(node, &words, key);
         }
@@ -57,6 +61,7 @@ impl Walk {
                 _ => self.wrong(node, key, "true or false"),
             },
             _ if schema["format"] == "strategy" => self.strategy(node, key),
+            _ if schema["format"] == "fault-target" => self.target(node, key),
             _ => match &node.data {
                 Data::Text(text) => text.clone().into(),
                 _ => self.wrong(node, key, "a string"),
@@ -84,6 +89,23 @@ impl Walk {
                 let hint = did_you_mean(text, Strategy::WORDS.iter().map(|(word, _)| *word));
                 self.complain(&node.place, key, format!("{error}{hint}"))
             }
+        }
+    }
+
+    fn target(&mut self, node: &Node, key: &str) -> Json {
+        let text = if let Data::Text(text) = &node.data { text.clone() } else { node.found() };
+        match text.parse::<FaultTarget>() {
+            Ok(target) => target.to_string().into(),
+            Err(error) => self.complain(&node.place, key, error.to_string()),
+        }
+    }
+
+    /// A word, or lists of drones.
+    fn sides(&mut self, node: &Node, lists: &Json, key: &str) -> Json {
+        match &node.data {
+            Data::List(_) => self.list(node, lists, key),
+            Data::Text(text) if text == "halves" => text.clone().into(),
+            _ => self.wrong(node, key, &format!("\"halves\" or an array {}", lengths(lists))),
         }
     }
 

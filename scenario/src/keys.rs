@@ -1,6 +1,7 @@
 //! The keys of a scenario. These types are the one source of truth: their doc comments, ranges and defaults make the
 //! JSON schema, which makes the checks and the key reference.
 
+use crate::faults::{Fault, Faults, MAX_FAULTS};
 use crate::obstacle::Obstacle;
 use crate::radio::RadioKeys;
 use crate::strategy::Strategy;
@@ -23,7 +24,7 @@ pub struct Scenario {
     #[serde(default)]
     #[schemars(regex(pattern = "^[A-Za-z0-9_][A-Za-z0-9._-]{0,63}$"))]
     pub name: String,
-    /// Seed of everything random: radio, start jitter. Equal seeds give equal runs.
+    /// Seed of everything random: radio, start jitter, faults. Equal seeds give equal runs.
     #[serde(default = "first_seed")]
     #[schemars(range(min = 0, max = 9_223_372_036_854_775_807_i64))]
     pub seed: u64,
@@ -62,6 +63,10 @@ pub struct Scenario {
     /// What becomes of drones that fail.
     #[serde(default)]
     pub faults: Faults,
+    /// What goes wrong on purpose, numbered from 0 in the file's order.
+    #[serde(default, rename = "fault")]
+    #[schemars(length(max = MAX_FAULTS))]
+    pub fault_plan: Vec<Fault>,
     /// Obstacles, numbered from 0 in the file's order.
     #[serde(default, rename = "obstacle")]
     #[schemars(length(max = MAX_OBSTACLES))]
@@ -355,28 +360,4 @@ impl Default for Guidance {
     fn default() -> Self {
         Self { velocity_gain_per_s: 2.0, filter_gain_per_s: 1.5, filter_margin: 0.02, precedence_share: 0.9 }
     }
-}
-
-/// What becomes of drones that fail.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Faults {
-    /// What a drone does whose process is dead.
-    pub failsafe: Failsafe,
-}
-
-impl Default for Faults {
-    fn default() -> Self {
-        Self { failsafe: Failsafe::Hover }
-    }
-}
-
-/// What a drone does whose process is dead.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Failsafe {
-    /// Brakes and hovers.
-    Hover,
-    /// Brakes and lands.
-    Land,
 }

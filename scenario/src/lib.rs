@@ -1,11 +1,13 @@
 //! TOML → a checked [`Scenario`]. Pure: text in, scenario out; reading files is the caller's.
 //!
-//! The types in `keys`, `obstacle`, `radio` and `strategy` are the one source of truth: schemars makes the JSON [`schema`] of
-//! their doc comments, ranges and defaults; the checks walk the text against that schema, and [`markdown`] prints it as
-//! the key reference `docs/scenario.md`.
+//! The types in `keys`, `faults`, `obstacle`, `radio` and `strategy` are the one source of truth: schemars makes the JSON
+//! [`schema`] of their doc comments, ranges and defaults; the checks walk the text against that schema, and [`markdown`]
+//! prints it as the key reference `docs/scenario.md`.
 
 mod check;
 mod error;
+mod fault_rules;
+mod faults;
 mod keys;
 mod near;
 mod node;
@@ -18,9 +20,10 @@ mod rules;
 mod strategy;
 
 pub use error::{Issue, ScenarioErrors};
+pub use faults::{Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, MAX_FAULTS, Sensor, Sides};
 pub use keys::{
-    Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
-    Protocol, Reformation, Scenario, Sensors, Time,
+    Avoidance, Drone, End, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol,
+    Reformation, Scenario, Sensors, Time,
 };
 pub use obstacle::Obstacle;
 pub use parse::Source;

@@ -140,9 +140,14 @@ impl Node {
                     &mut entries.entry(step.to_owned()).or_insert_with(fresh).node
                 }
                 Data::List(items) => {
-                    let len = items.len();
-                    step.parse().ok().and_then(|i: usize| items.get_mut(i)).ok_or_else(|| {
-                        format!("found index {step:?}, expected one below {len}, the number of entries of {at}")
+                    let (len, index) = (items.len(), step.parse::<usize>().ok());
+                    if index == Some(len) {
+                        items.push(Self::empty(number, needs_list));
+                    }
+                    index.and_then(|index| items.get_mut(index)).ok_or_else(|| {
+                        format!(
+                            "found index {step:?}, expected {len} at most: {at} has {len} entries, one more is made"
+                        )
                     })?
                 }
                 _ => return Err(format!("{at} is one value: expected no key or index {step:?} below it")),

@@ -117,6 +117,9 @@ fn values(schema: &Json) -> String {
     if let Some(words) = words(schema) {
         return words.iter().map(|w| format!("`\"{w}\"`")).collect::<Vec<_>>().join(", ");
     }
+    if schema["format"] == "sides" {
+        return format!("`\"halves\"`, or {}", array_values(&schema["anyOf"][1]));
+    }
     if let Some(word) = schema["const"].as_str() {
         return format!("`\"{word}\"`");
     }

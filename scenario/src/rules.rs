@@ -2,9 +2,9 @@
 
 use crate::check::quantity;
 use crate::keys::{End, Scenario};
-use crate::near;
 use crate::node::number;
 use crate::strategy::Strategy;
+use crate::{fault_rules, near};
 use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
@@ -29,6 +29,7 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
     rules.spacing();
     rules.obstacles();
     rules.broken.extend(crate::radio::broken(scenario));
+    rules.broken.extend(fault_rules::broken(scenario));
     rules.broken
 }
 

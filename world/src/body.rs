@@ -44,14 +44,32 @@ impl Body {
 
     /// One tick of a drone whose process is gone: it brakes to a stop, then stays, or descends and is gone.
     pub fn fail_safe(&mut self, params: &WorldParams) {
+        if !self.brake(params) && params.failsafe == Failsafe::Land {
+            self.altitude_m -= DESCENT_MPS * params.dt_s();
+        }
+    }
+
+    /// One tick of a drone whose process is frozen: it brakes to a stop and stays, whatever the failsafe.
+    pub fn hover(&mut self, params: &WorldParams) {
+        self.energy_j += power_w(self.velocity.norm()) * params.dt_s();
+        self.brake(params);
+    }
+
+    /// A new process flies the drone again, at its old altitude.
+    pub fn revive(&mut self) {
+        self.alive = true;
+        self.altitude_m = ALTITUDE_M;
+    }
+
+    /// Brakes as hard as it can; false if it stands still.
+    fn brake(&mut self, params: &WorldParams) -> bool {
         let dt = params.dt_s();
         let speed = self.velocity.norm();
         if speed > 0.0 {
             let rest = (speed - params.acceleration_max_mps2 * dt).max(0.0);
             self.glide(self.velocity * (rest / speed), dt);
-        } else if params.failsafe == Failsafe::Land {
-            self.altitude_m -= DESCENT_MPS * dt;
         }
+        speed > 0.0
     }
 
     fn glide(&mut self, velocity: Vec2, dt: f64) {

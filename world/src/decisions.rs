@@ -137,6 +137,7 @@ mod tests {
             sequence: 0,
             position_m: [0.0; 2],
             queue_ns: 0,
+            cuts: Default::default(),
             frame: message.encode(),
         }
     }

@@ -10,10 +10,12 @@
 //! | `body`, `geometry`, `grid`, `senses` | kinematics; distances; who is near whom and what |
 //! | `process` | a drone's process, as far as the world sees it |
 //! | `invariants`, `stages`, `finish` | what must hold; obstacle sets on the way; when the mission is over |
+//! | [`faults`] | what a scenario makes go wrong: the plan, and what of it is due and in force |
 //! | `decisions`, `totals`, `log` | what leaders said, what was counted, both told as events |
 
 mod body;
 mod decisions;
+pub mod faults;
 mod finish;
 mod geometry;
 mod grid;

@@ -1,5 +1,6 @@
 //! What a mission is made of, beside its drones and obstacles. SI units, world frame.
 
+use crate::faults::FaultPlan;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::Channel;
@@ -69,6 +70,8 @@ pub struct WorldParams {
     pub shape: Shape,
     /// Its spacing, m.
     pub spacing_m: f64,
+    /// What is to go wrong.
+    pub faults: FaultPlan,
 }
 
 /// Why no world can be made.

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::invariants::Obedience;
-use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_LATE, ROW_LEADS, ROW_QUEUED};
+use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED};
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
 
 /// How a drone has answered in the current tick.
@@ -11,6 +11,8 @@ pub(crate) enum Answer {
     Awaited,
     Given,
     Late,
+    /// It is frozen: no answer is awaited.
+    Frozen,
 }
 
 /// One drone's process.
@@ -20,6 +22,8 @@ pub(crate) struct Process {
     pub slot: Slot,
     pub answer: Answer,
     pub incarnation: u32,
+    /// Whether it is stopped.
+    pub frozen: bool,
     pub obedience: Obedience,
     sequence: u32,
 }
@@ -30,6 +34,7 @@ impl Default for Process {
             slot: Slot::default(),
             answer: Answer::Awaited,
             incarnation: 1,
+            frozen: false,
             obedience: Obedience::default(),
             sequence: 0,
         }
@@ -38,8 +43,8 @@ impl Default for Process {
 
 impl Process {
     /// Its last command goes on; it heard nothing in this tick.
-    pub fn hold(&mut self) {
-        self.answer = Answer::Late;
+    pub fn hold(&mut self, why: Answer) {
+        self.answer = why;
         self.slot =
             Slot { heard: 0, duplicates: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
     }
@@ -58,6 +63,7 @@ impl Process {
         let flags = flag(slot.flags & SLOT_LEADS != 0, ROW_LEADS)
             | flag(slot.flags & SLOT_QUEUED != 0, ROW_QUEUED)
             | flag(self.answer == Answer::Late, ROW_LATE)
+            | flag(self.frozen, ROW_FROZEN)
             | ROW_ALIVE;
         DroneRow {
             position_m: body.position.into(),

@@ -5,7 +5,8 @@ use crate::geometry::{Nearest, Outline};
 use crate::grid::Neighbours;
 use skein_protocol::downlink::{Downlink, SenseHead, SensedNeighbour, SensedObstacle, SensedShape};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, ObstacleId};
+use skein_protocol::sides::Cuts;
+use skein_protocol::{DroneId, ObstacleId, Vec2};
 
 /// An obstacle that a living drone senses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +68,23 @@ impl Surroundings {
     }
 }
 
+/// What a drone is told differently from the truth.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hindrance {
+    /// Its radio.
+    pub cuts: Cuts,
+    /// Added to its reaction time, s.
+    pub extra_reaction_s: f64,
+    /// It senses no obstacles.
+    pub no_obstacles: bool,
+    /// It senses no neighbours.
+    pub no_ranging: bool,
+    /// Added to what it is told of its own position, m. What it ranges, it ranges right.
+    pub position_error_m: Vec2,
+    /// Added to what it is told of its own velocity, m/s.
+    pub velocity_error_mps: Vec2,
+}
+
 /// Writes senses into a downlink, each sensed shape once.
 #[derive(Clone, Debug)]
 pub(crate) struct Teller {
@@ -85,7 +103,7 @@ impl Teller {
     pub fn tell(
         &mut self,
         bodies: &[Body],
-        incarnations: impl Iterator<Item = u32>,
+        drones: impl Iterator<Item = (u32, Hindrance)>,
         around: &Surroundings,
         ranging_m: Option<f64>,
         down: &mut Downlink,
@@ -96,29 +114,31 @@ impl Teller {
         down.shapes.clear();
         self.places.fill(u32::MAX);
         let mut contacts = around.contacts.iter().peekable();
-        for ((drone, body), incarnation) in bodies.iter().enumerate().zip(incarnations) {
+        for ((drone, body), (incarnation, hindrance)) in bodies.iter().enumerate().zip(drones) {
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
-                self.tell_contact(contact, down);
+                self.tell_contact(contact, hindrance.position_error_m, down);
             }
-            if let (true, Some(range)) = (body.alive, ranging_m) {
+            if let (true, Some(range)) = (body.alive && !hindrance.no_ranging, ranging_m) {
                 tell_neighbours(body, bodies, around.neighbours.of(drone), range, down);
             }
             down.drones.push(SenseHead {
-                position_m: body.position.into(),
-                velocity_mps: body.velocity.into(),
+                position_m: (body.position + hindrance.position_error_m).into(),
+                velocity_mps: (body.velocity + hindrance.velocity_error_mps).into(),
                 obstacle_first,
                 obstacle_count: down.obstacles.len() as u32 - obstacle_first,
                 neighbour_first,
                 neighbour_count: down.neighbours.len() as u32 - neighbour_first,
                 alive: u32::from(body.alive),
                 incarnation,
-                reserved: [0; 2],
+                cuts: hindrance.cuts,
+                extra_reaction_s: hindrance.extra_reaction_s,
             });
         }
     }
 
-    fn tell_contact(&mut self, contact: &Contact, down: &mut Downlink) {
+    /// A drone measures where an obstacle is from itself: an error of its own position moves the point along.
+    fn tell_contact(&mut self, contact: &Contact, error_m: Vec2, down: &mut Downlink) {
         let obstacle = contact.obstacle as usize;
         if self.places[obstacle] == u32::MAX {
             self.places[obstacle] = down.shapes.len() as u32;
@@ -126,7 +146,7 @@ impl Teller {
             down.shapes.push(SensedShape { shape, id, reserved: 0 });
         }
         down.obstacles.push(SensedObstacle {
-            nearest_m: contact.nearest.point.into(),
+            nearest_m: (contact.nearest.point + error_m).into(),
             distance_m: contact.nearest.distance_m,
             shape: self.places[obstacle],
             reserved: 0,
@@ -156,10 +176,15 @@ mod tests {
     const REACH: Reach = Reach { bodies_m: 66.0, detection_m: 90.0, clearance_m: 15.0 };
 
     fn told(bodies: &[Body], shapes: &[ConvexShape], ranging_m: Option<f64>) -> Downlink {
+        told_to(bodies, shapes, ranging_m, Hindrance::default())
+    }
+
+    fn told_to(bodies: &[Body], shapes: &[ConvexShape], ranging_m: Option<f64>, hindrance: Hindrance) -> Downlink {
         let outlines: Vec<Outline> = shapes.iter().map(Outline::new).collect();
         let (mut around, mut down) = (Surroundings::default(), Downlink::default());
         around.survey(bodies, &outlines, REACH);
-        Teller::new(shapes).tell(bodies, std::iter::repeat(1), &around, ranging_m, &mut down);
+        let drones = std::iter::repeat((1, hindrance));
+        Teller::new(shapes).tell(bodies, drones, &around, ranging_m, &mut down);
         down.seal(0, SimTime::ZERO);
         down
     }
@@ -190,7 +215,21 @@ mod tests {
     }
 
     #[test]
+    fn an_error_of_ones_own_position_leaves_what_is_ranged_right() {
+        let (position_error_m, velocity_error_mps) = (Vec2::new(3.0, -1.0), Vec2::new(0.5, 0.0));
+        let hindrance = Hindrance { position_error_m, velocity_error_mps, ..Hindrance::default() };
+        let all = bodies(&[[0.0, 0.0], [50.0, 0.0]]);
+        let down = told_to(&all, &[rectangle(80.0, 0.0, 10.0, 10.0)], Some(66.0), hindrance);
+        let senses = down.view().senses(DroneId(0)).unwrap();
+        assert_eq!((senses.position, senses.velocity), (position_error_m, velocity_error_mps));
+        assert_eq!((senses.obstacles[0].nearest_m, senses.obstacles[0].distance_m), ([73.0, -1.0], 70.0));
+        assert_eq!(senses.neighbours[0].position_m, [50.0, 0.0]);
+    }
+
+    #[test]
     fn ranging_can_be_off() {
+        let blind = Hindrance { no_ranging: true, ..Hindrance::default() };
+        assert!(told_to(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), blind).neighbours.is_empty());
         assert!(told(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], None).neighbours.is_empty());
     }
 

@@ -54,6 +54,26 @@ impl Stages {
         self.stages.push(Stage { centre_x_m, detected: false, passed: false });
     }
 
+    /// Number of sets.
+    pub fn count(&self) -> usize {
+        self.stages.len()
+    }
+
+    /// Mean abscissa of the centres of a set's boxes, m.
+    pub fn centre_x_m(&self, number: usize) -> f64 {
+        self.stages[number].centre_x_m
+    }
+
+    /// Whether a living drone has sensed the set.
+    pub fn is_detected(&self, number: usize) -> bool {
+        self.stages[number].detected
+    }
+
+    /// Whether the last living drone has passed the set.
+    pub fn is_passed(&self, number: usize) -> bool {
+        self.stages[number].passed
+    }
+
     /// Whether all sets are passed.
     pub fn all_passed(&self) -> bool {
         self.stages.iter().all(|stage| stage.passed)

@@ -1,6 +1,7 @@
 //! Fixtures of this crate's tests.
 
 use crate::body::Body;
+use crate::faults::FaultPlan;
 use crate::params::{End, Failsafe, WorldParams};
 use crate::world::World;
 use skein_protocol::formation::Shape;
@@ -27,6 +28,7 @@ pub(crate) fn params() -> WorldParams {
         arrival_error_m: 0.8,
         shape: Shape::NestedV,
         spacing_m: 35.0,
+        faults: FaultPlan::default(),
     }
 }
 

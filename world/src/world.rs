@@ -1,11 +1,13 @@
 //! One mission, a tick at a time.
 //!
-//! In each tick: [`World::downlink`]; then for each living drone [`World::take_slot`] and [`World::take_frames`], or
+//! In each tick: [`World::orders`], and what they say done to processes; [`World::downlink`]; then for each living drone [`World::take_slot`] and [`World::take_frames`], or
 //! [`World::hold`], or [`World::mark_dead`]; then [`World::advance`] and [`World::record`]. When [`World::ended`] says
 //! so: [`World::finish`] and, once more, [`World::record`].
 
 use crate::body::{Body, admissible};
 use crate::decisions::Decisions;
+use crate::faults::ProcessOrder;
+use crate::faults::engine::Engine;
 use crate::finish::Finish;
 use crate::geometry::Outline;
 use crate::invariants::Distances;
@@ -41,6 +43,11 @@ pub struct World {
     distances: Distances,
     stages: Stages,
     decisions: Decisions,
+    faults: Engine,
+    /// What the tick's faults do to processes.
+    orders: Vec<ProcessOrder>,
+    /// Whether the current tick is open.
+    open: bool,
     finish: Finish,
     log: Log,
     totals: Totals,
@@ -76,6 +83,9 @@ impl World {
             distances: Distances::new(&bodies, params.safe_distance_m, params.clearance_m),
             stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
             decisions: Decisions::new(bodies.len()),
+            faults: Engine::new(params.faults.clone(), bodies.len()),
+            orders: Vec::new(),
+            open: false,
             finish: Finish::default(),
             log: Log::default(),
             totals: Totals::default(),
@@ -109,11 +119,12 @@ impl World {
 
     /// Everybody's senses in the current tick, and the frames sent in the tick before.
     pub fn downlink(&mut self) -> &Downlink {
-        let now = self.now();
-        self.stages.detect(&self.around.contacts, now, &mut self.log);
-        let incarnations = self.processes.iter().map(|process| process.incarnation);
-        self.teller.tell(&self.bodies, incarnations, &self.around, self.params.ranging_m, &mut self.down);
-        self.down.seal(self.tick, now);
+        self.open();
+        let (tick, faults) = (self.tick, &self.faults);
+        let told = |(process, id): (&Process, u32)| (process.incarnation, faults.hindrance(DroneId(id), tick));
+        let drones = self.processes.iter().zip(0..).map(told);
+        self.teller.tell(&self.bodies, drones, &self.around, self.params.ranging_m, &mut self.down);
+        self.down.seal(tick, self.now());
         &self.down
     }
 
@@ -129,8 +140,16 @@ impl World {
     pub fn take_frames(&mut self, id: DroneId, frames: &[Frame]) {
         let Some(body) = self.bodies.get(id.index()).filter(|body| body.alive) else { return };
         let (tick, position_m, process) = (self.tick, body.position.into(), &mut self.processes[id.index()]);
-        let stamp =
-            |&frame| AirFrame { tick, source: id, sequence: process.next_sequence(), position_m, queue_ns: 0, frame };
+        let cuts = self.faults.standing(id).cuts;
+        let stamp = |&frame| AirFrame {
+            tick,
+            source: id,
+            sequence: process.next_sequence(),
+            position_m,
+            queue_ns: 0,
+            cuts,
+            frame,
+        };
         self.sent.extend(frames.iter().map(stamp));
         self.totals.sent += frames.len() as u64;
     }
@@ -138,7 +157,7 @@ impl World {
     /// A drone did not answer in time (wall clock only): its last command holds, the miss is counted.
     pub fn hold(&mut self, id: DroneId) {
         if let Some(process) = self.living(id).filter(|process| process.answer != Answer::Late) {
-            process.hold();
+            process.hold(Answer::Late);
             self.totals.deadline_misses += 1;
         }
     }
@@ -149,6 +168,7 @@ impl World {
         let now = self.now();
         let Some(body) = self.bodies.get_mut(id.index()).filter(|body| body.alive) else { return };
         body.alive = false;
+        self.processes[id.index()].frozen = false;
         self.decisions.forget(id);
         self.log.push(now, Happening::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
     }
@@ -160,6 +180,12 @@ impl World {
             process.obedience.restart();
             self.decisions.forget(id);
         }
+    }
+
+    /// The incarnation of a drone's process; `None` if there is no such drone.
+    #[must_use]
+    pub fn incarnation(&self, id: DroneId) -> Option<u32> {
+        self.processes.get(id.index()).map(|process| process.incarnation)
     }
 
     /// Ends the tick: commands, bodies, energy, invariants, stages, end condition, digest, record. A living drone
@@ -247,7 +273,7 @@ impl World {
     }
 
     fn living(&mut self, id: DroneId) -> Option<&mut Process> {
-        self.is_alive(id).then(|| &mut self.processes[id.index()])
+        self.is_alive(id).then(|| &mut self.processes[id.index()]).filter(|process| !process.frozen)
     }
 
     fn survey(&mut self) {
@@ -268,6 +294,10 @@ impl World {
             if !self.bodies[index].alive {
                 continue;
             }
+            if self.processes[index].frozen {
+                self.processes[index].hold(Answer::Frozen);
+                continue;
+            }
             if self.processes[index].answer == Answer::Awaited {
                 self.hold(id);
             }
@@ -280,14 +310,19 @@ impl World {
     }
 
     fn move_bodies(&mut self) {
-        for (body, process) in self.bodies.iter_mut().zip(&self.processes) {
+        let now = self.now();
+        for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
             if !body.alive {
                 body.fail_safe(&self.params);
                 continue;
             }
+            if process.frozen {
+                body.hover(&self.params);
+                continue;
+            }
             let command = admissible(process.slot.acceleration_mps2, self.params.acceleration_max_mps2);
             self.totals.rejected_commands += u64::from(command.is_none());
-            body.fly(command.unwrap_or_default(), &self.params);
+            body.fly(command.unwrap_or_default() + self.faults.wind_mps2(DroneId(id), now), &self.params);
         }
     }
 
@@ -297,7 +332,7 @@ impl World {
         }
         let (outcome, reason) = if self.finish.met(&self.params, &self.bodies, &self.stages) {
             (Outcome::Reached, "the end condition is met".to_owned())
-        } else if !self.bodies.iter().any(|body| body.alive) {
+        } else if !self.bodies.iter().any(|body| body.alive) && !self.faults.awaits_restarts() {
             (Outcome::Timeout, "no drone is left alive".to_owned())
         } else if end >= SimTime::from_secs(self.params.timeout_s) {
             (Outcome::Timeout, format!("the time of {} s is over", self.params.timeout_s))
@@ -348,6 +383,7 @@ impl World {
             digest: self.digest(),
         };
         self.tick += 1;
+        self.open = false;
     }
 }
 
@@ -360,5 +396,6 @@ fn check_bodies(starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<()
     shapes.try_for_each(|(index, shape)| shape.check().map_err(|error| WorldError::Obstacle { index, error }))
 }
 
+mod orders;
 #[cfg(test)]
 mod tests;

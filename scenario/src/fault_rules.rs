@@ -1,0 +1,146 @@
+//! What a fault's keys must be to each other.
+
+use crate::faults::{Fault, FaultEvent, FaultKind};
+use crate::keys::Scenario;
+use crate::rules::Broken;
+use skein_protocol::sides::MAX_PARTITIONS;
+use std::collections::BTreeSet;
+
+/// All broken rules of a scenario's faults.
+pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
+    let mut broken = Vec::new();
+    for (number, fault) in scenario.fault_plan.iter().enumerate() {
+        let mut rules = Rules { path: format!("fault.{number}"), scenario, fault, broken: &mut broken };
+        rules.when();
+        rules.whom();
+        rules.keys_of_kind();
+        rules.sides();
+    }
+    let mut partitions = scenario.fault_plan.iter().enumerate().filter(|(_, f)| f.kind == FaultKind::Partition);
+    if let Some((number, _)) = partitions.nth(MAX_PARTITIONS) {
+        let message = format!("found one more partition, expected at most {MAX_PARTITIONS} in a scenario");
+        broken.push(Broken { keys: vec![format!("fault.{number}.kind")], message });
+    }
+    broken
+}
+
+struct Rules<'a> {
+    path: String,
+    scenario: &'a Scenario,
+    fault: &'a Fault,
+    broken: &'a mut Vec<Broken>,
+}
+
+impl Rules<'_> {
+    fn expect(&mut self, holds: bool, keys: &[&str], message: impl FnOnce() -> String) {
+        if !holds {
+            let keys = keys.iter().map(|key| format!("{}.{key}", self.path)).collect();
+            self.broken.push(Broken { keys, message: message() });
+        }
+    }
+
+    fn when(&mut self) {
+        let fault = self.fault;
+        self.expect(fault.at_s.is_some() || fault.on.is_some(), &["at_s", "kind"], || {
+            "is missing: expected when the fault happens, either at_s or on".to_owned()
+        });
+        self.expect(fault.at_s.is_none() || fault.on.is_none(), &["on"], || {
+            "expected either this key or at_s, not both".to_owned()
+        });
+        self.expect(fault.on.is_some() || fault.after_s == 0.0, &["after_s"], || {
+            "belongs to an event: expected the key on beside it".to_owned()
+        });
+        let Some(event) = fault.on else {
+            let message = || "belongs to an event: expected the key on beside it".to_owned();
+            return self.expect(fault.stage == 0, &["stage"], message);
+        };
+        let sets = self.scenario.obstacles.len();
+        let election = matches!(event, FaultEvent::LeaderElected | FaultEvent::GroupLeaderElected);
+        self.expect(election || sets > 0, &["on"], || {
+            "waits for an obstacle set, expected at least one [[obstacle]]".to_owned()
+        });
+        self.expect(election || sets == 0 || (fault.stage as usize) < sets, &["stage"], || {
+            format!("found {}, expected an obstacle set from 0 to {} at most", fault.stage, sets - 1)
+        });
+    }
+
+    fn whom(&mut self) {
+        let fault = self.fault;
+        let keys =
+            [("drone", fault.drone.is_some()), ("drones", fault.drones.is_some()), ("target", fault.target.is_some())];
+        let written: Vec<&str> = keys.iter().filter(|(_, is)| *is).map(|(key, _)| *key).collect();
+        match (fault.kind, written.as_slice()) {
+            (FaultKind::Partition, [key, ..]) => {
+                self.expect(false, &[key], || "does not belong to a partition, expected its drones in sides".to_owned())
+            }
+            (FaultKind::Partition | FaultKind::Wind, []) | (_, [_]) => {}
+            (_, []) => self.expect(false, &["target", "kind"], || {
+                "is missing: expected whom the fault meets, one of drone, drones, target".to_owned()
+            }),
+            (_, [_, second, ..]) => {
+                self.expect(false, &[second], || format!("expected either this key or {}, not both", written[0]));
+            }
+        }
+        let drones = self.scenario.formation.drones;
+        let named = [("drone", fault.drone.as_slice()), ("drones", fault.drones.as_deref().unwrap_or_default())];
+        for (key, ids) in named {
+            for &id in ids.iter().filter(|id| **id >= drones) {
+                self.expect(false, &[key], || format!("found drone {id}, expected one from 0 to {}", drones - 1));
+            }
+        }
+    }
+
+    /// Keys that only some kinds have, and those that they need.
+    fn keys_of_kind(&mut self) {
+        use FaultKind::{Blind, Freeze, Noise, Partition, Restart, Slow, Wind};
+        let fault = self.fault;
+        let keys = [
+            ("reaction_time_s", fault.reaction_time_s.is_some(), Slow),
+            ("sides", fault.sides.is_some(), Partition),
+            ("sensor", fault.sensor.is_some(), Blind),
+            ("position_bias_m", fault.position_bias_m.is_some(), Noise),
+            ("position_std_m", fault.position_std_m.is_some(), Noise),
+            ("velocity_bias_mps", fault.velocity_bias_mps.is_some(), Noise),
+            ("velocity_std_mps", fault.velocity_std_mps.is_some(), Noise),
+            ("wind_mps2", fault.wind_mps2.is_some(), Wind),
+            ("gust_mps2", fault.gust_mps2.is_some(), Wind),
+            ("gust_s", fault.gust_s.is_some(), Wind),
+        ];
+        for (key, _, kind) in keys.iter().filter(|(_, is, kind)| *is && *kind != fault.kind) {
+            let found = fault.kind.word();
+            self.expect(false, &[key], || format!("belongs to kind = {:?}, found kind = {found:?}", kind.word()));
+        }
+        let has = |wanted: &[&str]| keys.iter().any(|(key, is, _)| *is && wanted.contains(key));
+        let needed: &[&str] = match fault.kind {
+            Slow => &["reaction_time_s"],
+            Partition => &["sides"],
+            Noise => &["position_std_m", "position_bias_m", "velocity_std_mps", "velocity_bias_mps"],
+            Wind => &["wind_mps2", "gust_mps2"],
+            _ => &[],
+        };
+        self.expect(needed.is_empty() || has(needed), &[needed.first().unwrap_or(&"kind"), "kind"], || {
+            format!("is missing: kind = {:?} needs {}", fault.kind.word(), needed.join(" or "))
+        });
+        let spans = matches!(fault.kind, Freeze | Restart);
+        self.expect(!spans || fault.for_s.is_some(), &["for_s", "kind"], || {
+            format!("is missing: kind = {:?} needs for_s", fault.kind.word())
+        });
+        self.expect(fault.kind != FaultKind::Kill || fault.for_s.is_none(), &["for_s"], || {
+            "does not belong to kind = \"kill\", expected kind = \"restart\" for a drone that comes back".to_owned()
+        });
+    }
+
+    fn sides(&mut self) {
+        let Some(sides) = &self.fault.sides else { return };
+        let drones = self.scenario.formation.drones;
+        let sides = sides.of(drones);
+        self.expect(sides.iter().all(|side| !side.is_empty()), &["sides"], || {
+            format!("found an empty side with {drones} drones, expected at least one drone on each")
+        });
+        let mut seen = BTreeSet::new();
+        for id in sides.into_iter().flatten() {
+            self.expect(id < drones, &["sides"], || format!("found drone {id}, expected one from 0 to {}", drones - 1));
+            self.expect(seen.insert(id), &["sides"], || format!("found drone {id} twice, expected it on one side"));
+        }
+    }
+}

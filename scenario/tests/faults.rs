@@ -1,0 +1,127 @@
+//! The keys of faults: what is read, and what is refused with its place.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+use skein_scenario::{Fault, FaultEvent, FaultKind, FaultTarget, Scenario, ScenarioErrors, Source};
+
+const HEAD: &str = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [300, 0]\nradius_m = 20\n";
+const SOURCE: Source<'_> = Source { name: "f.toml", stem: "f" };
+
+fn parse(text: &str, sets: &[(&str, &str)]) -> Result<Scenario, ScenarioErrors> {
+    let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    Scenario::parse(text, SOURCE, &sets)
+}
+
+/// The only fault of a scenario with these lines.
+fn fault(lines: &str) -> Fault {
+    let scenario = parse(&format!("{HEAD}[[fault]]\n{lines}"), &[]).unwrap_or_else(|errors| panic!("{errors}"));
+    scenario.fault_plan[0].clone()
+}
+
+#[test]
+fn every_kind_is_read_and_survives_json_and_toml() {
+    let faults = "[[fault]]\nkind = \"kill\"\nat_s = 12.0\ndrone = 3\n\
+        [[fault]]\nkind = \"freeze\"\non = \"queued\"\nafter_s = 1\ntarget = \"leader\"\nfor_s = 2\n\
+        [[fault]]\nkind = \"restart\"\non = \"leader-elected\"\nstage = 2\ntarget = \"group-leader:2\"\nfor_s = 2\n\
+        [[fault]]\nkind = \"slow\"\nat_s = 1\ndrones = [1, 2]\nreaction_time_s = 0.2\n\
+        [[fault]]\nkind = \"deaf\"\nat_s = 1\ntarget = \"random\"\n\
+        [[fault]]\nkind = \"mute\"\nat_s = 1\ntarget = \"all\"\n\
+        [[fault]]\nkind = \"partition\"\nat_s = 1\nsides = \"halves\"\n\
+        [[fault]]\nkind = \"partition\"\nat_s = 1\nsides = [[0, 1], [7]]\nfor_s = 3\n\
+        [[fault]]\nkind = \"blind\"\nat_s = 1\ndrone = 0\nsensor = \"ranging\"\n\
+        [[fault]]\nkind = \"noise\"\nat_s = 1\ndrone = 0\nposition_bias_m = [1, 0]\n\
+        [[fault]]\nkind = \"wind\"\nat_s = 1\ngust_mps2 = 0.2\n";
+    let scenario = parse(&format!("{HEAD}{faults}"), &[]).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!(scenario.fault_plan.len(), 11);
+    let json = serde_json::to_value(&scenario).unwrap();
+    assert_eq!(Scenario::from_json(&json, SOURCE).unwrap(), scenario);
+    assert_eq!(serde_json::from_value::<Scenario>(json).unwrap(), scenario);
+    assert_eq!(Scenario::parse(&scenario.to_toml().unwrap(), SOURCE, &[]).unwrap(), scenario);
+    let restart = &scenario.fault_plan[2];
+    assert_eq!((restart.kind, restart.on, restart.stage), (FaultKind::Restart, Some(FaultEvent::LeaderElected), 2));
+    assert_eq!(restart.target.unwrap().to_string(), "group-leader:N2");
+    let sides = |index: usize| scenario.fault_plan[index].sides.as_ref().unwrap().of(8);
+    assert_eq!(sides(6), [vec![0, 1, 2, 3], vec![4, 5, 6, 7]]);
+    assert_eq!(sides(7), [vec![0, 1], vec![7]]);
+}
+
+#[test]
+fn a_fault_is_made_by_overrides() {
+    let sets = [("fault.0", "{ kind = \"freeze\", for_s = 2 }"), ("fault.0.target", "leader"), ("fault.0.at_s", "3")];
+    let made = parse(HEAD, &sets).unwrap_or_else(|errors| panic!("{errors}")).fault_plan;
+    assert_eq!(made, [fault("kind = \"freeze\"\nfor_s = 2\ntarget = \"leader\"\nat_s = 3")]);
+    let keys = [("fault.0.kind", "kill"), ("fault.0.drone", "1"), ("fault.0.on", "gate")];
+    assert_eq!(parse(HEAD, &keys).unwrap().fault_plan[0].drone, Some(1));
+    assert_eq!(fault("kind = \"kill\"\ntarget = \"member\"\nat_s = 3").target, Some(FaultTarget::Member));
+    let wrong = parse(HEAD, &[("fault.0.kind", "kil")]).unwrap_err().to_string();
+    assert!(
+        wrong.contains("--set fault.0.kind=kil: fault.0.kind: found \"kil\"") && wrong.contains("`kill`?"),
+        "{wrong}"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_fault_is_said_with_its_place() {
+    let sides = |sides: &str| format!("kind = \"partition\"\nat_s = 1\nsides = {sides}");
+    let cases: &[(&str, &str)] = &[
+        ("kind = \"kill\"\ndrone = 1", "f.toml:7:8: fault.0.at_s: is missing: expected when the fault happens"),
+        ("at_s = 1\ndrone = 1", "f.toml:6:1: fault.0.kind: is missing"),
+        ("kind = \"kil\"\nat_s = 1\ndrone = 1", "f.toml:7:8: fault.0.kind: found \"kil\", expected one of \"kill\""),
+        (
+            "kind = \"kill\"\nat_s = 1\non = \"gate\"\ndrone = 1",
+            "f.toml:9:6: fault.0.on: expected either this key or at_s",
+        ),
+        ("kind = \"kill\"\nat_s = -1\ndrone = 1", "f.toml:8:8: fault.0.at_s: found -1, expected a number from 0"),
+        ("kind = \"kill\"\nat_s = 1\nafter_s = 1\ndrone = 1", "f.toml:9:11: fault.0.after_s: belongs to an event"),
+        ("kind = \"kill\"\nat_s = 1\nstage = 1\ndrone = 1", "f.toml:9:9: fault.0.stage: belongs to an event"),
+        (
+            "kind = \"kill\"\non = \"gate\"\nstage = 1\ndrone = 1",
+            "f.toml:9:9: fault.0.stage: found 1, expected an obstacle set",
+        ),
+        ("kind = \"kill\"\nat_s = 1", "fault.0.target: is missing: expected whom the fault meets"),
+        (
+            "kind = \"kill\"\nat_s = 1\ndrone = 1\ntarget = \"all\"",
+            "f.toml:10:10: fault.0.target: expected either this key or drone",
+        ),
+        ("kind = \"kill\"\nat_s = 1\ndrone = 8", "f.toml:9:9: fault.0.drone: found drone 8, expected one from 0 to 7"),
+        (
+            "kind = \"kill\"\nat_s = 1\ndrones = []",
+            "fault.0.drones: found an array of 0, expected an array of 1 to 10000 whole",
+        ),
+        (
+            "kind = \"kill\"\nat_s = 1\ntarget = \"boss\"",
+            "f.toml:9:10: fault.0.target: found \"boss\", expected one of \"leader\"",
+        ),
+        ("kind = \"kill\"\nat_s = 1\ndrone = 1\nfor_s = 1", "fault.0.for_s: does not belong to kind = \"kill\""),
+        ("kind = \"freeze\"\nat_s = 1\ndrone = 1", "fault.0.for_s: is missing: kind = \"freeze\" needs for_s"),
+        ("kind = \"slow\"\nat_s = 1\ndrone = 1", "fault.0.reaction_time_s: is missing: kind = \"slow\" needs"),
+        (
+            "kind = \"deaf\"\nat_s = 1\ndrone = 1\nreaction_time_s = 1",
+            "belongs to kind = \"slow\", found kind = \"deaf\"",
+        ),
+        ("kind = \"noise\"\nat_s = 1\ndrone = 1", "kind = \"noise\" needs position_std_m or position_bias_m or"),
+        ("kind = \"wind\"\nat_s = 1", "kind = \"wind\" needs wind_mps2 or gust_mps2"),
+        ("kind = \"partition\"\nat_s = 1", "fault.0.sides: is missing"),
+        (
+            "kind = \"partition\"\nat_s = 1\ntarget = \"all\"\nsides = \"halves\"",
+            "fault.0.target: does not belong to a partition",
+        ),
+        (
+            &sides("\"half\""),
+            "f.toml:9:9: fault.0.sides: found \"half\", expected \"halves\" or an array of 2 to 15 arrays",
+        ),
+        (&sides("[[0]]"), "expected an array of 2 to 15 arrays"),
+        (&sides("[[0], [9]]"), "fault.0.sides: found drone 9, expected one from 0 to 7"),
+        (&sides("[[0], [0]]"), "fault.0.sides: found drone 0 twice"),
+        ("kind = \"kill\"\nat_s = 1\ndrone = 1\nfore_s = 1", "fault.0.fore_s: unknown key"),
+    ];
+    for (lines, wanted) in cases {
+        let message = match parse(&format!("{HEAD}[[fault]]\n{lines}"), &[]) {
+            Ok(_) => panic!("accepted: {lines}"),
+            Err(errors) => errors.to_string(),
+        };
+        assert!(message.contains(wanted), "{lines:?}: no {wanted:?} in\n{message}");
+    }
+    let many = "[[fault]]\nkind = \"partition\"\nat_s = 1\nsides = \"halves\"\n".repeat(9);
+    let message = parse(&format!("{HEAD}{many}"), &[]).unwrap_err().to_string();
+    assert!(message.contains("fault.8.kind: found one more partition, expected at most 8"), "{message}");
+}

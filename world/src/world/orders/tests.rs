@@ -1,0 +1,170 @@
+//! Faults in whole worlds, flown by hand.
+
+use crate::faults::{Effect, Event, Fault, FaultPlan, ProcessOrder, When, Whom, Wind};
+use crate::params::{Failsafe, WorldParams};
+use crate::testing::{command, events, happenings, params, rectangle, starts};
+use crate::world::World;
+use skein_protocol::record::{FaultKind, Happening, ROW_ALIVE, ROW_FROZEN, RunEvent};
+use skein_protocol::slot::Slot;
+use skein_protocol::{DroneId, Vec2};
+
+const ID: DroneId = DroneId(3);
+
+fn world(effect: Effect, when: When, for_s: f64, params: WorldParams) -> World {
+    let fault = Fault { effect, when, whom: Whom::Drones(vec![ID]), for_s };
+    let faults = FaultPlan { seed: 1, faults: vec![fault] };
+    World::new(WorldParams { faults, ..params }, &starts(8), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap()
+}
+
+/// Flies so many ticks; the orders and the events with the ticks in which they came.
+fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessOrder)>, Vec<RunEvent>) {
+    let (mut orders, mut told) = (Vec::new(), Vec::new());
+    for _ in 0..ticks {
+        let tick = world.tick();
+        orders.extend(world.orders().iter().map(|&order| (tick, order)));
+        let drones = world.downlink().drones.len() as u32;
+        (0..drones).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+        world.advance();
+        told.extend(events(world));
+    }
+    (orders, told)
+}
+
+fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
+    let time = |event: &RunEvent| match &event.what {
+        Happening::Fault { target, scheduled: true, .. } if *target == ID => Some((event.t_s, true)),
+        Happening::FaultOver { target, .. } if *target == ID => Some((event.t_s, false)),
+        _ => None,
+    };
+    events.iter().filter_map(time).collect()
+}
+
+#[test]
+fn a_kill_is_ordered_once_at_its_tick() {
+    let mut world = world(Effect::Kill, When::At(1.0), f64::INFINITY, params());
+    let (orders, told) = fly(&mut world, 100);
+    assert_eq!(orders, [(50, ProcessOrder::Kill(ID))]);
+    assert_eq!(fault_times(&told), [(1.0, true)]);
+    assert!(!world.is_alive(ID));
+}
+
+#[test]
+fn a_frozen_drone_holds_and_flies_on_later() {
+    let land = WorldParams { failsafe: Failsafe::Land, ..params() };
+    let mut world = world(Effect::Freeze, When::At(1.0), 3.0, land);
+    fly(&mut world, 190);
+    let row = world.record().rows[ID.index()];
+    assert!(world.is_frozen(ID) && world.is_alive(ID));
+    assert_eq!((row.velocity_mps, row.flags & (ROW_ALIVE | ROW_FROZEN)), ([0.0, 0.0], ROW_ALIVE | ROW_FROZEN));
+    let other = world.record().rows[2];
+    assert!(row.energy_j > other.energy_j, "hovering costs more than cruising, and is counted");
+    let (orders, told) = fly(&mut world, 30);
+    assert_eq!(orders, [(200, ProcessOrder::Resume(ID))]);
+    assert_eq!(fault_times(&told), [(4.0, false)]);
+    world.orders();
+    world.downlink();
+    world.take_slot(ID, &command(1.0, 0.0));
+    world.advance();
+    assert!(world.record().rows[ID.index()].velocity_mps[0] > 0.0);
+    assert_eq!(world.record().head.lost, 0);
+}
+
+#[test]
+fn a_frozen_drone_that_is_killed_is_not_resumed() {
+    let mut world = world(Effect::Freeze, When::At(1.0), 1.0, params());
+    fly(&mut world, 60);
+    world.mark_dead(ID, FaultKind::Kill, false, "");
+    let (orders, told) = fly(&mut world, 100);
+    assert_eq!((orders, fault_times(&told)), (vec![], vec![]));
+    assert!(!world.is_frozen(ID));
+}
+
+#[test]
+fn a_restarted_drone_has_the_next_incarnation() {
+    let mut world = world(Effect::Restart, When::At(1.0), 2.0, params());
+    let (orders, told) = fly(&mut world, 151);
+    assert_eq!(orders, [(50, ProcessOrder::Kill(ID)), (150, ProcessOrder::Restart(ID, 2))]);
+    assert_eq!(fault_times(&told), [(1.0, true), (3.0, false)]);
+    assert!(world.is_alive(ID));
+    assert_eq!(world.incarnation(ID), Some(2));
+    let head = world.downlink().drones[ID.index()];
+    assert_eq!((head.alive, head.incarnation), (1, 2));
+}
+
+#[test]
+fn who_has_landed_is_not_started_again() {
+    let land = WorldParams { failsafe: Failsafe::Land, timeout_s: 60.0, ..params() };
+    let mut world = world(Effect::Restart, When::At(0.0), 14.0, land);
+    let (orders, _) = fly(&mut world, 800);
+    assert_eq!(orders, [(0, ProcessOrder::Kill(ID))]);
+    assert!(!world.is_alive(ID));
+}
+
+#[test]
+fn a_swarm_that_is_restarted_is_not_given_up() {
+    let whom = Whom::All;
+    let fault = Fault { effect: Effect::Restart, when: When::At(1.0), whom, for_s: 1.0 };
+    let faults = FaultPlan { seed: 1, faults: vec![fault] };
+    let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &[]).unwrap();
+    let (orders, _) = fly(&mut world, 120);
+    assert_eq!((orders.len(), world.ended()), (16, None));
+}
+
+#[test]
+fn who_is_blind_detects_nothing() {
+    // The front, drone 0, comes into range at 1.5 s; the next two 2.47 s later.
+    let blind = Effect::Blind { obstacles: true, ranging: true };
+    let fault = Fault { effect: blind, when: When::At(0.0), whom: Whom::Drones(vec![DroneId(0)]), for_s: 60.0 };
+    let faults = FaultPlan { seed: 1, faults: vec![fault] };
+    let shape = [rectangle(140.0, 0.0, 10.0, 5.0)];
+    let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &shape).unwrap();
+    let (_, told) = fly(&mut world, 300);
+    let detected = happenings(told).into_iter().find_map(|what| match what {
+        Happening::Detected { drone, .. } => Some(drone),
+        _ => None,
+    });
+    assert_eq!(detected, Some(DroneId(1)));
+    let view = world.downlink().view();
+    assert!(view.senses(DroneId(0)).unwrap().neighbours.is_empty());
+    assert!(!view.senses(DroneId(1)).unwrap().neighbours.is_empty());
+}
+
+#[test]
+fn a_fault_on_detection_begins_in_the_tick_that_detects() {
+    let when = When::On { event: Event::Detected, stage: 0, after_s: 0.0 };
+    let mut world = world(Effect::Slow(0.4), when, 1.0, params());
+    let (_, told) = fly(&mut world, 80);
+    let detected = told.iter().find(|event| matches!(event.what, Happening::Detected { .. })).unwrap();
+    assert_eq!(fault_times(&told), [(detected.t_s, true)]);
+    assert_eq!(world.downlink().drones[ID.index()].extra_reaction_s, 0.4);
+}
+
+#[test]
+fn wind_blows_those_that_fly() {
+    let wind = Wind { acceleration_mps2: Vec2::new(0.0, 1.0), gust_mps2: 0.0, gust_s: 1.0 };
+    let mut world = world(Effect::Wind(wind), When::At(0.0), 1.0, params());
+    fly(&mut world, 100);
+    let velocity = |world: &World, drone: usize| world.record().rows[drone].velocity_mps;
+    assert!((velocity(&world, 3)[1] - 1.0).abs() < 1e-9, "a second of 1 m/s²: {:?}", velocity(&world, 3));
+    assert_eq!(velocity(&world, 2)[1], 0.0);
+}
+
+#[test]
+fn frames_carry_their_senders_radio() {
+    let mut world = world(Effect::Mute, When::At(0.0), 1.0, params());
+    world.downlink();
+    let passed = skein_protocol::payload::Passed {
+        stamp: skein_protocol::SimTime::ZERO,
+        set_count: 0,
+        set: [skein_protocol::ObstacleId(0); 32],
+        reserved: 0,
+    };
+    let frame = skein_protocol::Message::Passed(passed).encode();
+    world.take_frames(ID, &[frame]);
+    world.take_frames(DroneId(0), &[frame]);
+    world.advance();
+    let down = world.downlink();
+    assert_eq!(down.frames.iter().map(|frame| frame.cuts.mute).collect::<Vec<_>>(), [0, 1]);
+    let reasons: Vec<_> = down.frames.iter().map(|frame| down.drones[5].cut_off(frame)).collect();
+    assert_eq!(reasons, [None, Some(skein_protocol::radio::DropReason::Deaf)]);
+}
