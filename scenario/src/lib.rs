@@ -6,6 +6,7 @@
 
 mod check;
 mod error;
+mod guidance;
 mod keys;
 mod near;
 mod node;
@@ -17,9 +18,10 @@ mod rules;
 mod strategy;
 
 pub use error::{Issue, ScenarioErrors};
+pub use guidance::Guidance;
 pub use keys::{
-    Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
-    Protocol, RadioKeys, Reformation, Scenario, Sensors, Time,
+    Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol,
+    RadioKeys, Reformation, Scenario, Sensors, Time,
 };
 pub use obstacle::Obstacle;
 pub use parse::Source;
