@@ -5,6 +5,7 @@ mod curves;
 pub mod reproduce;
 mod samples;
 mod style;
+pub mod surface;
 pub mod sweep;
 mod tracks;
 
