@@ -35,6 +35,8 @@ pub struct PilotParams {
     pub velocity_gain_per_s: f64,
     /// Share of an evasion that the drone behind takes from the one ahead in the same queue, 0.5 to 1.
     pub precedence_share: f64,
+    /// Whether drones on one route slow down into a single file before its gate.
+    pub queue: bool,
     /// Between two beacons, s.
     pub beacon_period_s: f64,
     /// Between two repetitions of what has to be repeated, s.

@@ -153,6 +153,9 @@ impl SwarmPilot {
     fn queue_speed(&mut self, now: SimTime, places: &[QueuePlace; MAX_PLACES]) -> f64 {
         let guidance = self.params.guidance;
         let mut speed = guidance.speed_mps;
+        if !self.params.queue {
+            return speed;
+        }
         for place in places.iter().filter(|place| place.set != 0 && self.way.is_open_set(place.set)) {
             ahead_of(*place, &self.leading.peers, now, &mut self.ahead);
             let headway_s = self.params.planner.headway_s;

@@ -157,26 +157,42 @@ impl Table {
         Ok(self.queued(routes.to_vec()))
     }
 
-    /// The least makespan with at most `limits[route]` drones on each route.
+    /// The least makespan alone, s: [`Table::split`] without its tie-break, for a fraction of the time.
+    #[must_use]
+    pub fn least_makespan_s(&self) -> f64 {
+        let unlimited = vec![self.arrivals.len(); self.headways.len()];
+        self.search(&unlimited, &self.costs()).map_or(0.0, |makespan| makespan as f64 / MICROS)
+    }
+
+    /// The grouping of least makespan with at most `limits[route]` drones on each route, ties to the least total.
     fn least(&self, limits: &[usize]) -> Result<Split, SplitError> {
-        let costs: Vec<Vec<Cost>> =
-            self.arrivals.iter().map(|row| row.iter().map(|a| a.unwrap_or(Cost::MAX)).collect()).collect();
-        let fit = |makespan: Cost, weighted| place(&self.caps(makespan, limits), &costs, weighted);
+        let costs = self.costs();
+        let makespan = self.search(limits, &costs)?;
+        let routes = place(&self.caps(makespan, limits), &costs, true);
+        Ok(self.queued(routes.ok_or(SplitError::Counts { drones: self.arrivals.len() })?))
+    }
+
+    fn costs(&self) -> Vec<Vec<Cost>> {
+        self.arrivals.iter().map(|row| row.iter().map(|a| a.unwrap_or(Cost::MAX)).collect()).collect()
+    }
+
+    /// The least makespan with at most `limits[route]` drones on each route.
+    fn search(&self, limits: &[usize], costs: &[Vec<Cost>]) -> Result<Cost, SplitError> {
+        let fit = |makespan: Cost| place(&self.caps(makespan, limits), costs, false);
         let drones = self.arrivals.len() as Cost;
         let finite = || self.arrivals.iter().flat_map(|row| row.iter().flatten());
         let slowest = finite().max().copied().unwrap_or(0) + drones * self.headways.iter().max().unwrap_or(&0);
-        let routes = fit(slowest, false).ok_or(SplitError::Counts { drones: drones as usize })?;
+        let routes = fit(slowest).ok_or(SplitError::Counts { drones: drones as usize })?;
         let mut reached = self.makespan(&routes);
         let mut missed = finite().min().copied().unwrap_or(0) - 1;
         while missed < reached - 1 {
             let middle = missed + (reached - missed) / 2;
-            match fit(middle, false) {
+            match fit(middle) {
                 Some(routes) => reached = self.makespan(&routes),
                 None => missed = middle,
             }
         }
-        let routes = fit(reached, true).ok_or(SplitError::Counts { drones: drones as usize })?;
-        Ok(self.queued(routes))
+        Ok(reached)
     }
 
     /// Slots of each route that each drone can use if the last one passes at `makespan`.

@@ -221,6 +221,7 @@ fn bad_tables_are_named() {
 fn nobody_is_split_into_nothing() {
     let split = Table::new(&[], &[1.0, 1.0]).unwrap().split();
     assert_eq!((split.makespan_s, split.queues.len()), (0.0, 2));
+    assert_eq!(Table::new(&[], &[1.0, 1.0]).unwrap().least_makespan_s(), 0.0);
     assert!(assign(&[], &[]).unwrap().is_empty());
     assert_eq!(assign(&[Vec2::zeros()], &[]), Err(TooFewSlots { drones: 1, slots: 0 }));
 }
@@ -231,6 +232,7 @@ fn a_thousand_drones_are_split_exactly() {
     let rows: Vec<Vec<f64>> = (0..1000).map(row).collect();
     let split = Table::new(&rows, &[3.0; 4]).unwrap().split();
     let shortest = Table::new(&rows, &[3.0; 4]).unwrap().shortest();
+    assert_eq!(Table::new(&rows, &[3.0; 4]).unwrap().least_makespan_s(), split.makespan_s);
     assert!(split.makespan_s < shortest.makespan_s && split.total_s >= shortest.total_s);
     // A thousand passes over four routes, three seconds apart, starting with the earliest arrival of all.
     assert!(split.makespan_s >= 249.0 * 3.0);

@@ -4,9 +4,10 @@
 
 use proptest::prelude::*;
 use skein_leader::slots::{Reformation, TooFewSlots, assign, assign_by};
-use skein_leader::tps::{self, bending_energy};
+use skein_leader::tps;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::thin_plate::bending_energy;
 
 const METHODS: [Reformation; 5] = [
     Reformation::Optimal,

@@ -12,6 +12,7 @@
 //! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
 //! | [`record`] | what the world tells the recorder |
 //! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
+//! | [`thin_plate`] | the spline between two point sets and its bending energy |
 
 pub mod digest;
 pub mod downlink;
@@ -26,6 +27,7 @@ pub mod record;
 pub mod shape;
 pub mod sides;
 pub mod slot;
+pub mod thin_plate;
 pub mod time;
 
 pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};

@@ -9,7 +9,15 @@ use skein_protocol::{DroneId, SimTime, Vec2};
 /// A frame of 100 bytes on the air.
 fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
     let frame = Frame { kind: Topic::Pose as u16, version: 1, len: 92, payload: [0; FRAME_PAYLOAD] };
-    AirFrame { tick, source: DroneId(source), sequence, position_m: [0.0; 2], queue_ns: 0, cuts: Default::default(), frame }
+    AirFrame {
+        tick,
+        source: DroneId(source),
+        sequence,
+        position_m: [0.0; 2],
+        queue_ns: 0,
+        cuts: Default::default(),
+        frame,
+    }
 }
 
 #[test]

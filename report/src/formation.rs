@@ -18,29 +18,34 @@ pub(crate) struct FormationError {
     pub rmse_m: f64,
     /// Mean distance between drones, less the slots', absolute, m; `None` for fewer than two.
     pub mean_distance_m: Option<f64>,
+    /// The slot of each drone.
+    pub slot_of: Vec<usize>,
 }
 
 /// The error of drones at these positions; `None` without drones, or if the shape has too few slots.
 pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationError> {
     let slots = slots(facts, positions.len())?;
     let positions = centred(positions.to_vec());
-    let offsets = offsets(&positions, &slots, &assign(&positions, &slots));
+    let slot_of = assign(&positions, &slots);
+    let offsets = offsets(&positions, &slots, &slot_of);
     let mean_distance_m = (positions.len() > 1).then(|| (mean_distance(&positions) - mean_distance(&slots)).abs());
     Some(FormationError {
         largest_m: offsets.iter().copied().fold(0.0, f64::max),
         rmse_m: (offsets.iter().map(|m| m * m).sum::<f64>() / offsets.len() as f64).sqrt(),
         mean_distance_m,
+        slot_of,
     })
 }
 
 /// The slots of `count` drones about their mean. The translation that is best in the least squares sense takes mean
 /// to mean, whatever the assignment.
-fn slots(facts: &RunFacts, count: usize) -> Option<Vec<Vec2>> {
+pub(crate) fn slots(facts: &RunFacts, count: usize) -> Option<Vec<Vec2>> {
     let slots = facts.shape.slots(count, facts.spacing_m);
     (count > 0 && slots.len() == count).then(|| centred(slots))
 }
 
-fn centred(mut points: Vec<Vec2>) -> Vec<Vec2> {
+/// The points about their mean.
+pub(crate) fn centred(mut points: Vec<Vec2>) -> Vec<Vec2> {
     let mean = points.iter().sum::<Vec2>() / points.len() as f64;
     points.iter_mut().for_each(|point| *point -= mean);
     points

@@ -12,6 +12,7 @@ mod folder;
 mod formation;
 mod leading;
 mod metrics;
+pub mod morph;
 pub mod plot;
 mod recorder;
 mod stages;

@@ -354,7 +354,7 @@ fn the_runs_folder_holds_trace_and_events() {
     let parsed: Vec<RunEvent> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((parsed.len(), parsed.last()), (8, Some(&end())));
     let manifest = RunFolder::open(folder.path()).unwrap().read_manifest().unwrap();
-    assert_eq!(skein_report::plot::write(&folder, &manifest.facts).unwrap().len(), 4);
+    assert_eq!(skein_report::plot::write(&folder, &manifest.facts).unwrap().len(), skein_report::plot::FILES.len());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! JSON schema, which makes the checks and the key reference.
 
 use crate::faults::{Fault, Faults, MAX_FAULTS};
+use crate::guidance::Guidance;
 use crate::obstacle::Obstacle;
 use crate::radio::RadioKeys;
 use crate::strategy::Strategy;
@@ -57,7 +58,7 @@ pub struct Scenario {
     /// Periods and time-outs of what drones say to each other.
     #[serde(default)]
     pub protocol: Protocol,
-    /// Gains of the guidance law and the safety filter.
+    /// The guidance law and the safety filter.
     #[serde(default)]
     pub guidance: Guidance,
     /// What becomes of drones that fail.
@@ -335,29 +336,5 @@ impl Default for Protocol {
             peer_timeout_s: 1.5,
             debounce_s: 0.1,
         }
-    }
-}
-
-/// Gains of the guidance law and the safety filter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Guidance {
-    /// Commanded acceleration for a velocity error.
-    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
-    pub velocity_gain_per_s: f64,
-    /// γ of the safety filter: how fast the distance to the safe distance may shrink.
-    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
-    pub filter_gain_per_s: f64,
-    /// By which part the filter widens the distances it keeps.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub filter_margin: f64,
-    /// The drone with less precedence takes this part of an evasion, the other one the rest.
-    #[schemars(range(min = 0.5, max = 1.0))]
-    pub precedence_share: f64,
-}
-
-impl Default for Guidance {
-    fn default() -> Self {
-        Self { velocity_gain_per_s: 2.0, filter_gain_per_s: 1.5, filter_margin: 0.02, precedence_share: 0.9 }
     }
 }

@@ -8,6 +8,7 @@ mod check;
 mod error;
 mod fault_rules;
 mod faults;
+mod guidance;
 mod keys;
 mod near;
 mod node;
@@ -21,9 +22,10 @@ mod strategy;
 
 pub use error::{Issue, ScenarioErrors};
 pub use faults::{Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, MAX_FAULTS, Sensor, Sides};
+pub use guidance::Guidance;
 pub use keys::{
-    Avoidance, Drone, End, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol,
-    Reformation, Scenario, Sensors, Time,
+    Avoidance, Drone, End, Formation, FormationShape, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol, Reformation,
+    Scenario, Sensors, Time,
 };
 pub use obstacle::Obstacle;
 pub use parse::Source;

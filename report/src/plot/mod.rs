@@ -5,27 +5,33 @@ mod curves;
 pub mod reproduce;
 mod samples;
 mod style;
+pub mod surface;
 pub mod sweep;
 mod tracks;
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
+use crate::morph::Morph;
 use curves::{Band, Curve, Figure};
 use samples::Samples;
 use std::path::PathBuf;
 use style::{BLUE, RED};
 
-/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones.
-pub const FILES: [&str; 4] = ["trace.svg", "separation.svg", "speed.svg", "distance.svg"];
+/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones, distance from
+/// the target shape, bending energy.
+pub const FILES: [&str; 6] =
+    ["trace.svg", "separation.svg", "speed.svg", "distance.svg", "disturbance.svg", "bending.svg"];
 
-/// Draws the plots of a run from its trace.csv. Those that have no data are left out: all of them for an empty trace,
-/// those of distances for a lone drone.
+/// Draws the plots of a run from its trace.csv, and writes formation.csv beside it: how far the swarm was from its target
+/// shape. Plots that have no data are left out: all of them for an empty trace, those of distances for a lone drone,
+/// those of the shape for a very large swarm.
 ///
 /// # Errors
 /// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Plot`].
 pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
-    let samples = Samples::read(&folder.path().join(crate::trace::FILE))?;
+    let samples = Samples::read(&folder.path().join(crate::trace::FILE), facts)?;
+    crate::morph::write(folder.path(), &samples.morphing.samples)?;
     let plots = folder.plots()?;
     let mut written = Vec::new();
     for (name, svg) in FILES.iter().zip(draw(&samples, facts)) {
@@ -42,7 +48,7 @@ pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, Repor
 /// A drawn plot, or why it cannot be drawn; `None` without data.
 type Drawn = Option<Result<String, String>>;
 
-fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 4] {
+fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 6] {
     let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
     let safe = || Curve {
         label: format!("safe distance, {} m", facts.safe_distance_m),
@@ -70,9 +76,26 @@ fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 4] {
         band: samples.distance.clone(),
         level: Some(safe()),
     };
+    let shape = |title: &str, y_label, line_label, of: fn(&Morph) -> f64| {
+        let band = |morph: &Morph| Band { t_s: morph.t_s, mean: of(morph), deviation: 0.0 };
+        let band = samples.morphing.samples.iter().map(band).collect();
+        Figure { title: format!("{title}: {run}"), y_label, line_label, band, level: None }
+    };
+    let disturbance = shape(
+        "Disturbance of the formation",
+        "distance from the target shape (m)",
+        "root mean square over drones, after the best translation and assignment",
+        |morph| morph.disturbance_m,
+    );
+    let bending = shape(
+        "Bending energy",
+        "bending energy (1)",
+        "of the thin-plate spline that takes the target shape to the drones",
+        |morph| morph.bending,
+    );
     let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
     let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
-    [tracks, curve(separation), curve(speed), curve(distance)]
+    [tracks, curve(separation), curve(speed), curve(distance), curve(disturbance), curve(bending)]
 }
 
 #[cfg(test)]
@@ -111,6 +134,7 @@ mod tests {
         assert!(text(1).contains("safe distance, 25 m") && text(3).contains("safe distance, 25 m"));
         assert!(text(2).contains("speed (m/s)") && !text(2).contains("safe distance"));
         assert!(text(1).contains("time (s)"));
+        assert!(text(4).contains("target shape (m)") && text(5).contains("bending energy (1)"));
     }
 
     #[test]

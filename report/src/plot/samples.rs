@@ -3,6 +3,8 @@
 use super::curves::Band;
 use crate::close::Sweep;
 use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::morph::Morphing;
 use crate::trace::{self, TraceRow};
 use skein_protocol::Vec2;
 use std::collections::BTreeMap;
@@ -22,6 +24,8 @@ pub(super) struct Samples {
     pub speed: Vec<Band>,
     /// Of the distances of all pairs, m.
     pub distance: Vec<Band>,
+    /// How far the swarm was from its shape.
+    pub morphing: Morphing,
     /// By drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
@@ -43,11 +47,11 @@ pub(super) struct Track {
 
 impl Samples {
     /// Reads trace.csv.
-    pub fn read(path: &Path) -> Result<Self, ReportError> {
+    pub fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
         let (mut samples, mut sweep, mut bin) = (Self::default(), Sweep::default(), None);
         trace::read(path, |rows| {
             let now = (rows[0].t_s / EVERY_S + 1e-6).floor() as i64;
-            samples.take(rows, bin.replace(now) != Some(now), &mut sweep);
+            samples.take(facts, rows, bin.replace(now) != Some(now), &mut sweep);
         })?;
         for track in samples.tracks.values_mut() {
             track.points.push(track.last_m);
@@ -56,10 +60,11 @@ impl Samples {
         Ok(samples)
     }
 
-    fn take(&mut self, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
+    fn take(&mut self, facts: &RunFacts, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
         let t_s = rows[0].t_s;
         self.end_s = t_s;
         let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
+        self.morphing.take(facts, t_s, &positions);
         match (sweep.least_distance(&positions), self.separation.last_mut()) {
             (Some(least), Some(last)) if !sampled => last.1 = last.1.min(least),
             (Some(least), _) => self.separation.push((t_s, least)),
@@ -129,7 +134,7 @@ mod tests {
             }
         }
         std::fs::write(&path, csv).unwrap();
-        let samples = Samples::read(&path).unwrap();
+        let samples = Samples::read(&path, &crate::testing::facts(2)).unwrap();
         let least: Vec<f64> = samples.separation.iter().map(|&(_, m)| m).collect();
         assert_eq!(least, [40.0, 30.0]);
         let (mean, deviation) = (samples.speed[0].mean, samples.speed[0].deviation);

@@ -1,10 +1,11 @@
 //! The command `reproduce`.
 
 use super::args::ReproduceArgs;
-use super::content::{TITLE, content};
+use super::content::{Block, TITLE, content};
 use super::figures::figures;
 use super::flights::flights;
 use super::forest::Forest;
+use super::gain;
 use super::page::{html, markdown};
 use super::results::Results;
 use super::rows::{Row, rows};
@@ -18,7 +19,7 @@ use std::path::Path;
 /// The recorded mission in a report's folder, by which that is known.
 const FOREST: &str = "forest";
 /// What the figures' file names begin with.
-const FIGURES: [&str; 6] = ["f1-", "f2-", "f3-", "f4-", "f5-", "f6-"];
+const FIGURES: [&str; 8] = ["f1-", "f2-", "f3-", "f4-", "f5-", "f6-", "e6-", "gain-"];
 
 /// Flies the paper's missions and writes the report.
 pub fn reproduce(args: &ReproduceArgs) -> Result<Exit, Failure> {
@@ -36,13 +37,16 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<Exit, Failure> {
     }
     let rows = rows(&results, &forest, args.quick);
     let figures = figures(&results, &forest).map_err(Failure::environment)?;
-    for figure in &figures {
-        write(out, &format!("figures/{}", figure.file), &figure.svg)?;
-    }
     let blocks = content(&results, &forest, &rows, figures, args.quick);
+    for block in &blocks {
+        if let Block::Figure(figure) = block {
+            write(out, &format!("figures/{}", figure.file), &figure.svg)?;
+        }
+    }
     write(out, "report.md", &markdown(TITLE, &blocks))?;
     write(out, "report.html", &html(TITLE, &blocks))?;
     write(out, "results.csv", &results.csv())?;
+    write(out, "gain.csv", &gain::csv(&results, args.quick))?;
     write(out, "reproduction.json", &(serde_json::to_string_pretty(&rows).map_err(Failure::environment)? + "\n"))?;
     if !args.quiet {
         print(out, &rows);

@@ -1,11 +1,14 @@
 //! What the report says.
 
 use super::figures::Figure;
-use super::flights::{DRONES, Flight, GEOMETRIES, JITTER_M, PAPER, PLACEMENTS, SHORTEST, fixed, seeds};
+use super::flight::{Flight, JITTER_M};
+use super::flights::{DEFAULT, DRONES, GEOMETRIES, PAPER, PLACEMENTS, SHORTEST, fixed, jittered, seeds};
 use super::forest::Forest;
+use super::gain;
 use super::results::{Results, split};
 use super::rows::{Row, pass_s};
-use super::table::{shown, table};
+use super::studies::studies;
+use super::table::{shown, study, table};
 
 /// A part of the report.
 pub enum Block {
@@ -31,11 +34,12 @@ pub const TITLE: &str = "Swarm Formation Morphing for Congestion Aware Collision
 pub fn content(results: &Results, forest: &Forest, rows: &[Row], figures: Vec<Figure>, quick: bool) -> Vec<Block> {
     let mut blocks = opening(results, quick);
     blocks.extend(differences(rows));
-    let sections: [(&str, &[&str]); 6] = [
+    let sections: [(&str, &[&str]); 7] = [
         ("One obstacle: time and split (R1, R2, R3)", &["R1", "R2", "R3"]),
         ("Energy (R4)", &["R4"]),
         ("The forest mission (R5)", &["R5"]),
         ("After the reformation (R6)", &["R6"]),
+        ("Disturbance and bending energy (E6)", &["E6"]),
         ("Forecasts (T*)", &["T*"]),
         ("The power model (P1)", &["P1"]),
     ];
@@ -44,10 +48,16 @@ pub fn content(results: &Results, forest: &Forest, rows: &[Row], figures: Vec<Fi
         match prefixes[0] {
             "R4" => blocks.push(Block::Text(ENERGY.to_owned())),
             "R5" => blocks.push(Block::Text(groups(forest))),
+            "E6" => blocks.push(Block::Text(BENDING.to_owned())),
             "T*" => blocks.push(Block::Text(FORECASTS.to_owned())),
             _ => {}
         }
     }
+    for one in studies(quick) {
+        blocks.push(Block::Heading(one.heading.to_owned()));
+        blocks.extend([Block::Text((one.says)(&one, results)), study(&one, results)]);
+    }
+    blocks.extend(gain::blocks(results, quick));
     blocks.push(Block::Heading("Figures".to_owned()));
     blocks.push(Block::Text(format!("{CURVES} {}", fastest(results))));
     blocks.extend(figures.into_iter().map(Block::Figure));
@@ -60,6 +70,11 @@ const ENERGY: &str = "The paper does not say when a mission ends, and the ratio 
     here under three conventions, beside the one published number. S1 and S2 end when the formation holds again, S3b \
     when all drones are in fixed slots at a goal, which is the clean convention: both strategies end in the same place.";
 
+const BENDING: &str = "Disturbance is the root of the mean square distance of the drones to the slots of the target shape, \
+    after the best translation and assignment. Bending energy is the second term of E6 for the thin-plate spline that \
+    takes each slot exactly to its drone (λ = 0): zero for whatever is an affine image of the shape, large where the \
+    swarm is torn apart; it jumps where the best assignment changes. The figures show both over time; each recorded run has them in `formation.csv`.";
+
 const FORECASTS: &str = "T* is the time of the cost model: each route a single-file queue with a headway of 1.1 safe \
     distances, each path a taut string round the obstacle. It is what the rule minimises. The time flown is longer: \
     drones accelerate, turn, and make way for each other. The paper gives one time and does not say which it is; it is \
@@ -71,14 +86,15 @@ const CURVES: &str = "In F1 the two ends of a curve, where nearly all drones tak
 
 fn opening(results: &Results, quick: bool) -> Vec<Block> {
     let count = results.len();
-    let seeds = seeds(quick).count();
+    let (seeds, scenarios) = (seeds(quick).count(), jittered(quick).join(", "));
     vec![
         Block::Text(format!(
             "{count} flights by the inline runtime, whose digests equal those of one process a drone. The rule is the \
-             paper's to the letter, `{PAPER}`; what it is compared with is `{SHORTEST}`. Means are over {seeds} \
-             starts, each drone displaced by up to {JITTER_M} m in any direction, with 95 % intervals (Student) in \
-             brackets. All flights stand in `results.csv`, the rows of all tables in `reproduction.json`, the forest \
-             mission recorded in `forest`."
+             paper's to the letter, `{PAPER}`; what it is compared with is `{SHORTEST}`, and beside them stands \
+             `{DEFAULT}`, the default. Means are over {seeds} starts of {scenarios}, each drone displaced by up to \
+             {JITTER_M} m in any direction, with 95 % intervals (Student) in brackets. All flights stand in \
+             `results.csv`, each with the command that repeats it, the rows of all tables in `reproduction.json`, the \
+             forest mission recorded in `forest`."
         )),
         Block::Text(
             "Time to pass is the paper's cost: from the first detection of the obstacle until the last drone is past \
@@ -133,10 +149,16 @@ fn differences(rows: &[Row]) -> Vec<Block> {
         says(format!(
             "The forest's clock. Only times are published; the obstacles were placed to meet them. Detection is the \
              first tick in which any drone senses the set. The paper's snapshot calls the disturbance greatest at 50 s, \
-             its text puts the peak of the average distance at about 43 s; ours has that peak at {} s, and is widest \
-             across the flight at {} s.",
+             its text puts the peak of the average distance at about 43 s; ours has that peak at {} s, is widest across \
+             the flight at {} s, and farthest from its target shape at {} s.",
             ours("R5.peak"),
             ours("R5.widest"),
+            ours("R5.disturbance"),
+        )),
+        says(format!(
+            "Jittered starts. The intervals over starts are narrow because drones hold their formation from the first \
+             second on: most of a displacement of {JITTER_M} m is gone when the first obstacle is seen. They are no \
+             measure of how the numbers depend on geometry; the gain over shift and safe distance is."
         )),
         says(
             "Assumptions. As in the paper there is no delay, no loss and no time to compute in these flights, but a \

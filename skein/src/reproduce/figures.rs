@@ -1,6 +1,7 @@
 //! The paper's figures, drawn from our flights.
 
-use super::flights::{DRONES, Flight, GEOMETRIES, PAPER, PLACEMENTS, SHORTEST, fixed};
+use super::flight::Flight;
+use super::flights::{DRONES, GEOMETRIES, PLACEMENTS, STRATEGIES, fixed, title};
 use super::forest::Forest;
 use super::results::Results;
 use super::rows::{CONVENTIONS, pass_s};
@@ -43,6 +44,17 @@ pub fn figures(results: &Results, forest: &Forest) -> Result<Vec<Figure>, String
             "f5-separation.svg",
             "F5, beside it: the least distance of two drones, which is what the safe distance bounds.",
         ),
+        (
+            "disturbance.svg",
+            "e6-disturbance.svg",
+            "E6. Disturbance of the formation over time, forest: distance of the drones from the target shape.",
+        ),
+        (
+            "bending.svg",
+            "e6-bending.svg",
+            "E6. Bending energy over time, forest: ∬(f_xx² + 2 f_xy² + f_yy²) dx dy of the thin-plate spline f that \
+             takes each slot of the target shape to its drone (λ = 0).",
+        ),
     ];
     for (plot, file, caption) in plots {
         let svg = forest.plots.iter().find(|(name, _)| name == plot).map(|(_, svg)| svg.clone());
@@ -65,7 +77,7 @@ fn time_against_split(results: &Results, geometry: &str) -> Result<Option<Figure
     if series.is_empty() {
         return Ok(None);
     }
-    let name = geometry.replacen('s', "S", 1);
+    let name = title(geometry);
     let lines = Lines {
         title: format!("Time to pass against the split, {name}"),
         x_label: format!("drones past the left side, of {DRONES}"),
@@ -85,21 +97,20 @@ fn energies(results: &Results) -> Figure {
             let flight = Flight::new(&format!("{geometry}-right"), strategy);
             results.reached(&flight).and_then(energy).map(|joules| joules / 1e3)
         };
-        let (paper, shortest) = (of(PAPER)?, of(SHORTEST)?);
+        let [Some(paper), Some(default), Some(shortest)] = STRATEGIES.map(of) else { return None };
         let note = format!("ratio {:.3}", shortest / paper);
-        let name = [geometry.replacen('s', "S", 1), words.to_owned()];
-        Some(BarGroup { name, note, values: vec![paper, shortest] })
+        Some(BarGroup { name: [title(geometry), words.to_owned()], note, values: vec![paper, default, shortest] })
     };
     let pairs = GEOMETRIES.iter().flat_map(|geometry| CONVENTIONS.map(|convention| (geometry, convention)));
     let bars = Bars {
-        title: "Energy of both strategies under each convention, obstacle right".to_owned(),
+        title: "Energy of each strategy under each convention, obstacle right".to_owned(),
         y_label: "energy of all drones (kJ)".to_owned(),
-        kinds: vec![PAPER.to_owned(), SHORTEST.to_owned()],
+        kinds: STRATEGIES.map(str::to_owned).to_vec(),
         groups: pairs.filter_map(|(geometry, convention)| group(geometry, convention)).collect(),
     };
     Figure {
         file: "f6-energy.svg".to_owned(),
-        caption: "F6. Energy by when the counting starts and ends; above each pair shortest path / congestion aware."
+        caption: "F6. Energy by when the counting starts and ends; above each group shortest path / the paper's rule."
             .to_owned(),
         svg: bars.draw(),
     }

@@ -1,11 +1,13 @@
 //! The forest mission, recorded: what figures and the times of the paper's story are taken from.
 
-use super::flights::{Flight, PAPER};
+use super::flight::Flight;
+use super::flights::PAPER;
 use crate::exit::Failure;
 use crate::facts::facts;
 use crate::interrupt::Interrupt;
 use crate::run::write_manifest;
 use skein_protocol::record::Outcome;
+use skein_report::morph::{self, Morph};
 use skein_report::plot::reproduce::Snapshots;
 use skein_report::{Ending, Recorder, RunFacts, RunFolder, Summary, plot};
 use skein_runtime::inline;
@@ -24,6 +26,8 @@ pub struct Forest {
     pub summary: Summary,
     /// Moments of it.
     pub snapshots: Snapshots,
+    /// How far the swarm was from its shape, over time.
+    pub morphs: Vec<Morph>,
     /// File names and SVGs of a run's plots.
     pub plots: Vec<(String, String)>,
 }
@@ -51,6 +55,13 @@ impl Forest {
             plots.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), svg));
         }
         let snapshots = Snapshots::read(&folder, &MOMENTS_S).map_err(Failure::environment)?;
-        Ok(Self { facts, summary, snapshots, plots })
+        let morphs = morph::read(folder.path()).map_err(Failure::environment)?;
+        Ok(Self { facts, summary, snapshots, morphs, plots })
+    }
+
+    /// The moment of the greatest disturbance between these times, s.
+    pub fn disturbance(&self, from_s: f64, to_s: f64) -> Option<&Morph> {
+        let then = self.morphs.iter().filter(|morph| (from_s..=to_s).contains(&morph.t_s));
+        then.max_by(|a, b| a.disturbance_m.total_cmp(&b.disturbance_m))
     }
 }

@@ -13,6 +13,7 @@ p{max-width:48rem}
 table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
 th,td{border-bottom:1px solid var(--line);padding:.25rem .6rem;text-align:left;vertical-align:top}
 th{background:var(--soft)}
+td:first-child{white-space:nowrap}
 code{font-size:12px;background:var(--soft);padding:0 .2em}
 figure{margin:1.5rem 0;background:#fff;color:#222;border:1px solid var(--line);break-inside:avoid}
 figure svg{display:block;width:100%;height:auto}

@@ -1,6 +1,6 @@
 //! What came of the flights.
 
-use super::flights::{Flight, JITTER_M};
+use super::flight::{Flight, JITTER_M};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::sweep::command::progress_bar;
@@ -53,6 +53,11 @@ impl Results {
         self.0.get(flight).filter(|summary| summary.outcome == Outcome::Reached)
     }
 
+    /// Of a flight, whatever became of it.
+    pub fn get(&self, flight: &Flight) -> Option<&Summary> {
+        self.0.get(flight)
+    }
+
     /// Flights that did not reach their goal.
     pub fn failed(&self) -> impl Iterator<Item = (&Flight, &Summary)> {
         self.0.iter().filter(|(_, summary)| summary.outcome != Outcome::Reached)
@@ -67,7 +72,7 @@ impl Results {
     pub fn csv(&self) -> String {
         let mut csv = "scenario,strategy,seed,start_jitter_m,outcome,pass_times_s,splits_rightmost_first,predicted_s,\
                        mission_s,energy_total_j,energy_until_passed_j,energy_detection_to_pass_j,min_separation_m,\
-                       min_clearance_m,formation_error_m,mean_distance_error_m,digest\n"
+                       min_clearance_m,formation_error_m,mean_distance_error_m,digest,command\n"
             .to_owned();
         for (flight, summary) in &self.0 {
             let jitter = flight.seed.map_or(0.0, |_| JITTER_M);
@@ -78,7 +83,7 @@ impl Results {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 csv,
-                "{},{},{},{jitter},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{jitter},{},{},{},{},{},{},{},{},{},{},{},{},{},\"{}\"",
                 flight.scenario,
                 flight.strategy,
                 summary.seed,
@@ -95,13 +100,15 @@ impl Results {
                 field(summary.formation_error_m),
                 field(summary.mean_distance_error_m),
                 summary.digest.as_deref().unwrap_or_default(),
+                flight.command(),
             );
         }
         csv
     }
 }
 
-fn field(value: Option<f64>) -> String {
+/// A number of a CSV, empty if there is none.
+pub fn field(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| format!("{value:.4}"))
 }
 

@@ -1,14 +1,17 @@
 //! One row for each published quantity, and for those of ours that belong beside them.
 
-use super::flights::{Flight, GEOMETRIES, PAPER, SHORTEST, seeds};
+use super::flight::Flight;
+use super::flights::{GEOMETRIES, PAPER, SHORTEST, title};
 use super::forest::{FOUR_GROUPS, Forest};
 use super::results::Results;
-use crate::sweep::statistics::{Estimate, mean};
+use super::studies::{Line, Study, studies};
+use super::{gain, jitter};
 use serde::Serialize;
 use serde_json::{Value, json};
 use skein_protocol::energy::power_w;
 use skein_protocol::record::Outcome;
 use skein_report::Summary;
+use skein_report::morph::Morph;
 use skein_report::plot::reproduce::Spread;
 
 /// A row of reproduction.json.
@@ -28,6 +31,14 @@ pub struct Row {
     pub interval: Option<[f64; 2]>,
     /// Repeats it.
     pub command: String,
+}
+
+impl Row {
+    /// A row without an interval; `values` are the published one and ours.
+    pub fn new(id: String, quantity: String, unit: &'static str, values: (Value, Value), command: String) -> Self {
+        let (published, ours) = values;
+        Self { id, quantity, published, ours, unit, interval: None, command }
+    }
 }
 
 /// Energy in one of the conventions of a mission's end, J.
@@ -62,15 +73,17 @@ pub fn rows(results: &Results, forest: &Forest, quick: bool) -> Vec<Row> {
     GEOMETRIES.iter().for_each(|geometry| rows.energies(geometry));
     GEOMETRIES.iter().for_each(|geometry| rows.forecasts(geometry));
     rows.forest(forest);
-    rows.jitter(quick);
+    rows.disturbance(forest);
+    rows.rows.extend(jitter::rows(results, quick));
     rows.power();
+    studies(quick).iter().for_each(|study| rows.study(study));
+    rows.rows.extend(gain::rows(results, quick));
     rows.rows
 }
 
 impl Rows<'_> {
     fn push(&mut self, id: String, quantity: String, unit: &'static str, values: (Value, Value), command: String) {
-        let (published, ours) = values;
-        self.rows.push(Row { id, quantity, published, ours, unit, interval: None, command });
+        self.rows.push(Row::new(id, quantity, unit, values, command));
     }
 
     /// A row of one flight.
@@ -86,7 +99,7 @@ impl Rows<'_> {
     }
 
     fn times(&mut self, geometry: &str) {
-        let name = geometry.replacen('s', "S", 1);
+        let name = title(geometry);
         let published = [
             ("R1", "centred", json!(28.0), "4/4"),
             ("R2", "left", Value::Null, "6/2"),
@@ -107,7 +120,7 @@ impl Rows<'_> {
     }
 
     fn energies(&mut self, geometry: &str) {
-        let name = geometry.replacen('s', "S", 1);
+        let name = title(geometry);
         let [paper, shortest] = [PAPER, SHORTEST].map(|strategy| Flight::new(&format!("{geometry}-right"), strategy));
         for (flight, strategy, published) in [(&paper, PAPER, 54.111), (&shortest, SHORTEST, 62.084)] {
             let what = (format!("R4.{name}.{strategy}"), format!("energy, {strategy}, {name}"), "kJ");
@@ -126,7 +139,7 @@ impl Rows<'_> {
     }
 
     fn forecasts(&mut self, geometry: &str) {
-        let name = geometry.replacen('s', "S", 1);
+        let name = title(geometry);
         let cases = [("best", "right", PAPER), ("shortest", "right", SHORTEST), ("centred", "centred", PAPER)];
         for (key, placement, strategy) in cases {
             let flight = Flight::new(&format!("{geometry}-{placement}"), strategy);
@@ -187,20 +200,41 @@ impl Rows<'_> {
         self.of(what, Value::Null, &shortest, |summary| Some(rounded(summary.energy_j.total / 1e3)));
     }
 
-    fn jitter(&mut self, quick: bool) {
-        for (id, quantity, unit, published, scenario, value) in jittered() {
-            let Some(found) = over_seeds(self.results, scenario, quick, value) else { continue };
-            let flight = |strategy| Flight { seed: Some(1), ..Flight::new(scenario, strategy) };
-            let command = format!("{}; {}", flight(PAPER).command(), flight(SHORTEST).command());
-            self.rows.push(Row {
-                id: format!("{id}.jitter"),
-                quantity: format!("{quantity}, mean of {} jittered starts (command: the first)", found.n),
-                published,
-                ours: rounded(found.mean),
-                unit,
-                interval: Some([found.low, found.high].map(|end| (end * 1e3).round() / 1e3)),
-                command,
-            });
+    /// E6 over the forest mission.
+    fn disturbance(&mut self, forest: &Forest) {
+        let detected = |set: usize| forest.summary.stages.get(set).and_then(|stage| stage.detected_s);
+        let most = |from_s: Option<f64>, to_s: Option<f64>| forest.disturbance(from_s?, to_s?);
+        let (first, second) = (most(detected(0), detected(1)), most(detected(1), Some(f64::INFINITY)));
+        let how_much = |morph: Option<&Morph>| morph.map(|morph| morph.disturbance_m);
+        let bending = forest.morphs.iter().map(|morph| morph.bending).reduce(f64::max);
+        let rows = [
+            ("R5.disturbance", "formation disturbance at maximum", "s", json!(50.0), first.map(|morph| morph.t_s)),
+            ("E6.disturbance.1", "greatest disturbance, first obstacle", "m", Value::Null, how_much(first)),
+            ("E6.disturbance.2", "greatest disturbance, second set", "m", Value::Null, how_much(second)),
+            ("E6.bending", "greatest bending energy (λ = 0)", "", Value::Null, bending),
+        ];
+        let command = Flight::new("forest", PAPER).command();
+        for (id, quantity, unit, published, ours) in rows {
+            let values = (published, ours.map(rounded).unwrap_or_default());
+            self.push(id.to_owned(), format!("{quantity}, forest"), unit, values, command.clone());
+        }
+    }
+
+    fn study(&mut self, study: &Study) {
+        for Line { id, labels, flight, published_kj } in &study.lines {
+            let words = labels.join(", ");
+            let what = (format!("{id}.time"), format!("time to pass the first obstacles, {words}"), "s");
+            self.of(what, Value::Null, flight, |summary| pass_s(summary).map(rounded));
+            let what = (format!("{id}.mission"), format!("time of the mission, {words}"), "s");
+            self.of(what, Value::Null, flight, |summary| Some(rounded(summary.mission_s)));
+            for (key, convention, energy) in CONVENTIONS {
+                let what = (format!("{id}.{key}"), format!("energy, {convention}, {words}"), "kJ");
+                self.of(what, json!(published_kj), flight, |summary| {
+                    energy(summary).map(|joules| rounded(joules / 1e3))
+                });
+            }
+            let what = (format!("{id}.separation"), format!("least separation, {words}"), "m");
+            self.of(what, Value::Null, flight, |summary| summary.min_separation_m.map(rounded));
         }
     }
 
@@ -211,41 +245,4 @@ impl Rows<'_> {
             self.push(format!("P1.{speed_mps}"), quantity, "W", values, "skein reproduce --quick".to_owned());
         }
     }
-}
-
-/// A value of a pair of flights from one jittered start: the paper's rule, then shortest path.
-type Paired = fn(&Summary, &Summary) -> Option<f64>;
-
-/// What is averaged over jittered starts: id, words, unit, published, scenario, value.
-fn jittered() -> [(&'static str, &'static str, &'static str, Value, &'static str, Paired); 6] {
-    [
-        ("R3.S2.time", "time to pass, obstacle right, S2", "s", json!(32.0), "s2-right", |paper, _| pass_s(paper)),
-        ("R4.S2.energy", "energy, congestion-aware-paper, S2", "kJ", json!(54.111), "s2-right", |paper, _| {
-            Some(paper.energy_j.total / 1e3)
-        }),
-        (
-            "R4.S2.ratio",
-            "energy, shortest path / congestion aware, S2",
-            "",
-            json!(1.147),
-            "s2-right",
-            |paper, other| Some(other.energy_j.total / paper.energy_j.total),
-        ),
-        ("R5.passed.2", "second set passed, forest", "s", Value::Null, "forest", |paper, _| {
-            paper.stages.last()?.passed_s
-        }),
-        ("R5.ratio", "energy, shortest path / congestion aware, forest", "", Value::Null, "forest", |paper, other| {
-            Some(other.energy_j.total / paper.energy_j.total)
-        }),
-        ("R6", "error in the mean inter-drone distance, forest", "m", json!(0.8), "forest", |paper, _| {
-            paper.mean_distance_error_m
-        }),
-    ]
-}
-
-/// The mean over those seeds of which both flights reached their goal.
-fn over_seeds(results: &Results, scenario: &str, quick: bool, value: Paired) -> Option<Estimate> {
-    let of = |seed, strategy| results.reached(&Flight { seed: Some(seed), ..Flight::new(scenario, strategy) });
-    let values = seeds(quick).filter_map(|seed| value(of(seed, PAPER)?, of(seed, SHORTEST)?));
-    mean(&values.collect::<Vec<f64>>())
 }

@@ -1,8 +1,11 @@
 //! Rows as tables for people.
 
 use super::content::Block;
-use super::rows::Row;
+use super::results::{Results, split};
+use super::rows::{CONVENTIONS, Row};
+use super::studies::{Line, Study};
 use serde_json::Value;
+use skein_protocol::record::Outcome;
 
 /// A number as short as it can be said, a text as it is, a dash for what is not.
 pub fn shown(value: &Value) -> String {
@@ -45,6 +48,38 @@ pub fn table(rows: &[Row], prefixes: &[&str]) -> Block {
     };
     let head = ["row", "quantity", "unit", "paper", "ours", "difference", "command"].map(str::to_owned).to_vec();
     Block::Table { head, lines: wanted.map(line).collect() }
+}
+
+/// The flights of a study, side by side; of one that did not reach its goal nothing but its outcome.
+pub fn study(study: &Study, results: &Results) -> Block {
+    let columns = ["drones by route", "time to pass (s)", "mission (s)"].map(str::to_owned).into_iter();
+    let energies = CONVENTIONS.iter().map(|(_, words, _)| format!("{words} (kJ)"));
+    let last = ["least separation (m)", "command"].map(str::to_owned);
+    let head = study.labels.iter().map(|&label| label.to_owned()).chain(columns).chain(energies).chain(last);
+    Block::Table { head: head.collect(), lines: study.lines.iter().map(|line| study_line(line, results)).collect() }
+}
+
+fn study_line(Line { labels, flight, .. }: &Line, results: &Results) -> Vec<String> {
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"));
+    let mut cells = labels.clone();
+    let summary = results.get(flight).filter(|summary| summary.outcome != Outcome::Aborted);
+    let stages = |of: fn(&skein_report::Stage) -> Option<String>| {
+        let parts = summary.iter().flat_map(|summary| &summary.stages).filter_map(of);
+        parts.collect::<Vec<String>>().join(", ")
+    };
+    cells.push(stages(|stage| stage.split.as_deref().map(|drones| split(Some(drones)))));
+    cells.push(stages(|stage| Some(format!("{:.2}", stage.pass_time_s?))));
+    let reached = results.reached(flight);
+    cells.push(match (reached, summary) {
+        (Some(summary), _) => number(Some(summary.mission_s), 2),
+        (None, Some(summary)) => format!("{:?}", summary.outcome).to_lowercase(),
+        (None, None) => "–".to_owned(),
+    });
+    let energies = CONVENTIONS.iter().map(|(_, _, of)| number(reached.and_then(of).map(|joules| joules / 1e3), 3));
+    cells.extend(energies);
+    cells.push(number(summary.and_then(|summary| summary.min_separation_m), 2));
+    cells.push(format!("`{}`", flight.command()));
+    cells
 }
 
 #[cfg(test)]

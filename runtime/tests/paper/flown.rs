@@ -1,0 +1,120 @@
+//! A mission, flown and remembered.
+
+use skein_protocol::record::{DroneRow, Happening, Outcome, RecordSink, RecordView, RunEvent};
+use skein_protocol::{DroneId, Vec2};
+use skein_runtime::inline;
+use skein_scenario::{Scenario, Source};
+
+/// Everything that the record tells.
+#[derive(Default)]
+pub struct Flown {
+    /// Time, s, and a row a drone, of every tick.
+    pub ticks: Vec<(f64, Vec<DroneRow>)>,
+    pub events: Vec<RunEvent>,
+}
+
+impl RecordSink for Flown {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+        let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line).map_err(|error| error.to_string());
+        self.events.extend(record.parse_events(parse)?);
+        let t_s = record.head.now.secs();
+        // The last record may repeat the rows.
+        if !record.rows.is_empty() && self.ticks.last().is_none_or(|(last_s, _)| t_s > *last_s) {
+            self.ticks.push((t_s, record.rows.to_vec()));
+        }
+        Ok(())
+    }
+}
+
+/// A scenario file below `scenarios`, such as `paper/s2-right`, with these keys set.
+pub fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
+    let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    parse(&std::fs::read_to_string(&path).unwrap(), sets)
+}
+
+/// A scenario from text.
+pub fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
+    let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    Scenario::parse(text, Source { name: "test", stem: "test" }, &sets).unwrap()
+}
+
+pub fn fly(scenario: &Scenario) -> Flown {
+    let mut flown = Flown::default();
+    inline::run(scenario, &mut flown, || None).unwrap();
+    flown
+}
+
+/// A file's mission by the paper's rule, which has to reach its goal with every distance kept.
+pub fn fly_file(name: &str, sets: &[(&str, &str)]) -> Flown {
+    let rule = ("strategy", "congestion-aware-paper");
+    let flown = fly(&scenario(name, &[&[rule], sets].concat()));
+    assert_eq!(flown.outcome(), Outcome::Reached, "{name} {sets:?}");
+    flown
+}
+
+pub fn position(row: &DroneRow) -> Vec2 {
+    row.position_m.into()
+}
+
+pub fn velocity(row: &DroneRow) -> Vec2 {
+    row.velocity_mps.into()
+}
+
+impl Flown {
+    pub fn outcome(&self) -> Outcome {
+        let end = |event: &RunEvent| match event.what {
+            Happening::End { outcome, .. } => Some(outcome),
+            _ => None,
+        };
+        self.events.iter().find_map(end).unwrap()
+    }
+
+    /// Time of the first event of which this is true, s.
+    pub fn when(&self, what: impl Fn(&Happening) -> bool) -> f64 {
+        self.events.iter().find(|event| what(&event.what)).unwrap().t_s
+    }
+
+    pub fn detected_s(&self, set: u32) -> f64 {
+        self.when(|what| matches!(what, Happening::Detected { stage, .. } if *stage == set))
+    }
+
+    pub fn passed_s(&self, set: u32) -> f64 {
+        self.when(|what| matches!(what, Happening::Passed { stage } if *stage == set))
+    }
+
+    /// Of the first plan to avoid something: number of routes, forecast, s, and time, s.
+    pub fn grouping(&self) -> (u32, f64, f64) {
+        let avoid = |event: &RunEvent| match &event.what {
+            Happening::Grouping { phase, routes, predicted_s, .. } if phase == "avoid" => {
+                Some((*routes, predicted_s.unwrap(), event.t_s))
+            }
+            _ => None,
+        };
+        self.events.iter().find_map(avoid).unwrap()
+    }
+
+    pub fn at(&self, t_s: f64) -> &[DroneRow] {
+        &self.ticks.iter().find(|(now_s, _)| *now_s >= t_s - 1e-9).unwrap().1
+    }
+
+    /// When and where, across the flight, each drone first passes this abscissa, m, with its row then; the first first.
+    pub fn crossings(&self, x_m: f64) -> Vec<(f64, DroneId, DroneRow)> {
+        let drones = self.ticks[0].1.len();
+        let crossing = |drone: usize| {
+            let (t_s, rows) = self.ticks.iter().find(|(_, rows)| rows[drone].position_m[0] >= x_m)?;
+            Some((*t_s, DroneId(drone as u32), rows[drone]))
+        };
+        let mut crossings: Vec<_> = (0..drones).filter_map(crossing).collect();
+        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+        crossings
+    }
+
+    /// Least distance of two drones over the mission, m.
+    pub fn separation_m(&self) -> f64 {
+        let least = |rows: &[DroneRow]| {
+            let pairs = (0..rows.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+            pairs.map(|(i, j)| (position(&rows[i]) - position(&rows[j])).norm()).fold(f64::INFINITY, f64::min)
+        };
+        self.ticks.iter().map(|(_, rows)| least(rows)).fold(f64::INFINITY, f64::min)
+    }
+}
