@@ -13,6 +13,7 @@
 
 pub mod danger;
 pub mod escape;
+mod foresight;
 pub mod guidance;
 mod neighbours;
 pub mod params;

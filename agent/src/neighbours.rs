@@ -13,8 +13,9 @@ const FRESH_S: f64 = 0.3;
 const BEACON_REACH: f64 = 4.0;
 
 impl SwarmPilot {
-    /// Neighbours by own senses, and beyond those by beacon, with the share of an evasion that falls to this drone.
-    pub(crate) fn find_neighbours(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) {
+    /// Neighbours by own senses, and beyond those by beacon, with the share of an evasion that falls to this drone. `senses`
+    /// are those of the moment at which a command that is given `now` takes effect.
+    pub(crate) fn find_neighbours(&mut self, now: SimTime, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) {
         self.neighbours.clear();
         for sensed in senses.neighbours {
             self.neighbours.push(Neighbour {
@@ -22,18 +23,19 @@ impl SwarmPilot {
                 position_m: sensed.position_m.into(),
                 velocity_mps: sensed.velocity_mps.into(),
                 age_s: 0.0,
-                share: self.share(senses.now, sensed.drone, places),
+                sensed: true,
+                share: self.share(now, sensed.drone, places),
             });
         }
         let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
-        for (id, pose) in self.leading.peers.living(senses.now) {
+        for (id, pose) in self.leading.peers.living(now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
             }
             let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
-            let (age_s, share) = (senses.now.since(pose.stamp), self.share(senses.now, id, places));
-            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, share });
+            let (age_s, share) = (senses.now.since(pose.stamp), self.share(now, id, places));
+            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, share });
         }
     }
 

@@ -33,6 +33,21 @@ impl Reaction {
         self.own_s + extra_s
     }
 
+    /// How long a command that is given now takes to take effect, s.
+    pub fn span_s(&self) -> f64 {
+        self.line.len() as f64 * self.dt_s
+    }
+
+    /// How far the drone will have flown, m, and its velocity, m/s, when a command that is given now takes effect: what is
+    /// on its way to the actuators is known.
+    pub fn foresee(&self, velocity: Vec2) -> (Vec2, Vec2) {
+        let fly = |(offset, velocity): (Vec2, Vec2), command: &Vec2| {
+            let next = velocity + command * self.dt_s;
+            (offset + (velocity + next) * (self.dt_s / 2.0), next)
+        };
+        self.line.iter().fold((Vec2::zeros(), velocity), fly)
+    }
+
     /// Takes a command in, m/s², and gives the one that takes effect now.
     pub fn delay(&mut self, command: Vec2) -> Vec2 {
         self.line.push_back(command);
@@ -48,6 +63,25 @@ fn ticks(span_s: f64, dt_s: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_on_its_way_is_foreseen() {
+        let mut reaction = Reaction::new(0.1, 0.02);
+        let (mut position, mut velocity) = (Vec2::zeros(), Vec2::new(10.0, 0.0));
+        let commands: Vec<Vec2> = (0..20).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i % 3))).collect();
+        let mut foreseen = Vec::new();
+        for command in commands {
+            let (offset, then) = reaction.foresee(velocity);
+            foreseen.push((position + offset, then));
+            let next = velocity + reaction.delay(command) * 0.02;
+            position += (velocity + next) * 0.01;
+            velocity = next;
+            if foreseen.len() >= 5 {
+                let (p, v) = foreseen[foreseen.len() - 5];
+                assert!((p - position).norm() < 1e-12 && (v - velocity).norm() < 1e-12);
+            }
+        }
+    }
 
     #[test]
     fn the_line_is_lengthened_and_shortened() {

@@ -6,6 +6,7 @@
 
 use crate::program::{HalfPlane, Program};
 use skein_protocol::{DroneId, Vec2};
+use std::collections::VecDeque;
 
 /// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,8 +59,10 @@ pub struct Neighbour {
     pub position_m: Vec2,
     /// Its velocity relative to the drone, m/s.
     pub velocity_mps: Vec2,
-    /// Age of this knowledge, s; 0 if sensed now.
+    /// Age of what was told when the command takes effect, s; 0 if sensed.
     pub age_s: f64,
+    /// Whether it is sensed, not told.
+    pub sensed: bool,
     /// Share of an evasion that this drone takes, 0 to 1.
     pub share: f64,
 }
@@ -82,15 +85,15 @@ pub struct Safety {
     params: SafetyParams,
     planes: Vec<HalfPlane>,
     program: Program,
-    trusted: Vec<Trust>,
-    trusting: Vec<Trust>,
+    /// What neighbours were counted upon for, the newest last: one entry a tick, until it has taken effect.
+    trusted: VecDeque<Vec<Trust>>,
 }
 
 impl Safety {
     /// A filter with these constants.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        Self { params, planes: Vec::new(), program: Program::default(), trusted: Vec::new(), trusting: Vec::new() }
+        Self { params, planes: Vec::new(), program: Program::default(), trusted: VecDeque::new() }
     }
 
     /// Margins for another t_c from now on, s.
@@ -110,39 +113,47 @@ impl Safety {
         let params = self.params;
         self.planes.clear();
         self.planes.extend(obstacles.filter_map(|obstacle| params.obstacle_plane(&obstacle, velocity)));
-        self.trusting.clear();
+        let lag = (params.reaction_time_s / params.dt_s).round() as usize;
+        let mut trusting = match self.trusted.len() > lag + 1 {
+            true => self.trusted.pop_front().unwrap_or_default(),
+            false => Vec::new(),
+        };
+        trusting.clear();
+        let due = self.trusted.len().checked_sub(lag + 1).and_then(|i| self.trusted.get(i));
+        let last = self.trusted.back();
         // Whoever cannot evade is kept clear of like an obstacle: first, and whatever the others do.
         let (helpless, others) = (neighbours.clone().filter(|n| n.share >= 1.0), neighbours.filter(|n| n.share < 1.0));
         let mut hard = self.planes.len();
         for neighbour in helpless.chain(others) {
             let barrier = params.neighbour_barrier(&neighbour);
-            let before = self.trusted.iter().find(|trust| trust.id == neighbour.id && neighbour.age_s == 0.0);
-            let missing = before.map_or(0.0, |trust| trust.missing(velocity + neighbour.velocity_mps, params.dt_s));
-            let braking = before
-                .map_or_else(Vec2::zeros, |trust| (velocity + neighbour.velocity_mps - trust.velocity) / params.dt_s);
+            let theirs = velocity + neighbour.velocity_mps;
+            let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
+                trusts?.iter().find(|trust| trust.id == neighbour.id && neighbour.sensed).copied()
+            };
+            let braking = of(last).map_or_else(Vec2::zeros, |trust| (theirs - trust.velocity) / params.dt_s);
+            let missing = of(due).map_or(0.0, |trust| trust.missing(braking));
             self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking));
             self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
             if neighbour.share >= 1.0 {
                 hard = self.planes.len();
             }
-            self.trusting.push(Trust {
+            trusting.push(Trust {
                 id: neighbour.id,
-                velocity: velocity + neighbour.velocity_mps,
+                velocity: theirs,
                 normal: barrier.normal,
                 owed: (barrier.share - 1.0) * barrier.slack,
             });
         }
-        std::mem::swap(&mut self.trusted, &mut self.trusting);
+        self.trusted.push_back(trusting);
         self.program.solve(&self.planes, hard, params.acceleration_max_mps2, wanted)
     }
 }
 
 impl Trust {
-    /// What the neighbour, whose velocity is known again `dt_s` later, did less than its share, m/s²: this drone makes up
-    /// for it, whether the other is dead, brakes, or cannot evade. Sensed, not told.
-    fn missing(&self, velocity: Vec2, dt_s: f64) -> f64 {
-        let done = (self.velocity - velocity).dot(&self.normal) / dt_s;
-        (self.owed - done).max(0.0)
+    /// What the neighbour did less than its share, m/s², when its acceleration in the tick in which it was due was `done`,
+    /// m/s²: this drone makes up for it, whether the other is dead, brakes, or cannot evade. Sensed, not told.
+    fn missing(&self, done: Vec2) -> f64 {
+        (self.owed + done.dot(&self.normal)).max(0.0)
     }
 }
 
@@ -166,9 +177,7 @@ impl SafetyParams {
         let away = -obstacle.nearest_m / obstacle.distance_m.abs().max(1e-9);
         let normal = if obstacle.distance_m < 0.0 { -away } else { away };
         let alpha = OBSTACLE_BRAKING * self.acceleration_max_mps2;
-        // While the drone has not yet reacted it flies on.
-        let reaction_m = velocity.norm() * self.reaction_time_s;
-        let (root, slope) = root(alpha, obstacle.distance_m - self.clearance_m - OBSTACLE_MARGIN_M - reaction_m);
+        let (root, slope) = root(alpha, obstacle.distance_m - self.clearance_m - OBSTACLE_MARGIN_M);
         let speed = normal.dot(&velocity);
         Some(HalfPlane { normal, bound: -(self.gain_per_s * (root + speed) + slope * speed) })
     }
@@ -177,8 +186,8 @@ impl SafetyParams {
         let distance = neighbour.position_m.norm().max(1e-6);
         let normal = -neighbour.position_m / distance;
         let velocity = -neighbour.velocity_mps;
-        // What is known is old, and the answer comes late: meanwhile either may have turned.
-        let late_s = neighbour.age_s + self.reaction_time_s;
+        // What is known is old, and the answer comes late: meanwhile the other may have turned.
+        let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
         let margin_m = (self.safe_distance_m * self.margin).max(LEAST_MARGIN_M);
         let keep = self.safe_distance_m + margin_m + late_s * (1.0 + self.acceleration_max_mps2 * late_s);
         let alpha = self.acceleration_max_mps2;
@@ -247,7 +256,7 @@ mod tests {
                 let other = 1 - i;
                 let (position_m, velocity_mps) = (p[other] - p[i], v[other] - v[i]);
                 let id = DroneId(other as u32);
-                let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, share: shares[i] };
+                let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, sensed: true, share: shares[i] };
                 let want = (wanted[i] - v[i]) * 2.0;
                 filters[i].filter(want, v[i], std::iter::empty(), std::iter::once(neighbour))
             });
@@ -291,6 +300,7 @@ mod tests {
                     position_m: Vec2::new(ahead.0 - behind.0, 0.0),
                     velocity_mps: Vec2::new(ahead.1 - behind.1, 0.0),
                     age_s: 0.0,
+                    sensed: true,
                     share,
                 };
                 let (velocity, wanted) = (Vec2::new(behind.1, 0.0), Vec2::new((10.0 - behind.1) * 2.0, 0.0));

@@ -1,6 +1,7 @@
 //! The paper's drone: detect, obey, avoid, queue, re-form; plan for all while it leads. Paper, Algorithm 1.
 
 use crate::escape::Escape;
+use crate::foresight::Foresight;
 use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
@@ -16,8 +17,6 @@ use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, QueuePlace, set_tag};
 use skein_protocol::{Message, SimTime, Vec2};
 
-/// With a reaction time t_c, the velocity gain is at most this over t_c: a higher one oscillates.
-const GAIN_BY_REACTION: f64 = 0.4;
 /// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
 const DEAD_BERTH: f64 = 1.1;
 
@@ -33,6 +32,7 @@ pub struct SwarmPilot {
     pub(crate) way: Way,
     safety: Safety,
     reaction: Reaction,
+    foresight: Foresight,
     escape: Escape,
     rehearsal: Option<Rehearsal>,
     silent: Vec<Vec2>,
@@ -49,6 +49,7 @@ impl SwarmPilot {
             way: Way::new(params.me, params.planner.course_y_m),
             safety: Safety::new(params.safety),
             reaction: Reaction::new(params.braking.reaction_time_s, params.dt_s),
+            foresight: Foresight::default(),
             escape: Escape::default(),
             rehearsal: None,
             silent: Vec::new(),
@@ -168,17 +169,33 @@ impl SwarmPilot {
 
     /// Acceleration towards a velocity, made safe, m/s².
     fn accelerate(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
-        let reaction_s = self.params.braking.reaction_time_s;
-        let gain = match reaction_s > 0.0 {
-            true => self.params.velocity_gain_per_s.min(GAIN_BY_REACTION / reaction_s),
-            false => self.params.velocity_gain_per_s,
-        };
+        let gain = self.params.velocity_gain_per_s;
         let obstacles = senses
             .obstacles
             .iter()
             .map(|o| NearObstacle { nearest_m: Vec2::from(o.nearest_m) - senses.position, distance_m: o.distance_m });
         let neighbours = self.neighbours.iter().copied();
         self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, neighbours)
+    }
+
+    /// The acceleration to command now, m/s²: for the moment at which it takes effect.
+    fn steer(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) -> Vec2 {
+        let mut foresight = std::mem::take(&mut self.foresight);
+        let then = match self.reaction.span_s() {
+            span_s if span_s > 0.0 => {
+                foresight.look(senses, span_s, self.reaction.foresee(senses.velocity));
+                foresight.senses(senses)
+            }
+            _ => *senses,
+        };
+        let wanted = self.wanted_velocity(&then, places);
+        let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
+        let patience_s = if self.way.is_open() { PATIENCE_ON_THE_WAY_S } else { PATIENCE_IN_FORMATION_S };
+        let wanted = self.escape.steer(then.now, then.velocity, wanted, patience_s, slow_mps);
+        self.find_neighbours(senses.now, &then, places);
+        let safe = self.accelerate(wanted, &then);
+        self.foresight = foresight;
+        safe
     }
 
     fn command(&self, acceleration: Vec2, places: &[QueuePlace; MAX_PLACES]) -> Command {
@@ -198,9 +215,8 @@ impl SwarmPilot {
 
 impl Pilot for SwarmPilot {
     fn step(&mut self, senses: &Senses<'_>, heard: &[Heard], say: &mut Vec<Message>) -> Command {
-        let reaction_s = self.reaction.slow_down(senses.extra_reaction_s);
-        (self.params.braking.reaction_time_s, self.params.safety.reaction_time_s) = (reaction_s, reaction_s);
-        self.safety.set_reaction_time(reaction_s);
+        self.params.braking.reaction_time_s = self.reaction.slow_down(senses.extra_reaction_s);
+        self.safety.set_reaction_time(self.reaction.span_s());
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for Heard { source, message } in heard {
             self.leading.hear(senses.now, *source, message, say);
@@ -215,12 +231,7 @@ impl Pilot for SwarmPilot {
             self.leading.obstacles.note_passed(self.params.me, &set.ids);
         }
         let places = self.way.places(senses.position);
-        let wanted = self.wanted_velocity(senses, &places);
-        let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
-        let patience_s = if self.way.is_open() { PATIENCE_ON_THE_WAY_S } else { PATIENCE_IN_FORMATION_S };
-        let wanted = self.escape.steer(senses.now, senses.velocity, wanted, patience_s, slow_mps);
-        self.find_neighbours(senses, &places);
-        let safe = self.accelerate(wanted, senses);
+        let safe = self.steer(senses, &places);
         let acceleration = self.reaction.delay(safe);
         let command = self.command(acceleration, &places);
         self.leading.speak(senses.now, &own, &places, say);

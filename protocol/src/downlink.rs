@@ -278,6 +278,21 @@ impl<'a> Senses<'a> {
         Self { now, tick, position, velocity, extra_reaction_s: 0.0, obstacles, neighbours, shapes }
     }
 
+    /// The same senses as they will be at another time and place: for looking ahead.
+    #[must_use]
+    pub fn at<'b>(
+        &self,
+        now: SimTime,
+        (position, velocity): (Vec2, Vec2),
+        obstacles: &'b [SensedObstacle],
+        neighbours: &'b [SensedNeighbour],
+    ) -> Senses<'b>
+    where
+        'a: 'b,
+    {
+        Senses { now, position, velocity, obstacles, neighbours, ..*self }
+    }
+
     /// The outline of a sensed obstacle; `None` if the entry points nowhere.
     #[must_use]
     pub fn shape(&self, obstacle: &SensedObstacle) -> Option<&'a SensedShape> {

@@ -1,0 +1,70 @@
+//! What a drone will sense when a command that it gives now takes effect, a reaction time from now. Its own way until
+//! then is known, obstacles stay where they are, and neighbours are taken to keep their velocity.
+
+use skein_leader::geometry::nearest;
+use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, Senses};
+use skein_protocol::{SimTime, Vec2};
+
+/// Senses ahead of time; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Foresight {
+    now: SimTime,
+    body: (Vec2, Vec2),
+    obstacles: Vec<SensedObstacle>,
+    neighbours: Vec<SensedNeighbour>,
+}
+
+impl Foresight {
+    /// Looks `span_s` ahead, in which the drone will have flown `offset`, m, and have this velocity then, m/s.
+    pub fn look(&mut self, senses: &Senses<'_>, span_s: f64, (offset, velocity): (Vec2, Vec2)) {
+        let position = senses.position + offset;
+        self.now = senses.now.after(span_s);
+        self.body = (position, velocity);
+        self.obstacles.clear();
+        for sensed in senses.obstacles {
+            let Some(outline) = senses.shape(sensed).map(|sensed| &sensed.shape) else { continue };
+            let core: Vec<Vec2> = outline.vertices().collect();
+            let to_core = nearest(&core, position) - position;
+            let distance_m = to_core.norm() - outline.radius_m;
+            let nearest_m = (position + to_core * (distance_m / to_core.norm().max(1e-9))).into();
+            self.obstacles.push(SensedObstacle { nearest_m, distance_m, ..*sensed });
+        }
+        self.neighbours.clear();
+        self.neighbours.extend(senses.neighbours.iter().map(|sensed| {
+            let theirs = Vec2::from(sensed.velocity_mps) + senses.velocity;
+            let position_m = (Vec2::from(sensed.position_m) + theirs * span_s - offset).into();
+            SensedNeighbour { position_m, velocity_mps: (theirs - velocity).into(), ..*sensed }
+        }));
+    }
+
+    /// What it will sense then.
+    pub fn senses<'a>(&'a self, senses: &Senses<'a>) -> Senses<'a> {
+        senses.at(self.now, self.body, &self.obstacles, &self.neighbours)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_protocol::downlink::SensedShape;
+    use skein_protocol::shape::ConvexShape;
+    use skein_protocol::{DroneId, ObstacleId};
+
+    #[test]
+    fn obstacles_stay_and_neighbours_fly_on() {
+        let shape = ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap();
+        let shapes = [SensedShape { shape, id: ObstacleId(3), reserved: 0 }];
+        let obstacles = [SensedObstacle { nearest_m: [40.0, 0.0], distance_m: 40.0, shape: 0, reserved: 0 }];
+        let neighbours =
+            [SensedNeighbour { position_m: [0.0, 30.0], velocity_mps: [0.0, -2.0], drone: DroneId(7), reserved: 0 }];
+        let body = (Vec2::zeros(), Vec2::new(10.0, 0.0));
+        let senses = Senses::new((5, SimTime::from_secs(0.1)), body, &obstacles, &neighbours, &shapes);
+        let mut foresight = Foresight::default();
+        foresight.look(&senses, 0.5, (Vec2::new(4.0, 0.0), Vec2::new(6.0, 0.0)));
+        let ahead = foresight.senses(&senses);
+        assert_eq!((ahead.now, ahead.position, ahead.velocity.x), (SimTime::from_secs(0.6), Vec2::new(4.0, 0.0), 6.0));
+        assert!((ahead.obstacles[0].distance_m - 36.0).abs() < 1e-12);
+        assert!((Vec2::from(ahead.obstacles[0].nearest_m) - Vec2::new(40.0, 0.0)).norm() < 1e-12);
+        assert_eq!((ahead.neighbours[0].position_m, ahead.neighbours[0].velocity_mps), ([1.0, 29.0], [4.0, -2.0]));
+    }
+}
