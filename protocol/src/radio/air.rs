@@ -45,18 +45,18 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// A delay, s; never negative.
-    pub(super) fn draw(&self, mut draws: Draws) -> f64 {
+    /// A delay, s; never negative. Nothing is drawn where nothing varies.
+    pub(super) fn draw(&self, draws: impl FnOnce() -> Draws) -> f64 {
         let Self { model, mean_s, jitter_s } = *self;
         match model {
-            _ if jitter_s <= 0.0 => mean_s,
             DelayModel::Fixed => mean_s,
-            DelayModel::Uniform => (mean_s + 3f64.sqrt() * jitter_s * (2.0 * draws.unit() - 1.0)).max(0.0),
-            DelayModel::Normal => draws.normal_above_zero(mean_s, jitter_s),
+            _ if jitter_s <= 0.0 => mean_s,
+            DelayModel::Uniform => (mean_s + 3f64.sqrt() * jitter_s * (2.0 * draws().unit() - 1.0)).max(0.0),
+            DelayModel::Normal => draws().normal_above_zero(mean_s, jitter_s),
             DelayModel::Gamma => {
                 // Shape (m/σ)², scale σ²/m.
                 let ratio = mean_s / jitter_s;
-                if ratio > 0.0 { draws.gamma(ratio * ratio) * jitter_s / ratio } else { 0.0 }
+                if ratio > 0.0 { draws().gamma(ratio * ratio) * jitter_s / ratio } else { 0.0 }
             }
         }
     }

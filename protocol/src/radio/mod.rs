@@ -129,7 +129,7 @@ impl Radio {
         if air.loss > 0.0 && chance(b"loss") < air.loss * factor {
             return Verdict::Drop(DropReason::Loss);
         }
-        let arrival = |purpose| aired.after(factor * air.delay.draw(Draws::of_frame(self.seed, link, purpose)));
+        let arrival = |purpose| aired.after(factor * air.delay.draw(|| Draws::of_frame(self.seed, link, purpose)));
         let due = arrival(b"dely");
         if air.duplicate > 0.0 && chance(b"dupl") < air.duplicate {
             let copy = arrival(b"copy");
