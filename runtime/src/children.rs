@@ -3,6 +3,7 @@
 use crate::supervisor::{Launch, ProcessInfo};
 use crate::{Clock, RuntimeError};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
 use skein_bus::{Control, Domain, PinMode};
 use skein_protocol::{DroneId, Tick};
@@ -133,13 +134,22 @@ impl Children {
         let Some(pid) = self.pid_of(drone) else { return false };
         // Not reaped here, should it have ended: that is the watcher's.
         let wanted = WaitIdOptions::STOPPED | WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
-        let stopped = || waitid(WaitId::Pid(pid), wanted).ok().flatten().is_some_and(|status| status.stopped());
+        let wait = || retry_on_intr(|| waitid(WaitId::Pid(pid), wanted));
+        let stopped = || wait().ok().flatten().is_some_and(|status| status.stopped());
         kill_process(pid, Signal::STOP).is_ok() && stopped()
     }
 
     /// Lets a drone's process go on; false if there is none.
     pub(crate) fn resume_drone(&self, drone: DroneId) -> bool {
         self.pid_of(drone).is_some_and(|pid| kill_process(pid, Signal::CONT).is_ok())
+    }
+
+    /// Lets all processes that are stopped go on, so that they can end.
+    pub(crate) fn resume_all(&self) {
+        for running in &self.running {
+            // Whoever has ended needs no signal.
+            let _ = kill_process(Pid::from_child(&running.child), Signal::CONT);
+        }
     }
 
     fn pid_of(&self, drone: DroneId) -> Option<Pid> {

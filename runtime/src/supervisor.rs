@@ -254,6 +254,7 @@ impl Supervisor<'_, '_, '_> {
     /// Nobody outlives the run: drones end by themselves when the mission is closed, or are killed.
     fn wind_up(&mut self) {
         self.control.close();
+        self.children.resume_all();
         if self.end.failure.is_some() {
             self.children.kill_all();
         }

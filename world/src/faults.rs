@@ -179,7 +179,7 @@ impl Effect {
         match self {
             Self::Kill => "killed".to_owned(),
             Self::Freeze => "stopped".to_owned(),
-            Self::Restart => "killed, to be started again".to_owned(),
+            Self::Restart => "killed, a new process follows".to_owned(),
             Self::Slow(extra_s) => format!("reacts {extra_s} s later"),
             Self::Deaf => "hears nobody".to_owned(),
             Self::Mute => "is heard by nobody".to_owned(),

@@ -349,14 +349,19 @@ mod tests {
     #[test]
     fn lists_ranges_and_tables_make_a_grid() {
         let text = "scenario = \"random\"\nseeds = { from = 5, count = 3 }\n[grid]\n\"radio.delay_s\" = [0, 0.5]\n\
-                    radio.loss = { from = 0, to = 0.7, steps = 8 }\nformation.shape = \"v\"\n";
+                    radio.loss = { from = 0, to = 0.7, steps = 8 }\nformation.shape = \"v\"\n\
+                    \"fault.0\" = [{ kind = \"kill\" }, { kind = \"mute\", for_s = 2 }]\n";
         let experiment = parse(text).unwrap();
         assert_eq!(experiment.name, "stem");
         assert_eq!(experiment.seeds, [5, 6, 7]);
         let axes: Vec<(&str, String)> =
             experiment.grid.iter().map(|axis| (axis.key.as_str(), axis.values.join(" "))).collect();
-        let wanted =
-            [("formation.shape", "\"v\""), ("radio.delay_s", "0 0.5"), ("radio.loss", "0 0.1 0.2 0.3 0.4 0.5 0.6 0.7")];
+        let wanted = [
+            ("fault.0", "{ kind = \"kill\" } { for_s = 2, kind = \"mute\" }"),
+            ("formation.shape", "\"v\""),
+            ("radio.delay_s", "0 0.5"),
+            ("radio.loss", "0 0.1 0.2 0.3 0.4 0.5 0.6 0.7"),
+        ];
         assert_eq!(axes, wanted.map(|(key, values)| (key, values.to_owned())));
     }
 

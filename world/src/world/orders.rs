@@ -63,7 +63,7 @@ impl World {
         let fault = self.faults.fault(turn.fault);
         let (kind, mut words) = (fault.effect.kind(), fault.effect.words());
         if fault.for_s.is_finite() && kind != FaultKind::Kill {
-            words += &format!(", for {} s", fault.for_s);
+            words += &format!("{} {} s", if kind == FaultKind::Restart { " after" } else { ", for" }, fault.for_s);
         }
         if is_whole(&fault.whom, &fault.effect) {
             self.log_fault(kind, DroneId::NONE, &words);
