@@ -83,7 +83,7 @@ impl Surface {
         let ((x, y), width) = (self.corner(cell), self.column());
         let [r, g, b] = value.map_or([225.0; 3], |value| colour(value / extent));
         let ink = if 0.3 * r + 0.59 * g + 0.11 * b > 125.0 { "#000" } else { "#fff" };
-        let text = value.map_or_else(|| "–".to_owned(), |value| signed(value));
+        let text = value.map_or_else(|| "–".to_owned(), signed);
         // Writing to a string cannot fail.
         let _ = writeln!(
             svg,

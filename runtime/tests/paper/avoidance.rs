@@ -26,7 +26,7 @@ fn between(flown: &Flown, half_width_m: f64) -> usize {
 fn e5_k_obstacles_have_one_route_more_and_drones_take_those_between() {
     for count in 1..=3 {
         let flown = abreast(count, 60.0);
-        assert_eq!(flown.grouping().0 as usize, count + 1);
+        assert_eq!(flown.routes() as usize, count + 1);
         let through = between(&flown, count as f64 * 50.0 - 30.0);
         assert_eq!(through > 0, count > 1, "{count} obstacles: {through} drones fly between them");
     }
@@ -36,7 +36,7 @@ fn e5_k_obstacles_have_one_route_more_and_drones_take_those_between() {
 fn a4_a_gap_not_wider_than_the_clearance_on_both_sides_is_closed_and_the_obstacles_enveloped() {
     // The clearance is 15 m on either side of a drone.
     let (open, closed) = (abreast(2, 34.0), abreast(2, 29.0));
-    assert_eq!((open.grouping().0, closed.grouping().0), (3, 2));
+    assert_eq!((open.routes(), closed.routes()), (3, 2));
     assert!(between(&open, 57.0) > 0);
     assert_eq!(between(&closed, 54.5), 0, "somebody took the closed gap");
 }

@@ -67,7 +67,7 @@ fn turns_s(flown: &Flown) -> f64 {
 fn e4_a_time_to_react_delays_the_drone_and_widens_what_it_keeps() {
     let (quick, slow) =
         (fly_file("paper/s2-right", &[]), fly_file("paper/s2-right", &[("drone.reaction_time_s", "0.4")]));
-    let [decided, later] = [&quick, &slow].map(|flown| turns_s(flown) - flown.grouping().2);
+    let [decided, later] = [&quick, &slow].map(|flown| turns_s(flown) - flown.grouping().1);
     assert!((0.4..0.6).contains(&(later - decided)), "turned {decided} and {later} s after the decision");
     assert!(slow.separation_m() > quick.separation_m() + 0.5, "{} and {}", slow.separation_m(), quick.separation_m());
 }

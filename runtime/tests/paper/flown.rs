@@ -82,22 +82,31 @@ impl Flown {
         self.when(|what| matches!(what, Happening::Passed { stage } if *stage == set))
     }
 
-    /// Of the first plan to avoid something: number of routes, forecast, s, and time, s.
-    pub fn grouping(&self) -> (u32, f64, f64) {
+    /// Of the first plan to avoid something: forecast, s, and time, s.
+    pub fn grouping(&self) -> (f64, f64) {
         let avoid = |event: &RunEvent| match &event.what {
-            Happening::Grouping { phase, routes, predicted_s, .. } if phase == "avoid" => {
-                Some((*routes, predicted_s.unwrap(), event.t_s))
+            Happening::Grouping { phase, predicted_s, .. } if phase == "avoid" => {
+                Some((predicted_s.unwrap(), event.t_s))
             }
             _ => None,
         };
         self.events.iter().find_map(avoid).unwrap()
     }
 
+    /// Routes of the last plan to avoid something: it knows all obstacles, those that were seen late too.
+    pub fn routes(&self) -> u32 {
+        let avoid = |event: &RunEvent| match &event.what {
+            Happening::Grouping { phase, routes, .. } if phase == "avoid" => Some(*routes),
+            _ => None,
+        };
+        self.events.iter().rev().find_map(avoid).unwrap()
+    }
+
     pub fn at(&self, t_s: f64) -> &[DroneRow] {
         &self.ticks.iter().find(|(now_s, _)| *now_s >= t_s - 1e-9).unwrap().1
     }
 
-    /// When and where, across the flight, each drone first passes this abscissa, m, with its row then; the first first.
+    /// When each drone first passes this abscissa, m, with its row then; the first first.
     pub fn crossings(&self, x_m: f64) -> Vec<(f64, DroneId, DroneRow)> {
         let drones = self.ticks[0].1.len();
         let crossing = |drone: usize| {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// What the leader forecasts for a split, s: the mission need not be flown for it.
 fn forecast_s(name: &str, strategy: &str) -> f64 {
-    fly(&scenario(name, &[("strategy", strategy), ("time.timeout_s", "8")])).grouping().1
+    fly(&scenario(name, &[("strategy", strategy), ("time.timeout_s", "8")])).grouping().0
 }
 
 #[test]
@@ -22,7 +22,7 @@ fn a3_the_rule_takes_the_split_of_least_forecast() {
 /// The members and the leader of each group of the first plan to avoid something.
 fn groups(flown: &Flown) -> BTreeMap<String, (Vec<usize>, usize)> {
     let mut groups: BTreeMap<String, (Vec<usize>, usize)> = BTreeMap::new();
-    let decided_s = flown.grouping().2;
+    let decided_s = flown.grouping().1;
     for event in flown.events.iter().filter(|event| (decided_s..decided_s + 0.5).contains(&event.t_s)) {
         if let Happening::Assigned { drone, group, leader, route: Some(_), .. } = &event.what {
             let group = groups.entry(group.clone()).or_insert_with(|| (Vec::new(), leader.index()));
@@ -40,7 +40,7 @@ fn a3_each_group_is_led_by_its_member_closest_to_the_destination() {
         let groups = groups(&flown);
         assert_eq!(groups.len(), 2, "{name}");
         assert_eq!(groups.values().map(|group| group.0.len()).sum::<usize>(), 8, "{name}");
-        let rows = flown.at(flown.grouping().2);
+        let rows = flown.at(flown.grouping().1);
         for (group, (members, leader)) in groups {
             let farthest = members.iter().map(|&drone| rows[drone].position_m[0]).fold(f64::NEG_INFINITY, f64::max);
             // Positions that leaders know are up to a beacon old.
@@ -54,6 +54,6 @@ fn c1_the_cost_is_from_the_detection_to_the_last_drone_past_the_centre() {
     let flown = fly_file("paper/s2-right", &[]);
     let last_s = flown.crossings(144.0).last().unwrap().0;
     assert!((flown.passed_s(0) - last_s).abs() < 0.021);
-    let (time_s, predicted_s) = (flown.passed_s(0) - flown.detected_s(0), flown.grouping().1);
+    let (time_s, predicted_s) = (flown.passed_s(0) - flown.detected_s(0), flown.grouping().0);
     assert!((predicted_s..predicted_s + 1.5).contains(&time_s), "{time_s} s flown, {predicted_s} s forecast");
 }

@@ -158,7 +158,8 @@ fn differences(rows: &[Row]) -> Vec<Block> {
         says(format!(
             "Jittered starts. The intervals over starts are narrow because drones hold their formation from the first \
              second on: most of a displacement of {JITTER_M} m is gone when the first obstacle is seen. They are no \
-             measure of how the numbers depend on geometry; the gain over shift and safe distance is."
+             measure of how the numbers depend on geometry; the gain over shift and safe distance is. S1 has no room for \
+             jitter: its slots are 35 m apart, and its safe distance is 33 m."
         )),
         says(
             "Assumptions. As in the paper there is no delay, no loss and no time to compute in these flights, but a \

@@ -55,9 +55,10 @@ pub fn seeds(quick: bool) -> std::ops::RangeInclusive<u64> {
     1..=if quick { 8 } else { 30 }
 }
 
-/// Scenarios that are flown from jittered starts.
+/// Scenarios that are flown from jittered starts. S1 has no room for it: its slots are 35 m apart, its safe distance is
+/// 33 m.
 pub fn jittered(quick: bool) -> &'static [&'static str] {
-    if quick { &["s2-right", "forest"] } else { &["s2-right", "forest", "s1-right", "s3b-right"] }
+    if quick { &["s2-right", "forest"] } else { &["s2-right", "forest", "s3b-right"] }
 }
 
 /// A geometry's or scenario's name in words: `S2`, `S2-right`.
