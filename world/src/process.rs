@@ -21,6 +21,8 @@ pub(crate) struct Process {
     /// Its last answer; without the tally while it is held.
     pub slot: Slot,
     pub answer: Answer,
+    /// Ticks without an answer, up to now.
+    pub late_ticks: u32,
     pub incarnation: u32,
     /// Whether it is stopped.
     pub frozen: bool,
@@ -33,6 +35,7 @@ impl Default for Process {
         Self {
             slot: Slot::default(),
             answer: Answer::Awaited,
+            late_ticks: 0,
             incarnation: 1,
             frozen: false,
             obedience: Obedience::default(),
@@ -42,9 +45,16 @@ impl Default for Process {
 }
 
 impl Process {
+    /// It answered.
+    pub fn answered(&mut self) {
+        self.answer = Answer::Given;
+        self.late_ticks = 0;
+    }
+
     /// Its last command goes on; it heard nothing in this tick.
     pub fn hold(&mut self, why: Answer) {
         self.answer = why;
+        self.late_ticks = self.late_ticks.saturating_add(u32::from(why == Answer::Late));
         self.slot =
             Slot { heard: 0, duplicates: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
     }

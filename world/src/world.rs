@@ -4,7 +4,7 @@
 //! [`World::hold`], or [`World::mark_dead`]; then [`World::advance`] and [`World::record`]. When [`World::ended`] says
 //! so: [`World::finish`] and, once more, [`World::record`].
 
-use crate::body::{Body, admissible};
+use crate::body::Body;
 use crate::decisions::Decisions;
 use crate::faults::ProcessOrder;
 use crate::faults::engine::Engine;
@@ -132,7 +132,7 @@ impl World {
     pub fn take_slot(&mut self, id: DroneId, slot: &Slot) {
         if let Some(process) = self.living(id) {
             process.slot = *slot;
-            process.answer = Answer::Given;
+            process.answered();
         }
     }
 
@@ -154,7 +154,8 @@ impl World {
         self.totals.sent += frames.len() as u64;
     }
 
-    /// A drone did not answer in time (wall clock only): its last command holds, the miss is counted.
+    /// A drone did not answer in time (wall clock only): its last command holds for a while, then it brakes; the miss is
+    /// counted.
     pub fn hold(&mut self, id: DroneId) {
         if let Some(process) = self.living(id).filter(|process| process.answer != Answer::Late) {
             process.hold(Answer::Late);
@@ -309,23 +310,6 @@ impl World {
         self.sent.iter().for_each(|sent| self.decisions.follow_frame(sent, opening, &mut self.log));
     }
 
-    fn move_bodies(&mut self) {
-        let now = self.now();
-        for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
-            if !body.alive {
-                body.fail_safe(&self.params);
-                continue;
-            }
-            if process.frozen {
-                body.hover(&self.params);
-                continue;
-            }
-            let command = admissible(process.slot.acceleration_mps2, self.params.acceleration_max_mps2);
-            self.totals.rejected_commands += u64::from(command.is_none());
-            body.fly(command.unwrap_or_default() + self.faults.wind_mps2(DroneId(id), now), &self.params);
-        }
-    }
-
     fn judge(&mut self, end: SimTime) {
         if self.end.is_some() {
             return;
@@ -396,6 +380,7 @@ fn check_bodies(starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<()
     shapes.try_for_each(|(index, shape)| shape.check().map_err(|error| WorldError::Obstacle { index, error }))
 }
 
+mod motion;
 mod orders;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! Whole missions of a world, flown by hand.
 
+use super::motion::HOLD_S;
 use super::*;
 use crate::params::{End, Failsafe};
 use crate::testing::{command, events, happenings, params, rectangle, starts, tick};
@@ -110,6 +111,22 @@ fn a_late_drone_holds_its_last_command_and_hears_nothing() {
     assert_eq!(world.record().rows[7].flags, ROW_ALIVE | ROW_LATE, "no answer at all is a late one");
     let totals = totals_of(&mut world);
     assert_eq!((totals.deadline_misses, totals.delivered), (9, 24));
+}
+
+#[test]
+fn a_drone_without_commands_brakes_until_the_next_one() {
+    let mut world = eight(params(), &[]);
+    tick(&mut world, &command(1.0, 0.0));
+    let mut speeds = Vec::new();
+    for _ in 0..200 {
+        (1..8).for_each(|id| world.take_slot(DroneId(id), &command(0.0, 0.0)));
+        world.advance();
+        speeds.push(world.record().rows[0].velocity_mps[0]);
+    }
+    let held = (HOLD_S / params().dt_s()).round() as usize;
+    assert!(speeds[..held].is_sorted() && speeds[held] < speeds[held - 1] && speeds[199] == 0.0, "{speeds:?}");
+    tick(&mut world, &command(1.0, 0.0));
+    assert!(world.record().rows[0].velocity_mps[0] > 0.0);
 }
 
 #[test]
