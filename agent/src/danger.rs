@@ -1,5 +1,8 @@
 //! Distances of obstacle detection: paper, Algorithm 2 and equations 1 to 4.
 
+use skein_protocol::Vec2;
+use skein_protocol::downlink::SensedObstacle;
+
 /// Standard gravity, m/s².
 pub const GRAVITY_MPS2: f64 = 9.81;
 
@@ -12,7 +15,34 @@ pub struct Braking {
     pub reaction_time_s: f64,
 }
 
+/// What a drone makes of an obstacle that it senses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {
+    /// Distance to its nearest point, negative inside, m.
+    pub distance_m: f64,
+    /// Direction of that point against the drone's velocity, positive to the left, -π to π, rad; against the x axis at
+    /// rest.
+    pub bearing_rad: f64,
+    /// Until the drone is there if it flew straight at it (equation 1), s; infinity at rest.
+    pub time_to_impact_s: f64,
+    /// Whether it is in the danger zone.
+    pub danger: bool,
+}
+
 impl Braking {
+    /// Algorithm 2 for one obstacle in range of a drone at `position`, m, with `velocity`, m/s, which is to keep `clearance_m`.
+    #[must_use]
+    pub fn detect(&self, position: Vec2, velocity: Vec2, obstacle: &SensedObstacle, clearance_m: f64) -> Detection {
+        let (to, speed) = (Vec2::from(obstacle.nearest_m) - position, velocity.norm());
+        let heading = if speed > 0.0 { velocity } else { Vec2::x() };
+        Detection {
+            distance_m: obstacle.distance_m,
+            bearing_rad: heading.perp(&to).atan2(heading.dot(&to)),
+            time_to_impact_s: Self::time_to_impact_s(obstacle.distance_m, speed),
+            danger: obstacle.distance_m < self.danger_zone_m(speed, clearance_m),
+        }
+    }
+
     /// Time to impact at this distance and speed (equation 1), s; infinity at rest.
     #[must_use]
     pub fn time_to_impact_s(distance_m: f64, speed_mps: f64) -> f64 {
@@ -48,6 +78,23 @@ impl Braking {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_obstacle_is_detected_with_distance_bearing_and_danger() {
+        let braking = Braking { drag_coefficient: 5.0 / GRAVITY_MPS2, reaction_time_s: 0.0 };
+        let obstacle = |nearest_m: [f64; 2]| {
+            let distance_m = Vec2::from(nearest_m).norm();
+            SensedObstacle { nearest_m, distance_m, shape: 0, reserved: 0 }
+        };
+        let detect = |nearest_m, velocity| braking.detect(Vec2::zeros(), velocity, &obstacle(nearest_m), 15.0);
+        let ahead = detect([60.0, 0.0], Vec2::new(10.0, 0.0));
+        assert_eq!((ahead.bearing_rad, ahead.time_to_impact_s, ahead.danger), (0.0, 6.0, false));
+        let left = detect([0.0, 30.0], Vec2::new(10.0, 0.0));
+        assert!((left.bearing_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12 && left.danger);
+        assert!((detect([30.0, 0.0], Vec2::new(0.0, 5.0)).bearing_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        let resting = detect([0.0, -30.0], Vec2::zeros());
+        assert!(resting.time_to_impact_s.is_infinite() && resting.bearing_rad < 0.0 && !resting.danger);
+    }
 
     #[test]
     fn equations_one_to_four() {

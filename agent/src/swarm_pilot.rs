@@ -1,5 +1,6 @@
 //! The paper's drone: detect, obey, avoid, queue, re-form; plan for all while it leads. Paper, Algorithm 1.
 
+use crate::danger::Detection;
 use crate::escape::Escape;
 use crate::foresight::Foresight;
 use crate::guidance::anchor;
@@ -113,13 +114,16 @@ impl SwarmPilot {
 
     /// Nobody said anything about an obstacle, and it is dangerously near: go round it by the nearest way.
     fn fend_for_itself(&mut self, senses: &Senses<'_>) {
-        let zone_m = self.params.braking.danger_zone_m(senses.velocity.norm(), self.params.safety.clearance_m);
-        let near = senses.obstacles.iter().filter(|o| o.distance_m < zone_m).filter_map(|o| senses.shape(o));
+        let clearance_m = self.params.safety.clearance_m;
+        let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
+        let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
         let planned = |id| {
             self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains_key(&self.params.me))
         };
         let past = |id| self.leading.obstacles.has_passed(self.params.me, id);
-        let Some(id) = near.map(|shape| shape.id).find(|&id| !planned(id) && !past(id)) else { return };
+        let urgent = near.filter(|(detection, id)| detection.danger && !planned(*id) && !past(*id));
+        let sooner = |a: &(Detection, _), b: &(Detection, _)| a.0.time_to_impact_s.total_cmp(&b.0.time_to_impact_s);
+        let Some((_, id)) = urgent.min_by(sooner) else { return };
         let Some(set) = self.leading.obstacles.sets().iter().find(|set| set.contains(&id)) else { return };
         let tag = set_tag(set);
         if self.way.own.as_ref().is_some_and(|own| own.tag == tag) {
