@@ -162,7 +162,7 @@ fn beside_the_paper(rows: &BTreeMap<String, Value>) {
         assert!(with > 1.1 && without < with - 0.05, "{scenario}: {with}, {without}");
     }
     assert!(ratio("ablation.s1-right.queue-false") < 1.0 && ratio("ablation.s3b-right.queue-false") < 1.0);
-    // In a gap for one drone it is real either way, and the law the faster way through.
+    // In a gap for one drone it is real either way; those whom the rule sends through are faster in a queue.
     for queue in ["true", "false"] {
         assert!(ratio(&format!("narrow.gap-40.queue-{queue}")) > 1.1);
     }

@@ -89,7 +89,7 @@ pub fn ablation(study: &Study, results: &Results) -> String {
         "With `guidance.queue = false` drones on one route do not slow down into a single file; the safety filter alone \
          keeps them apart, and in open space they pass abreast. What shortest path takes by what the paper's rule takes, \
          with the law and without: {}. Without the law shortest path is the cheaper of the two in {wins} of {} scenarios, \
-         and takes {} of energy against itself with the law, on average: most of the congestion that the rule avoids is \
+         and takes {} of energy against itself with the law, on average: much of the congestion that the rule avoids is \
          made by the queue.",
         ratios.join("; "),
         without.len(),
@@ -114,9 +114,9 @@ pub fn narrow(study: &Study, results: &Results) -> String {
     };
     let all: Vec<String> = study.firsts().iter().map(one).collect();
     format!(
-        "Where a gap lets one drone through at a time, congestion is real with and without the law, and a queue is the \
-         faster way through; where an opening is wide and nobody can avoid it, strategies cannot differ and the law costs \
-         time. All drones are past: {}.",
+        "Where a gap lets one drone through at a time, congestion is real with and without the law; whether a queue or a \
+         crowd is through sooner depends on the gap and on how many come. Where an opening is wide and nobody can avoid \
+         it, strategies cannot differ, and the law alone makes the difference. All drones are past: {}.",
         all.join("; ")
     )
 }
