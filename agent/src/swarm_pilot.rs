@@ -5,7 +5,7 @@ use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::{Ahead, ahead_of, queue_speed};
-use crate::rehearsal::{MOST_MEMBERS, Rehearsal};
+use crate::rehearsal::{MOST_MEMBERS, Rehearsal, Start};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::talk::Talk;
 use crate::way::{OwnWay, Way};
@@ -14,7 +14,7 @@ use skein_leader::election::{Election, Input};
 use skein_leader::ledger::{Ledger, Orders};
 use skein_leader::membership::{Peers, extrapolated};
 use skein_leader::obstacles::Obstacles;
-use skein_leader::planner::{Member, Planner, Situation};
+use skein_leader::planner::{Member, Planner, Situation, Strategy};
 use skein_leader::routes::Routes;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, POSE_LEADS, QueuePlace, set_tag};
@@ -162,17 +162,19 @@ impl SwarmPilot {
             let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
             past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
         }
-        if let Some(rehearsal) = &mut self.rehearsal {
-            if rehearsal.still_holds(&self.members, self.obstacles.iter().count()) {
-                if let Some(orders) = rehearsal.work() {
-                    self.rehearsal = None;
-                    self.adopt(orders);
-                }
-                return;
+        if let Some(mut rehearsal) = self.rehearsal.take() {
+            // What became known meanwhile is planned for in the next tick.
+            let over = match rehearsal.still_holds(&self.members, self.obstacles.iter().count()) {
+                true => rehearsal.work(senses.tick),
+                false => Some(rehearsal.choose()),
+            };
+            match over {
+                Some(orders) => self.adopt(orders),
+                None => self.rehearsal = Some(rehearsal),
             }
-            self.rehearsal = None;
+            return;
         }
-        let mut alternatives = self.planner.decide(&Situation {
+        let alternatives = self.planner.decide(&Situation {
             now,
             ballot: self.election.obeyed(),
             members: &self.members,
@@ -180,15 +182,26 @@ impl SwarmPilot {
             obstacles: &self.obstacles,
             ledger: &self.ledger,
         });
-        if alternatives.len() > 1 && self.members.len() <= MOST_MEMBERS {
-            let leader = self.clone();
-            self.rehearsal = Some(Rehearsal::new(leader, self.members.clone(), now, alternatives));
-        } else if !alternatives.is_empty() {
-            self.adopt(alternatives.swap_remove(0));
+        match self.params.planner.strategy {
+            Strategy::Rehearsed(objective) if alternatives.len() > 1 && self.members.len() <= MOST_MEMBERS => {
+                self.rehearse(Start { tick: senses.tick, now, objective }, alternatives);
+            }
+            // Too many for a rehearsal: the rule's.
+            _ => alternatives.into_iter().take(2).next_back().into_iter().for_each(|orders| self.adopt(orders)),
         }
     }
 
-    fn adopt(&mut self, orders: Orders) {
+    /// Sends all on their shortest ways, in the groups they have, and begins to rehearse what else could be done.
+    fn rehearse(&mut self, start: Start, alternatives: Vec<Orders>) {
+        let before = self.ledger.clone();
+        let mut first = alternatives[0].clone();
+        let current = |id| before.obeyed().and_then(|orders| orders.parts.get(&id)).map_or(GroupId::ALL, |p| p.group);
+        first.parts.iter_mut().for_each(|(&id, part)| part.group = current(id));
+        self.adopt(first);
+        self.rehearsal = Some(Rehearsal::new(self, &before, &self.members, start, alternatives));
+    }
+
+    pub(crate) fn adopt(&mut self, orders: Orders) {
         self.ledger.adopt(orders, &self.obstacles);
         self.talk.hurry();
     }

@@ -9,6 +9,7 @@ mod error;
 mod keys;
 mod near;
 mod node;
+mod objective;
 mod obstacle;
 mod parse;
 mod reference;
@@ -21,6 +22,7 @@ pub use keys::{
     Avoidance, Drone, End, Failsafe, Faults, Formation, FormationShape, Guidance, MAX_DRONES, MAX_OBSTACLES, Mission,
     Protocol, RadioKeys, Reformation, Scenario, Sensors, Time,
 };
+pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::Source;
 pub use reference::{Key, keys, markdown, schema};
