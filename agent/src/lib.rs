@@ -7,7 +7,7 @@
 //! | [`danger`] | detection distances (equations 1–4) |
 //! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
 //! | [`escape`] | out of a corner |
-//! | [`rehearsal`] | a leader flies its alternatives ahead |
+//! | [`rehearsal`], [`stage`] | a leader flies its alternatives ahead |
 //! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
 //! | [`talk`] | what is said, and when |
 
@@ -23,6 +23,7 @@ pub mod queue;
 mod reaction;
 pub mod rehearsal;
 pub mod safety;
+pub mod stage;
 pub mod swarm_pilot;
 pub mod way;
 

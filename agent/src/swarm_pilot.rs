@@ -8,11 +8,13 @@ use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::{Ahead, ahead_of, queue_speed};
 use crate::reaction::Reaction;
-use crate::rehearsal::{MOST_MEMBERS, Rehearsal};
+use crate::rehearsal::{MOST_MEMBERS, Rehearsal, Start};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
+use skein_leader::ledger::Orders;
+use skein_leader::planner::Strategy;
 use skein_leader::routes::Routes;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, QueuePlace, set_tag};
@@ -79,25 +81,40 @@ impl SwarmPilot {
 
     fn plan(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
         self.leading.muster(now, own);
-        let members = self.leading.members();
-        if let Some(rehearsal) = &mut self.rehearsal {
-            if rehearsal.still_holds(members, self.leading.obstacles.iter().count()) {
-                if let Some(orders) = rehearsal.work() {
-                    self.rehearsal = None;
-                    self.leading.adopt(now, orders);
-                }
-                return;
+        if let Some(mut rehearsal) = self.rehearsal.take() {
+            // What became known meanwhile is planned for in the next tick.
+            let over = match rehearsal.still_holds(self.leading.members(), self.leading.obstacles.iter().count()) {
+                true => rehearsal.work(own.tick),
+                false => Some(rehearsal.choose()),
+            };
+            match over {
+                Some(orders) => self.leading.adopt(now, orders),
+                None => self.rehearsal = Some(rehearsal),
             }
-            self.rehearsal = None;
+            return;
         }
-        let mut alternatives = self.leading.decide(now, &self.silent, say);
+        let alternatives = self.leading.decide(now, &self.silent, say);
+        match self.params.planner.strategy {
+            Strategy::Rehearsed(objective)
+                if alternatives.len() > 1 && self.leading.members().len() <= MOST_MEMBERS =>
+            {
+                self.rehearse(Start { tick: own.tick, now, objective }, alternatives);
+            }
+            // Too many for a rehearsal: the rule's.
+            _ => alternatives.into_iter().take(2).next_back().into_iter().for_each(|o| self.leading.adopt(now, o)),
+        }
+    }
+
+    /// Sends all on their shortest ways, in the groups they have, and begins to rehearse what else could be done.
+    fn rehearse(&mut self, start: Start, alternatives: Vec<Orders>) {
+        let before = self.leading.ledger.clone();
         let members = self.leading.members().to_vec();
-        if alternatives.len() > 1 && members.len() <= MOST_MEMBERS {
-            let leader = self.clone();
-            self.rehearsal = Some(Rehearsal::new(leader, members, now, alternatives));
-        } else if !alternatives.is_empty() {
-            self.leading.adopt(now, alternatives.swap_remove(0));
-        }
+        let mut first = alternatives[0].clone();
+        let scope = self.leading.election.scope();
+        let current = |id| members.iter().find(|m| m.id == id).map(|m| m.group).filter(|group| scope.contains(*group));
+        first.parts.iter_mut().for_each(|(&id, part)| part.group = current(id).unwrap_or(scope));
+        self.leading.adopt(start.now, first);
+        self.rehearsal = Some(Rehearsal::new(self, &before, &members, start, alternatives));
     }
 
     /// Where drones that fell silent hang by now: their last beacon, and how far they took to stop.

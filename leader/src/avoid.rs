@@ -1,5 +1,6 @@
 //! Who flies which way past an obstacle set (paper, Algorithm 3).
 
+use crate::candidates::candidates;
 use crate::cost::{Flight, Trip, shortest, trips};
 use crate::council::{self, arrivals_s};
 use crate::ledger::{Ledger, Orders, PlannedSet};
@@ -43,6 +44,10 @@ impl Survey<'_> {
     }
 }
 
+/// Several groups together cannot rehearse what they do: the rule's grouping has to undercut the shortest ways by this
+/// share of the time that the last drone takes.
+const WORTH_UNREHEARSED: f64 = 0.1;
+
 /// A grouping of the members: the route of each and its place in the queue there, and when the last one passes.
 struct Grouping {
     chosen: Vec<usize>,
@@ -52,7 +57,7 @@ struct Grouping {
 
 impl Planner {
     /// Divides the members over the routes past a set. Those who fly it already, or are past its gate, keep their way.
-    /// One grouping, or the few that are worth a rehearsal; with other groups before the same set, one grouping of all
+    /// One grouping, or the few that are worth a rehearsal, the shortest ways first, the rule's second; with other groups before the same set, one grouping of all
     /// of them, once their leaders have said what they know.
     pub(crate) fn avoid(
         &mut self,
@@ -128,9 +133,9 @@ impl Planner {
         let rows: Vec<Vec<f64>> = free.iter().map(|&i| arrivals[i].clone()).collect();
         let table = self.table(&rows, routes.count())?;
         let splits = match self.params.strategy {
-            Strategy::Rehearsed => {
+            Strategy::Rehearsed(_) => {
                 let lateral_m: Vec<f64> = free.iter().map(|&i| members[i].position.y).collect();
-                few_best(&table, &lateral_m, routes.count())
+                candidates(&table, &lateral_m, routes.count())
             }
             Strategy::CongestionAware => vec![table.split()],
             Strategy::Fixed { left, right } if routes.count() == 2 && left + right == free.len() => {
@@ -154,7 +159,16 @@ impl Planner {
     fn choose_jointly(&self, s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>) -> Option<Grouping> {
         let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
         let union = self.table(&arrivals, survey.routes.count())?;
-        let split = if self.params.strategy == Strategy::ShortestPath { union.shortest() } else { union.split() };
+        let shortest = union.shortest();
+        // Without a rehearsal the rule has to save so much that waiting and detours cannot undo it.
+        let start_s = table.iter().map(|row| row.stamp.since(SimTime::ZERO)).fold(f64::INFINITY, f64::min);
+        let worth =
+            |rule: &Split| rule.makespan_s - start_s <= (1.0 - WORTH_UNREHEARSED) * (shortest.makespan_s - start_s);
+        let split = match self.params.strategy {
+            Strategy::ShortestPath => shortest,
+            Strategy::Rehearsed(_) => Some(union.split()).filter(worth).unwrap_or(shortest),
+            Strategy::CongestionAware | Strategy::Fixed { .. } => union.split(),
+        };
         let own = |drone: DroneId| s.members.binary_search_by_key(&drone, |m| m.id).ok();
         let kept: Vec<Option<u16>> =
             table.iter().map(|row| own(row.drone).and_then(|i| survey.kept[i]).map(|part| part.rank)).collect();
@@ -172,59 +186,6 @@ impl Planner {
     fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
         Table::new(arrivals, &vec![self.params.headway_s; routes]).ok()
     }
-}
-
-/// Most groupings that are worth a rehearsal, the shortest ways not counted.
-const REHEARSED: usize = 12;
-
-/// The rule's grouping; the best of those with other numbers on the routes, exact or in lateral order (where no lanes
-/// cross); and the shortest ways. By makespan, no two alike.
-fn few_best(table: &Table, lateral_m: &[f64], routes: usize) -> Vec<Split> {
-    let rule = table.split();
-    let mut counts: Vec<usize> = vec![0; routes];
-    rule.routes.iter().for_each(|&route| counts[route] += 1);
-    let mut from_right: Vec<usize> = (0..lateral_m.len()).collect();
-    from_right.sort_by(|&a, &b| lateral_m[a].total_cmp(&lateral_m[b]).then(a.cmp(&b)));
-    let in_order = |counts: &Vec<usize>| {
-        let mut chosen = vec![0; from_right.len()];
-        let lanes = counts.iter().enumerate().flat_map(|(route, &count)| std::iter::repeat_n(route, count));
-        from_right.iter().zip(lanes).for_each(|(&drone, route)| chosen[drone] = route);
-        table.assigned(&chosen).ok()
-    };
-    let numbers = neighbouring(&counts, lateral_m.len());
-    let mut others: Vec<Split> = numbers.iter().chain([&counts]).filter_map(in_order).collect();
-    others.extend(numbers.iter().filter_map(|counts| table.fixed(counts).ok()));
-    others.sort_by(|a, b| a.makespan_s.total_cmp(&b.makespan_s).then(a.total_s.total_cmp(&b.total_s)));
-    let mut kept: Vec<Split> = Vec::new();
-    for split in std::iter::once(rule).chain(others) {
-        if kept.len() < REHEARSED && !kept.iter().any(|other| other.routes == split.routes) {
-            kept.push(split);
-        }
-    }
-    let shortest = table.shortest();
-    if !kept.iter().any(|other| other.routes == shortest.routes) {
-        kept.push(shortest);
-    }
-    kept
-}
-
-/// Numbers of drones on the routes: all of them for two routes, else those that move one or two drones over.
-fn neighbouring(counts: &[usize], drones: usize) -> Vec<Vec<usize>> {
-    if counts.len() == 2 {
-        return (0..=drones).map(|right| vec![right, drones - right]).collect();
-    }
-    let mut all = Vec::new();
-    for from in 0..counts.len() {
-        for to in (0..counts.len()).filter(|&to| to != from) {
-            for moved in 1..=counts[from].min(2) {
-                let mut next = counts.to_vec();
-                next[from] -= moved;
-                next[to] += moved;
-                all.push(next);
-            }
-        }
-    }
-    all
 }
 
 /// What other leaders are told of a member.

@@ -102,18 +102,19 @@ impl Leading {
         }
     }
 
-    /// The machine that another member would have, had it heard what this leader has heard, and these orders.
+    /// The machine that a member would have, had it heard what this leader has heard, but of plans only what the ledger
+    /// `before` holds; of this drone itself the machine as it is.
     #[must_use]
-    pub fn of_member(&self, params: &LeadingParams, now: SimTime, orders: &Orders) -> Self {
+    pub fn of_member(&self, params: &LeadingParams, now: SimTime, before: &Ledger) -> Self {
         let mut study = Self::new(params);
         study.obstacles = self.obstacles.clone();
         study.peers = self.peers.clone();
         study.peers.forget(params.me);
-        study.ledger = self.ledger.of_member(params.me);
-        study.ledger.adopt(orders.clone(), &study.obstacles);
         if params.me == self.me {
+            study.ledger = self.ledger.clone();
             study.election = self.election.clone();
         } else {
+            study.ledger = before.of_member(params.me);
             let (ballot, scope) = (self.election.obeyed(), self.election.scope());
             study.election.handle(now, 0, Input::Sign { ballot, scope, named: true });
         }

@@ -1,6 +1,7 @@
 //! Who leads, and who goes where: membership, election, routes, exact grouping, formation. Pure.
 
 mod avoid;
+pub mod candidates;
 pub mod cost;
 pub mod council;
 pub mod election;

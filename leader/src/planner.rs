@@ -12,12 +12,12 @@ use skein_protocol::payload::{Arrivals, PHASE_AVOID, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
 
 /// How a leader chooses among the groupings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strategy {
     /// Least time of the last drone past the gate (paper, Algorithm 3).
     CongestionAware,
-    /// The best few groupings by that rule and the shortest ways, flown ahead in a rehearsal; the cheapest wins.
-    Rehearsed,
+    /// The best few groupings by that rule and the shortest ways, flown ahead in a rehearsal; the best wins.
+    Rehearsed(Objective),
     /// Each drone takes its own shortest way.
     ShortestPath,
     /// So many drones on the left and on the right of one obstacle, each side filled in the least time.
@@ -27,6 +27,23 @@ pub enum Strategy {
         /// On the right route.
         right: usize,
     },
+}
+
+/// What a rehearsed mission costs: a weighted sum. Ties go to the lower energy, then to the earlier end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Objective {
+    /// Weight of the energy of all drones until the mission's end, 1/kJ.
+    pub energy_per_kj: f64,
+    /// Weight of the time until the mission's end, 1/s.
+    pub time_per_s: f64,
+}
+
+impl Objective {
+    /// The cost of so much energy (J) and time (s).
+    #[must_use]
+    pub fn cost(&self, energy_j: f64, time_s: f64) -> f64 {
+        self.energy_per_kj * energy_j / 1000.0 + self.time_per_s * time_s
+    }
 }
 
 /// Where a mission ends.
@@ -152,7 +169,8 @@ impl Planner {
         self.council.hear(now, row);
     }
 
-    /// New orders, if there is something to decide: one, or alternatives to rehearse, by the paper's rule the first.
+    /// New orders, if there is something to decide: one, or alternatives to rehearse, the shortest ways first,
+    /// the paper's rule second.
     /// What other leaders are to be asked or told goes into `say`.
     pub fn decide(&mut self, s: &Situation<'_>, say: &mut Vec<Arrivals>) -> Vec<Orders> {
         if let Some(planned) = self.council.asked(s.now).and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag)) {

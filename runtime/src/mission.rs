@@ -7,7 +7,7 @@ use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::SafetyParams;
 use skein_agent::{PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
-use skein_leader::planner::{Destination, PlannerParams, Strategy};
+use skein_leader::planner::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::{DroneId, SimTime, Vec2};
@@ -119,8 +119,11 @@ fn planner(scenario: &Scenario) -> PlannerParams {
     let (drone, avoidance) = (&scenario.drone, &scenario.avoidance);
     PlannerParams {
         strategy: match scenario.strategy {
-            StrategyKey::CongestionAware | StrategyKey::CongestionAwarePaper => Strategy::CongestionAware,
-            StrategyKey::CongestionAwareRehearsed => Strategy::Rehearsed,
+            StrategyKey::CongestionAware => Strategy::Rehearsed(Objective {
+                energy_per_kj: scenario.objective.energy_per_kj,
+                time_per_s: scenario.objective.time_per_s,
+            }),
+            StrategyKey::CongestionAwarePaper => Strategy::CongestionAware,
             StrategyKey::ShortestPath => Strategy::ShortestPath,
             StrategyKey::Fixed { left, right } => Strategy::Fixed { left: left as usize, right: right as usize },
         },

@@ -3,6 +3,7 @@
 
 use crate::faults::{Fault, Faults, MAX_FAULTS};
 use crate::guidance::Guidance;
+use crate::objective::Objective;
 use crate::obstacle::Obstacle;
 use crate::radio::RadioKeys;
 use crate::strategy::Strategy;
@@ -29,12 +30,14 @@ pub struct Scenario {
     #[serde(default = "first_seed")]
     #[schemars(range(min = 0, max = 9_223_372_036_854_775_807_i64))]
     pub seed: u64,
-    /// How drones are shared out to the routes round an obstacle set: `congestion-aware` and
-    /// `congestion-aware-paper` (the paper's rule), `congestion-aware-rehearsed` (the best few groupings are flown ahead,
-    /// the cheapest is taken), `shortest-path`, or `fixed:L/R` (L drones to the left, R to the right of the only
-    /// obstacle).
+    /// How drones are shared out to the routes round an obstacle set: `congestion-aware` (the best few groupings and the
+    /// shortest paths flown ahead by the leader, the best by `objective` taken), `congestion-aware-paper` (the paper's
+    /// rule), `shortest-path`, or `fixed:L/R` (L drones to the left, R to the right of the only obstacle).
     #[serde(default)]
     pub strategy: Strategy,
+    /// What `congestion-aware` makes least.
+    #[serde(default)]
+    pub objective: Objective,
     /// Simulated time.
     #[serde(default)]
     pub time: Time,

@@ -12,6 +12,7 @@ mod guidance;
 mod keys;
 mod near;
 mod node;
+mod objective;
 mod obstacle;
 mod parse;
 mod radio;
@@ -27,6 +28,7 @@ pub use keys::{
     Avoidance, Drone, End, Formation, FormationShape, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol, Reformation,
     Scenario, Sensors, Time,
 };
+pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::Source;
 pub use radio::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};

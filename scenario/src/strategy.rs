@@ -11,14 +11,12 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Strategy {
-    /// `congestion-aware`: the least time of the last drone; for now the same as the paper's rule.
+    /// `congestion-aware`: the best few groupings by the paper's rule, and the shortest paths, are flown ahead in the
+    /// leader's mind; the best by the scenario's objective is taken.
     #[default]
     CongestionAware,
     /// `congestion-aware-paper`: the paper's rule to the letter (A3, C1), no rehearsal.
     CongestionAwarePaper,
-    /// `congestion-aware-rehearsed`: the best few groupings by the rule and the shortest paths flown ahead, the cheapest
-    /// taken.
-    CongestionAwareRehearsed,
     /// `shortest-path`: every drone takes its own shortest path.
     ShortestPath,
     /// `fixed:L/R`: so many drones to each side of the only obstacle.
@@ -39,10 +37,9 @@ pub struct StrategyError {
 
 impl Strategy {
     /// The words without numbers in them.
-    pub const WORDS: [(&str, Self); 4] = [
+    pub const WORDS: [(&str, Self); 3] = [
         ("congestion-aware", Self::CongestionAware),
         ("congestion-aware-paper", Self::CongestionAwarePaper),
-        ("congestion-aware-rehearsed", Self::CongestionAwareRehearsed),
         ("shortest-path", Self::ShortestPath),
     ];
 }
@@ -71,7 +68,6 @@ impl fmt::Display for Strategy {
         match self {
             Self::CongestionAware => f.write_str("congestion-aware"),
             Self::CongestionAwarePaper => f.write_str("congestion-aware-paper"),
-            Self::CongestionAwareRehearsed => f.write_str("congestion-aware-rehearsed"),
             Self::ShortestPath => f.write_str("shortest-path"),
             Self::Fixed { left, right } => write!(f, "fixed:{left}/{right}"),
         }

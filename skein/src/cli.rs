@@ -76,8 +76,8 @@ pub enum SchemaOf {
 pub struct ScenarioArgs {
     /// Scenario file (TOML)
     pub scenario: PathBuf,
-    /// How drones are grouped: congestion-aware, congestion-aware-paper, congestion-aware-rehearsed,
-    /// shortest-path or fixed:L/R
+    /// How drones are grouped: congestion-aware, congestion-aware-paper, shortest-path or
+    /// fixed:L/R
     #[arg(long, value_name = "STRATEGY")]
     pub strategy: Option<String>,
     /// Seed of everything random

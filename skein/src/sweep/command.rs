@@ -8,6 +8,7 @@ use super::grid::Grid;
 use super::plots::plots;
 use super::pool::fly_all;
 use super::random::{Bounds, scene_toml};
+use super::ratios;
 use super::row::{Row, write_csv};
 use super::store::{Identity, Store};
 use super::table::table;
@@ -135,16 +136,22 @@ fn tell(
     write_csv(&mut csv, grid, &keys, rows).map_err(Failure::environment)?;
     store.write("runs.csv", &csv)?;
     let cells = cells(grid, rows);
+    let ratios = ratios::ratios(grid, rows);
     let summary = json!({
         "schema": "skein-sweep/1", "experiment": experiment.name, "runs": rows.len(),
         "scenarios": experiment.scenarios.iter().map(scenario).collect::<Vec<Value>>(),
         "seeds": experiment.seeds, "keys": keys,
         "cells": cells.iter().map(|cell| cell.json(&keys)).collect::<Vec<Value>>(),
+        "ratios": ratios.iter().map(ratios::Ratios::json).collect::<Vec<Value>>(),
     });
     let text = serde_json::to_vec_pretty(&summary).map_err(Failure::environment)?;
     store.write("summary.json", &text)?;
     for (name, svg) in plots(experiment, &cells).map_err(Failure::environment)? {
         store.write(&format!("plots/{name}"), svg.as_bytes())?;
+    }
+    if let Some(svg) = ratios::figure(&experiment.name, &ratios).map_err(Failure::environment)? {
+        store.write("plots/ratios.svg", svg.as_bytes())?;
+        store.write("ratios.csv", ratios::csv(&ratios, &keys).as_bytes())?;
     }
     let mut out = std::io::stdout().lock();
     // A closed pipe is the reader's choice.
@@ -153,7 +160,8 @@ fn tell(
         (false, true) => Ok(()),
         (false, false) => {
             let folder: PathBuf = store.path("");
-            writeln!(out, "{}folder  {}", table(&cells, &keys, &experiment.metrics), folder.display())
+            let table = table(&cells, &keys, &experiment.metrics);
+            writeln!(out, "{table}{}folder  {}", ratios::text(&ratios), folder.display())
         }
     };
     Ok(())

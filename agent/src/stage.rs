@@ -1,0 +1,216 @@
+//! The stage of a rehearsal: understudies of all members, flown step by step in their leader's mind.
+
+use crate::guidance::anchor;
+use crate::params::PilotParams;
+use crate::pilot::{Heard, Pilot};
+use crate::swarm_pilot::SwarmPilot;
+use skein_leader::geometry::nearest;
+use skein_leader::ledger::{Ledger, Orders};
+use skein_leader::planner::{Destination, Member, Objective, Strategy};
+use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
+use skein_protocol::energy::power_w;
+use skein_protocol::payload::PHASE_AVOID;
+use skein_protocol::{DroneId, Message, SimTime, Vec2};
+
+/// A rehearsal that takes longer has failed, s.
+const HORIZON_S: f64 = 200.0;
+/// Obstacles farther away are not sensed, m.
+const OBSTACLE_REACH_M: f64 = 90.0;
+/// Neighbours within so many safe distances are sensed.
+const RANGING: f64 = 2.0;
+/// A formation that is held moves no faster, m/s.
+const HOLD_SPEED_MPS: f64 = 1.0;
+
+/// What became of one alternative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Whether all got there and kept their distances.
+    pub good: bool,
+    /// By the objective, until the mission's end.
+    pub cost: f64,
+    /// Of all members, from the decision until the mission's end, J.
+    pub energy_j: f64,
+    /// From the decision until the mission's end, s.
+    pub end_s: f64,
+    /// From the decision until the last drone passed the gate, s.
+    pub pass_s: f64,
+}
+
+/// Understudies and their bodies.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    params: PilotParams,
+    step_s: f64,
+    start: SimTime,
+    now: SimTime,
+    tick: u64,
+    /// Steps until the decision.
+    thinking: u64,
+    gate_x_m: f64,
+    pilots: Vec<SwarmPilot>,
+    bodies: Vec<(Vec2, Vec2)>,
+    said: Vec<Heard>,
+    energy_j: f64,
+    pass_s: Option<f64>,
+    safe: bool,
+}
+
+impl Stage {
+    /// The members as their leader knows them, who has orders of which they do not yet know. `(tick, now, step_s)`:
+    /// number and time of the first step and the length of all, s; `thinking`: steps until the decision.
+    #[must_use]
+    pub fn new(
+        leader: &SwarmPilot,
+        before: &Ledger,
+        members: &[Member],
+        (tick, now, step_s): (u64, SimTime, f64),
+        thinking: u64,
+    ) -> Self {
+        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, before);
+        let gate_x_m = leader.leading.ledger.sets().last().map_or(f64::NEG_INFINITY, |set| set.routes.gate_x_m());
+        Self {
+            params: leader.params.clone(),
+            step_s,
+            start: now,
+            now,
+            tick,
+            thinking,
+            gate_x_m,
+            pilots: members.iter().map(understudy).collect(),
+            bodies: members.iter().map(|member| (member.position, member.velocity)).collect(),
+            said: Vec::new(),
+            energy_j: 0.0,
+            pass_s: None,
+            safe: true,
+        }
+    }
+
+    /// Whether the decision is still to come.
+    #[must_use]
+    pub fn is_thinking(&self) -> bool {
+        self.thinking > 0
+    }
+
+    /// The same at the decision, for these orders.
+    #[must_use]
+    pub fn under(&self, orders: &Orders) -> Self {
+        let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
+        let me = self.params.me;
+        if let Some(leader) = stage.pilots.iter_mut().find(|pilot| pilot.params.me == me) {
+            leader.leading.adopt(stage.now, orders.clone());
+        }
+        stage
+    }
+
+    /// One step of all drones.
+    pub fn step(&mut self, shapes: &[SensedShape]) {
+        self.thinking = self.thinking.saturating_sub(1);
+        let mut accelerations = Vec::with_capacity(self.pilots.len());
+        let mut said = Vec::new();
+        let mut words: Vec<Message> = Vec::new();
+        let mut heard: Vec<Heard> = Vec::new();
+        for i in 0..self.pilots.len() {
+            let (obstacles, neighbours) = self.surroundings(i, shapes);
+            let senses = Senses::new((self.tick, self.now), self.bodies[i], &obstacles, &neighbours, shapes);
+            let source = self.pilots[i].params.me;
+            heard.clear();
+            heard.extend(self.said.iter().filter(|heard| heard.source != source));
+            words.clear();
+            accelerations.push(self.pilots[i].step(&senses, &heard, &mut words).acceleration);
+            said.extend(words.iter().map(|&message| Heard { source, message }));
+        }
+        self.said = said;
+        self.fly(&accelerations);
+    }
+
+    fn surroundings(&mut self, i: usize, shapes: &[SensedShape]) -> (Vec<SensedObstacle>, Vec<SensedNeighbour>) {
+        let (position, velocity) = self.bodies[i];
+        let safety = self.params.safety;
+        let mut obstacles = Vec::new();
+        for (shape, entry) in shapes.iter().zip(0..) {
+            let core: Vec<Vec2> = shape.shape.vertices().collect();
+            let to_core = nearest(&core, position) - position;
+            let distance_m = to_core.norm() - shape.shape.radius_m;
+            self.safe &= distance_m >= safety.clearance_m;
+            if distance_m < OBSTACLE_REACH_M {
+                let nearest_m = position + to_core * (distance_m / to_core.norm().max(1e-9));
+                obstacles.push(SensedObstacle { nearest_m: nearest_m.into(), distance_m, shape: entry, reserved: 0 });
+            }
+        }
+        let mut neighbours = Vec::new();
+        for (j, &(other, speed)) in self.bodies.iter().enumerate().filter(|(j, _)| *j != i) {
+            let offset = other - position;
+            self.safe &= offset.norm() >= safety.safe_distance_m;
+            if offset.norm() <= RANGING * safety.safe_distance_m {
+                let drone = self.pilots[j].params.me;
+                let velocity_mps = (speed - velocity).into();
+                neighbours.push(SensedNeighbour { position_m: offset.into(), velocity_mps, drone, reserved: 0 });
+            }
+        }
+        (obstacles, neighbours)
+    }
+
+    fn fly(&mut self, accelerations: &[Vec2]) {
+        for ((position, velocity), &wanted) in self.bodies.iter_mut().zip(accelerations) {
+            let most = self.params.safety.acceleration_max_mps2;
+            let acceleration = if wanted.norm() > most { wanted * (most / wanted.norm()) } else { wanted };
+            self.energy_j += power_w(velocity.norm()) * self.step_s;
+            let next = *velocity + acceleration * self.step_s;
+            *position += (*velocity + next) * (self.step_s / 2.0);
+            *velocity = next;
+        }
+        self.now = self.now.after(self.step_s);
+        self.tick += 1;
+    }
+
+    /// The forecast, once the formation is closed, or never will be, or costs more than `limit` already.
+    pub fn judge(&mut self, objective: &Objective, limit: f64) -> Option<Forecast> {
+        let elapsed_s = self.now.since(self.start);
+        if self.pass_s.is_none() && self.bodies.iter().all(|(position, _)| position.x >= self.gate_x_m) {
+            self.pass_s = Some(elapsed_s);
+        }
+        let cruise_s = self.pass_s.and_then(|_| self.closed());
+        let (rest_s, count) = (cruise_s.unwrap_or(0.0), self.bodies.len() as f64);
+        let energy_j = self.energy_j + count * power_w(self.params.guidance.speed_mps) * rest_s;
+        let end_s = elapsed_s + rest_s;
+        let cost = objective.cost(energy_j, end_s);
+        let good = cruise_s.is_some() && self.safe;
+        let pass_s = self.pass_s.unwrap_or(elapsed_s);
+        let over = cruise_s.is_some() || elapsed_s >= HORIZON_S || cost > limit;
+        over.then_some(Forecast { good, cost, energy_j, end_s, pass_s })
+    }
+
+    /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
+    fn closed(&self) -> Option<f64> {
+        let orders = self.pilots.first()?.leading.ledger.obeyed().filter(|orders| orders.plan.phase != PHASE_AVOID)?;
+        let (place, velocity) = anchor(&orders.plan, self.now);
+        let error_m = self.params.planner.arrival_error_m;
+        let holds = matches!(self.params.planner.destination, Destination::Hold { .. });
+        let in_slot = |(pilot, (position, speed)): (&SwarmPilot, &(Vec2, Vec2))| {
+            let slot = pilot.leading.ledger.part().map(|part| place + Vec2::from(part.slot_m));
+            let still = !holds || (speed - velocity).norm() <= HOLD_SPEED_MPS;
+            pilot.leading.ledger.stamp() == orders.plan.id
+                && still
+                && slot.is_some_and(|s| (s - position).norm() <= error_m)
+        };
+        let all = self.pilots.iter().zip(&self.bodies).all(in_slot);
+        let rest_m = if velocity.x > 0.0 { (orders.plan.anchor_stop_x_m - place.x).max(0.0) } else { 0.0 };
+        all.then(|| rest_m / velocity.x.max(1e-9))
+    }
+}
+
+impl SwarmPilot {
+    /// A member of this leader's group as the leader knows it, to be stepped every `dt_s`; it has heard what the ledger
+    /// `before` holds.
+    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, before: &Ledger) -> Self {
+        let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
+        params.safety.dt_s = dt_s;
+        params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
+        // In the mind nothing is rehearsed again.
+        params.planner.strategy = Strategy::CongestionAware;
+        let leading = self.leading.of_member(&params.leading(), now, before);
+        let mut study = Self::new(params);
+        study.leading = leading;
+        study
+    }
+}
