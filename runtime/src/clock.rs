@@ -72,6 +72,11 @@ impl Pacer {
         self.next
     }
 
+    /// Stands still for a while that does not count.
+    pub fn stand_still(&mut self, span: Duration) {
+        self.next += span;
+    }
+
     /// Sleeps until the next tick opens.
     pub fn pause(&self) {
         std::thread::sleep(self.next.saturating_duration_since(Instant::now()));
@@ -98,6 +103,8 @@ mod tests {
         let mut pacer = Pacer::new(0.02, 2.0);
         let (first, second) = (pacer.open(), pacer.open());
         assert_eq!(second - first, Duration::from_millis(10));
+        pacer.stand_still(Duration::from_millis(40));
+        assert_eq!(pacer.open() - second, Duration::from_millis(50));
         pacer.next -= Duration::from_secs(5);
         assert!(pacer.open() > Instant::now());
     }

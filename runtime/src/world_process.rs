@@ -119,10 +119,15 @@ impl Air {
         Ok(())
     }
 
-    fn tick(&mut self, pacer: Option<&mut Pacer>) -> Result<(), RuntimeError> {
+    fn tick(&mut self, mut pacer: Option<&mut Pacer>) -> Result<(), RuntimeError> {
         let tick = self.world.tick();
         for order in self.world.orders().to_vec() {
+            let begun = Instant::now();
             self.carry_out(order)?;
+            if let Some(pacer) = &mut pacer {
+                // What a start takes must not make everybody else late.
+                pacer.stand_still(begun.elapsed());
+            }
         }
         let down = self.world.downlink();
         self.down.send(tick, down.byte_len(), |bytes| down.write_to(bytes))?;

@@ -74,9 +74,9 @@ fn a_frozen_drone_that_is_killed_is_not_resumed() {
     let mut world = world(Effect::Freeze, When::At(1.0), 1.0, params());
     fly(&mut world, 60);
     world.mark_dead(ID, FaultKind::Kill, false, "");
+    assert!(!world.is_frozen(ID));
     let (orders, told) = fly(&mut world, 100);
     assert_eq!((orders, fault_times(&told)), (vec![], vec![]));
-    assert!(!world.is_frozen(ID));
 }
 
 #[test]
