@@ -131,6 +131,7 @@ impl Rehearsal {
 }
 
 /// The best of those that are good, if it undercuts the first, the shortest ways, by this share of its cost; else these.
+/// The second, the rule's, is taken before what is hardly better: a forecast is not more exact than that.
 fn best(forecasts: &[Forecast], worth: f64) -> usize {
     let order = |a: &usize, b: &usize| {
         let (a, b) = (&forecasts[*a], &forecasts[*b]);
@@ -141,7 +142,10 @@ fn best(forecasts: &[Forecast], worth: f64) -> usize {
         _ => f64::INFINITY,
     };
     let good = (0..forecasts.len()).filter(|&i| forecasts[i].good);
-    good.min_by(order).filter(|&best| forecasts[best].cost <= enough).unwrap_or(0)
+    let Some(best) = good.min_by(order).filter(|&best| forecasts[best].cost <= enough) else { return 0 };
+    let as_good = |rule: &&Forecast| rule.good && (1.0 - WORTH) * rule.cost <= forecasts[best].cost;
+    let rule = forecasts.get(1).filter(as_good).filter(|rule| rule.cost <= enough);
+    if best > 0 && rule.is_some() { 1 } else { best }
 }
 
 impl SwarmPilot {
@@ -188,10 +192,20 @@ mod tests {
     }
 
     #[test]
+    fn the_rule_is_followed_where_something_else_is_hardly_better() {
+        let of = |costs: &[f64]| costs.iter().map(|&cost| forecast(true, cost, 30.0)).collect::<Vec<_>>();
+        assert_eq!(best(&of(&[60.0, 55.0, 54.6]), 0.01), 1);
+        assert_eq!(best(&of(&[60.0, 55.0, 54.0]), 0.01), 2);
+        assert_eq!(best(&of(&[60.0, 59.6, 59.2]), 0.01), 2, "but not if it is hardly better than the shortest ways");
+        assert_eq!(best(&[of(&[60.0])[0], forecast(false, 50.0, 30.0), of(&[50.2])[0]], 0.01), 2);
+    }
+
+    #[test]
     fn what_does_not_keep_its_distances_is_not_taken_and_ties_go_to_the_earlier_end() {
         let shortest = forecast(true, 60.0, 30.0);
         assert_eq!(best(&[shortest, forecast(false, 50.0, 28.0)], 0.01), 0);
-        assert_eq!(best(&[shortest, forecast(true, 50.0, 29.0), forecast(true, 50.0, 28.0)], 0.01), 2);
+        let (jams, late, early) = (forecast(false, 50.0, 28.0), forecast(true, 50.0, 29.0), forecast(true, 50.0, 28.0));
+        assert_eq!(best(&[shortest, jams, late, early], 0.01), 3);
         // Jammed on the shortest ways: anything that gets through.
         assert_eq!(best(&[forecast(false, 20.0, 200.0), forecast(true, 90.0, 40.0)], 0.01), 1);
     }

@@ -197,6 +197,8 @@ pub enum TopicKey {
     Plan,
     /// One drone's part in it.
     Assignment,
+    /// When one member of a group can be at the next gate.
+    Arrivals,
     /// Who is through which set.
     Passed,
 }

@@ -123,6 +123,7 @@ impl From<TopicKey> for Topic {
             TopicKey::Leadership => Self::Leadership,
             TopicKey::Plan => Self::Plan,
             TopicKey::Assignment => Self::Assignment,
+            TopicKey::Arrivals => Self::Arrivals,
             TopicKey::Passed => Self::Passed,
         }
     }
