@@ -175,9 +175,9 @@ fn beside_the_paper(rows: &BTreeMap<String, Value>) {
     // Least time is not least energy: somewhere the gain is negative.
     assert!(ours("gain.energy.congestion-aware-paper.least") < -1.0);
     assert!(ours("gain.energy.congestion-aware-paper.most") > 10.0);
-    // A time to react costs energy, and no distance.
+    // A time to react costs hardly anything where there is room, and no distance.
     let reacting = |t_c: &str, what: &str| ours(&format!("E4.S2.congestion-aware-paper.t_c-{t_c}.{what}"));
-    assert!(reacting("0.5", "total") > reacting("0.2", "total") && reacting("0.2", "total") > reacting("0", "total"));
+    assert!(["0.2", "0.5"].iter().all(|t_c| (reacting(t_c, "total") / reacting("0", "total") - 1.0).abs() < 0.05));
     assert!(["0", "0.2", "0.5"].iter().all(|t_c| reacting(t_c, "separation") >= 37.0));
     // The swarm is torn apart at the wide obstacle, less so at the two small ones, and whole again at the end.
     assert!(ours("E6.disturbance.1") > 2.0 * ours("E6.disturbance.2") && ours("E6.disturbance.2") > 10.0);

@@ -46,7 +46,7 @@ impl Survey<'_> {
 
 /// Several groups together cannot rehearse what they do: the rule's grouping has to undercut the shortest ways by this
 /// share of the time that the last drone takes.
-const WORTH_UNREHEARSED: f64 = 0.1;
+const WORTH_UNREHEARSED: f64 = 0.2;
 
 /// A grouping of the members: the route of each and its place in the queue there, and when the last one passes.
 struct Grouping {

@@ -141,8 +141,9 @@ pub fn reaction(study: &Study, results: &Results) -> String {
         "The paper's runs have t_c = 0. Here `drone.reaction_time_s` delays what a drone does by t_c, and widens its \
          stopping distance by v·t_c (E2, E4) and the distance it keeps from others by t_c (1 m/s + a·t_c). It costs, with \
          the paper's rule: {}. Flights in which a distance was broken: {broken}; flights that did not reach their goal: \
-         {open}. S1 has slots 35 m apart and a safe distance of 33 m: from t_c = 0.43 s on drones keep more than 35 m \
-         apart, and its formation cannot close; just below that it closes slowly.",
+         {open}. What it has commanded but not yet done a drone knows, and it decides for the moment at which a command \
+         takes effect: where there is room the delay itself costs nothing. S1 has slots 35 m apart and a safe distance of \
+         33 m: there the wider distances leave no room, and its formation closes slowly if at all.",
         costs.join("; ")
     )
 }
