@@ -58,7 +58,6 @@ pub struct Leading {
     pub(crate) incarnation: u32,
     drones: u32,
     wait_s: f64,
-    leader_timeout_s: f64,
     /// Who is there.
     pub peers: Peers,
     /// What is in the way.
@@ -88,7 +87,6 @@ impl Leading {
             incarnation: params.incarnation,
             drones: params.drones,
             wait_s: params.election.wait_s,
-            leader_timeout_s: params.election.leader_timeout_s,
             peers: Peers::new(params.drones, params.peer_timeout_s),
             obstacles: Obstacles::new(params.drones, reach_m),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
@@ -215,11 +213,9 @@ impl Leading {
 
     /// Elections: heartbeats, probes, claims.
     pub fn elect(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
-        let suspect = self.election.obeyed().claimant;
-        let patience_s = self.peers.patience_s(suspect, self.leader_timeout_s);
-        let closer = if self.election.has_leader(now, patience_s) { 0 } else { self.closer(now, own, suspect) };
+        let (closer, delay_s) = (self.closer(now, own), self.peers.delay_s());
         let epoch = self.ledger.stamp().epoch;
-        let said = self.election.handle(now, epoch, Input::Tick { closer, patience_s });
+        let said = self.election.handle(now, epoch, Input::Tick { closer, delay_s });
         say.extend(said.map(Message::Leadership));
         if let Some(scope) = self.claimable(now, own) {
             let said = self.election.handle(now, epoch, Input::Claim(scope));
@@ -230,17 +226,19 @@ impl Leading {
     /// When the machine next wants to be told the time, if nothing is heard until then.
     #[must_use]
     pub fn next_deadline(&self, now: SimTime, own: &Own) -> SimTime {
-        let suspect = self.election.obeyed().claimant;
-        let patience_s = self.peers.patience_s(suspect, self.leader_timeout_s);
-        let closer = if self.election.has_leader(now, patience_s) { 0 } else { self.closer(now, own, suspect) };
-        self.election.next_deadline(closer, patience_s)
+        self.election.next_deadline(self.closer(now, own), self.peers.delay_s())
     }
 
-    /// Living drones of the scope that are closer to the destination, `suspect` not counted.
-    fn closer(&self, now: SimTime, own: &Own, suspect: DroneId) -> usize {
+    /// Living drones of the scope that are closer to the destination, the suspect not counted; nobody has to be counted
+    /// while there is a leader.
+    fn closer(&self, now: SimTime, own: &Own) -> usize {
+        if self.election.has_leader(now) {
+            return 0;
+        }
         let mine = self.key(own.position, self.me);
-        let (scope, obeys) = (self.election.scope(), self.election.obeyed().is_some());
-        let rivals = self.living(now).filter(|m| (!obeys || m.id != suspect) && scope.contains(m.group));
+        let (scope, suspect) = (self.election.scope(), self.election.obeyed());
+        let rivals =
+            self.living(now).filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
         rivals.filter(|m| self.key(m.position, m.id) < mine).count()
     }
 
@@ -276,12 +274,14 @@ impl Leading {
         Member { id: self.me, position, speed_mps: velocity.norm(), velocity, group: self.ledger.group() }
     }
 
-    /// Living peers by now. The group is the one the plan puts a peer in, unless its beacon shows that it is on already.
+    /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
+    /// its beacon shows that it is on already.
     fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
-        let (stamp, parts) = (self.ledger.stamp(), self.ledger.obeyed().map(|orders| &orders.parts));
+        let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
-            let planned = parts.filter(|_| pose.obeyed < stamp).and_then(|parts| parts.get(&id));
-            let group = planned.map_or(pose.group, |part| part.group);
+            let untold = plans.into_iter().flatten().filter(|orders| pose.obeyed < orders.plan.id);
+            let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
+            let group = group.unwrap_or(pose.group);
             let velocity = Vec2::from(pose.velocity_mps);
             Member { id, position: extrapolated(pose, now), speed_mps: velocity.norm(), velocity, group }
         })
@@ -333,7 +333,11 @@ impl Leading {
                 others.push(peer);
             }
         }
-        orphans.retain(|orphan| nearest_m2(orphan, &members) <= nearest_m2(orphan, &others));
+        // Of another lineage nobody takes it in.
+        orphans.retain(|orphan| {
+            let kin = others.iter().filter(|m| orphan.group.contains(m.group));
+            nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
+        });
         members.append(&mut orphans);
         (self.members, self.others) = (members, others);
         self.members.sort_by_key(|member| member.id);
@@ -380,6 +384,6 @@ impl Leading {
 const ANSWERS: usize = 4;
 
 /// Square of the distance to the nearest of these, m².
-fn nearest_m2(from: &Member, to: &[Member]) -> f64 {
-    to.iter().map(|m| (m.position - from.position).norm_squared()).fold(f64::INFINITY, f64::min)
+fn nearest_m2<'m>(from: &Member, to: impl Iterator<Item = &'m Member>) -> f64 {
+    to.map(|m| (m.position - from.position).norm_squared()).fold(f64::INFINITY, f64::min)
 }

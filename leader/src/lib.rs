@@ -12,6 +12,7 @@ pub mod membership;
 pub mod obstacles;
 pub mod planner;
 mod reform;
+mod rhythm;
 pub mod routes;
 pub mod slots;
 pub mod split;

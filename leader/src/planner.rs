@@ -188,7 +188,9 @@ impl Planner {
                 continue;
             }
             let mut planned = s.ledger.sets().iter().filter(|p| p.ids == *set && holds(p, s));
-            if !split && !planned.next().is_some_and(|p| waiting.all(|m| p.parts.contains_key(&m.id))) {
+            // Whoever is of no part of the scope does not obey that plan, whether it was meant to or not.
+            let obeys = |p: &PlannedSet, m: &Member| p.parts.contains_key(&m.id) && s.scope.contains(m.group);
+            if !split && !planned.next().is_some_and(|p| waiting.all(|m| obeys(p, m))) {
                 return Need::Plan(set.clone());
             }
             need = Need::Wait;
