@@ -202,9 +202,10 @@ impl Election {
             self.leads = false;
             self.rhythm.turn(now);
         }
-        // Its group was split without it: whoever leads a part will take it in, and what it led is no more.
-        let parted = scope != self.group && self.group.contains(scope);
-        if parted && ballot > self.obeyed {
+        // Its group was split without it: whoever leads a part will take it in, and what it led is no more. One of an
+        // older term cannot.
+        let parted = ballot > self.obeyed && scope != self.group && self.group.contains(scope);
+        if parted {
             self.leads = false;
         }
         if ballot == self.obeyed {

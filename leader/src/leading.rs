@@ -13,7 +13,7 @@ use crate::planner::{Member, Planner, PlannerParams, Situation};
 use crate::talk::Talk;
 use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_LEADS, Pose};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
 
 /// What the machine needs to know before it starts.
 #[derive(Clone, Debug)]
@@ -275,11 +275,12 @@ impl Leading {
     }
 
     /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
-    /// its beacon shows that it is on already.
+    /// its beacon shows that it is on already or will not obey it.
     fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
-            let untold = plans.into_iter().flatten().filter(|orders| pose.obeyed < orders.plan.id);
+            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && pose.term <= plan.ballot;
+            let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
             let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);
             let velocity = Vec2::from(pose.velocity_mps);
@@ -327,15 +328,16 @@ impl Leading {
         for peer in self.living(now) {
             if scope.contains(peer.group) {
                 members.push(peer);
-            } else if peer.group.contains(scope) {
+            } else if peer.group.contains(scope) && self.term_of(peer.id) < self.election.obeyed() {
                 orphans.push(peer);
             } else {
                 others.push(peer);
             }
         }
-        // Of another lineage nobody takes it in.
+        // Whoever is of another lineage, or obeys an older term, does not take it in.
         orphans.retain(|orphan| {
-            let kin = others.iter().filter(|m| orphan.group.contains(m.group));
+            let later = |m: &Member| self.term_of(m.id) > self.term_of(orphan.id);
+            let kin = others.iter().filter(|m| orphan.group.contains(m.group) && later(m));
             nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
         });
         members.append(&mut orphans);
@@ -345,6 +347,11 @@ impl Leading {
             let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
             past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
         }
+    }
+
+    /// The term that a peer obeys, by its last beacon.
+    fn term_of(&self, peer: DroneId) -> Ballot {
+        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
     }
 
     /// The living members, by id, as of the last [`Self::muster`].

@@ -4,9 +4,13 @@ use skein_protocol::SimTime;
 
 /// Weight of a new gap in the running means, once there are many.
 const NOVELTY: f64 = 0.02;
+/// Deviation that a link is thought to have before it is known, as a part of the first gap.
+const DOUBT: f64 = 0.25;
 /// So many mean deviations above the mean gap a silence is no chance any more: at 50 % loss that are 24 periods, and
 /// one silence in ten million is as long.
 const PATIENCE: f64 = 22.0;
+/// Nobody is waited for longer than so many time-outs: then it is as good as gone.
+const MOST_TIMEOUTS: f64 = 12.0;
 
 /// The gaps between the signs of one source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,11 +47,11 @@ impl Rhythm {
             return;
         }
         if self.gaps == 0 {
-            (self.mean_s, self.deviation_s) = (gap_s, gap_s);
+            (self.mean_s, self.deviation_s) = (gap_s, gap_s * DOUBT);
         }
         self.gaps = self.gaps.saturating_add(1);
         let weight = NOVELTY.max(1.0 / f64::from(self.gaps));
-        // The first gap stands for the deviation too: a link that is not known yet is not trusted.
+        // One more than there were: the doubt counts as a gap.
         let novelty = NOVELTY.max(1.0 / (f64::from(self.gaps) + 1.0));
         self.deviation_s += novelty * ((gap_s - self.mean_s).abs() - self.deviation_s);
         self.mean_s += weight * (gap_s - self.mean_s);
@@ -55,7 +59,7 @@ impl Rhythm {
 
     /// How long a silence is no news, s: `base_s`, or more if gaps are long or differ.
     pub fn patience_s(&self, base_s: f64) -> f64 {
-        base_s.max(self.mean_s + PATIENCE * self.deviation_s)
+        (self.mean_s + PATIENCE * self.deviation_s).clamp(base_s, MOST_TIMEOUTS * base_s)
     }
 }
 

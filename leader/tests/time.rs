@@ -13,10 +13,10 @@ use swarm::{DEFAULT, Periods};
 fn false_elections(air: Air, settle_s: f64, seconds: f64) -> Vec<(Ballot, DroneId)> {
     let mut swarm = Swarm::new(DEFAULT, air, 8);
     swarm.run(settle_s);
-    let settled: BTreeSet<Ballot> = swarm.watch.leaders.keys().copied().collect();
+    let settled: BTreeSet<Ballot> = swarm.watch.as_ref().unwrap().leaders.keys().copied().collect();
     swarm.run(seconds);
     assert_eq!(swarm.disunion(0), None);
-    swarm.watch.leaders.clone().into_iter().filter(|(ballot, _)| !settled.contains(ballot)).collect()
+    swarm.watch.unwrap().leaders.into_iter().filter(|(ballot, _)| !settled.contains(ballot)).collect()
 }
 
 #[test]

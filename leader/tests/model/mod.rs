@@ -191,7 +191,8 @@ impl Mission {
             let process = &state.processes[id as usize];
             let Some(machine) = &process.machine else { continue };
             let (mut machine, mut say) = (Leading::clone(machine), Vec::new());
-            for (post, message) in due.iter().filter(|(post, _)| post.to == id && state.hear_each_other(post.from, id)) {
+            for (post, message) in due.iter().filter(|(post, _)| post.to == id && state.hear_each_other(post.from, id))
+            {
                 machine.hear(now, DroneId(post.from), message, &mut say);
             }
             // The first one senses, the others are told.
