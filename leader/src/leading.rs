@@ -75,6 +75,8 @@ pub struct Leading {
     part_due: Option<SimTime>,
     /// Since when the parts could be one again.
     whole_due: Option<SimTime>,
+    /// Somebody obeys what it never said: a new term puts an end to that.
+    belied: bool,
 }
 
 impl Leading {
@@ -97,6 +99,7 @@ impl Leading {
             others: Vec::new(),
             part_due: None,
             whole_due: None,
+            belied: false,
         }
     }
 
@@ -156,6 +159,8 @@ impl Leading {
             let scope = self.election.scope();
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
         }
+        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
+        self.belied |= self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
     }
 
     /// Claims and heartbeats count from the claimant alone.
@@ -183,8 +188,8 @@ impl Leading {
         if ballot.claimant.0 >= self.drones {
             return false;
         }
-        // Repeated by somebody else it is no sign that the leader lives.
-        if ballot.claimant == source || ballot > self.election.obeyed() {
+        // Repeated by somebody else it is no sign that the leader lives, nor that there is such a term.
+        if ballot.claimant == source {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named });
         }
         ballot == self.election.obeyed() && !self.election.leads()
@@ -251,6 +256,9 @@ impl Leading {
     /// an obstacle ahead; or the whole swarm, when it leads a part and nobody has an obstacle ahead any more.
     fn claimable(&mut self, now: SimTime, own: &Own) -> Option<GroupId> {
         let (scope, group) = (self.election.scope(), self.election.group());
+        if std::mem::take(&mut self.belied) && self.election.leads() {
+            return Some(scope);
+        }
         let me = self.myself(own);
         let part = scope != group && scope.contains(group) && self.part_has_ahead(now, &me);
         let whole = scope != GroupId::ALL && self.election.leads() && !self.all_have_ahead(now, &me);
