@@ -7,13 +7,14 @@
 
 use crate::election::{Election, ElectionParams, Input};
 use crate::ledger::{Ledger, Orders};
-use crate::membership::{Peers, extrapolated};
+use crate::membership::Peers;
 use crate::obstacles::Obstacles;
+use crate::parts::Due;
 use crate::planner::{Member, Planner, PlannerParams, Situation};
 use crate::talk::Talk;
 use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_LEADS, Pose};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, SimTime, Vec2};
 
 /// What the machine needs to know before it starts.
 #[derive(Clone, Debug)]
@@ -57,7 +58,7 @@ pub struct Leading {
     pub(crate) me: DroneId,
     pub(crate) incarnation: u32,
     drones: u32,
-    wait_s: f64,
+    pub(crate) wait_s: f64,
     /// Who is there.
     pub peers: Peers,
     /// What is in the way.
@@ -69,14 +70,9 @@ pub struct Leading {
     /// How groupings are chosen, should it lead.
     pub planner: Planner,
     pub(crate) talk: Talk,
-    members: Vec<Member>,
-    others: Vec<Member>,
-    /// Since when its part of a split group has a task and no leader of its own.
-    part_due: Option<SimTime>,
-    /// Since when the parts could be one again.
-    whole_due: Option<SimTime>,
-    /// Somebody obeys what it never said: a new term puts an end to that.
-    belied: bool,
+    pub(crate) members: Vec<Member>,
+    pub(crate) others: Vec<Member>,
+    pub(crate) due: Due,
 }
 
 impl Leading {
@@ -97,9 +93,7 @@ impl Leading {
             talk: Talk::new(params.start, params.dt_s, params.beacon_period_s, params.repeat_period_s),
             members: Vec::new(),
             others: Vec::new(),
-            part_due: None,
-            whole_due: None,
-            belied: false,
+            due: Due::default(),
         }
     }
 
@@ -160,7 +154,7 @@ impl Leading {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
         }
         let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
-        self.belied |= self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
+        self.due.belied |= self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
     }
 
     /// Claims and heartbeats count from the claimant alone.
@@ -222,9 +216,8 @@ impl Leading {
         let epoch = self.ledger.stamp().epoch;
         let said = self.election.handle(now, epoch, Input::Tick { closer, delay_s });
         say.extend(said.map(Message::Leadership));
-        if let Some(scope) = self.claimable(now, own) {
-            let said = self.election.handle(now, epoch, Input::Claim(scope));
-            say.extend(said.map(Message::Leadership));
+        if let Some(input) = self.calls_for(now, own) {
+            say.extend(self.election.handle(now, epoch, input).map(Message::Leadership));
         }
     }
 
@@ -248,124 +241,8 @@ impl Leading {
     }
 
     /// Order of claims: by distance to the destination, ties by id.
-    fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
+    pub(crate) fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
         (self.planner.params.destination.distance_m(position), id)
-    }
-
-    /// The group that this drone is to lead by now although another leader may be well: its part of a split group, with
-    /// an obstacle ahead; or the whole swarm, when it leads a part and nobody has an obstacle ahead any more.
-    fn claimable(&mut self, now: SimTime, own: &Own) -> Option<GroupId> {
-        let (scope, group) = (self.election.scope(), self.election.group());
-        if std::mem::take(&mut self.belied) && self.election.leads() {
-            return Some(scope);
-        }
-        let me = self.myself(own);
-        let part = scope != group && scope.contains(group) && self.part_has_ahead(now, &me);
-        let whole = scope != GroupId::ALL && self.election.leads() && !self.all_have_ahead(now, &me);
-        let rank = match (part, whole) {
-            (true, _) => self.rank_in_part(now, &me),
-            (false, true) => self.rank_of_leaders(now, &me),
-            (false, false) => 0,
-        };
-        let due = |since: &mut Option<SimTime>, condition: bool| {
-            *since = condition.then(|| since.unwrap_or(now));
-            since.is_some_and(|since| now.since(since) >= self.wait_s * rank as f64)
-        };
-        let (mut part_due, mut whole_due) = (self.part_due, self.whole_due);
-        let (claim_part, claim_whole) = (due(&mut part_due, part), due(&mut whole_due, whole && !part));
-        (self.part_due, self.whole_due) = (part_due, whole_due);
-        if claim_part { Some(group) } else { claim_whole.then_some(GroupId::ALL) }
-    }
-
-    fn myself(&self, own: &Own) -> Member {
-        let Own { position, velocity, .. } = *own;
-        Member { id: self.me, position, speed_mps: velocity.norm(), velocity, group: self.ledger.group() }
-    }
-
-    /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
-    /// its beacon shows that it is on already or will not obey it.
-    fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
-        let plans = [self.ledger.obeyed(), self.ledger.origin()];
-        self.peers.living(now).map(move |(id, pose)| {
-            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && pose.term <= plan.ballot;
-            let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
-            let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
-            let group = group.unwrap_or(pose.group);
-            let velocity = Vec2::from(pose.velocity_mps);
-            Member { id, position: extrapolated(pose, now), speed_mps: velocity.norm(), velocity, group }
-        })
-    }
-
-    /// Living peers in this drone's part.
-    fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> {
-        let group = me.group;
-        self.living(now).filter(move |m| group.contains(m.group))
-    }
-
-    /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
-    fn part_has_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let named = self.ledger.part().is_some_and(|part| part.leader == self.me);
-        let kin: Vec<Member> = self.kin(now, me).filter(|_| named).collect();
-        self.planner.has_ahead(&self.obstacles, kin.iter().chain([me]))
-    }
-
-    fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let all: Vec<Member> = self.living(now).collect();
-        self.planner.has_ahead(&self.obstacles, all.iter().chain([me]))
-    }
-
-    /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
-    /// destination.
-    fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
-        let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
-        let mine = (me.id != named, self.key(me.position, me.id));
-        self.kin(now, me).filter(|m| (m.id != named, self.key(m.position, m.id)) < mine).count()
-    }
-
-    /// Leaders closer to the destination.
-    fn rank_of_leaders(&self, now: SimTime, me: &Member) -> usize {
-        let mine = self.key(me.position, me.id);
-        let leaders = self.peers.living(now).filter(|(_, pose)| pose.flags & POSE_LEADS != 0);
-        leaders.filter(|(id, pose)| self.key(extrapolated(pose, now), *id) < mine).count()
-    }
-
-    /// Takes stock of who is there, before a leader decides. A drone of no part joins the one of the nearest drone.
-    pub fn muster(&mut self, now: SimTime, own: &Own) {
-        let scope = self.election.scope();
-        let (mut members, mut others, mut orphans) = (vec![self.myself(own)], Vec::new(), Vec::new());
-        for peer in self.living(now) {
-            if scope.contains(peer.group) {
-                members.push(peer);
-            } else if peer.group.contains(scope) && self.term_of(peer.id) < self.election.obeyed() {
-                orphans.push(peer);
-            } else {
-                others.push(peer);
-            }
-        }
-        // Whoever is of another lineage, or obeys an older term, does not take it in.
-        orphans.retain(|orphan| {
-            let later = |m: &Member| self.term_of(m.id) > self.term_of(orphan.id);
-            let kin = others.iter().filter(|m| orphan.group.contains(m.group) && later(m));
-            nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
-        });
-        members.append(&mut orphans);
-        (self.members, self.others) = (members, others);
-        self.members.sort_by_key(|member| member.id);
-        for set in self.ledger.sets() {
-            let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
-            past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
-        }
-    }
-
-    /// The term that a peer obeys, by its last beacon.
-    fn term_of(&self, peer: DroneId) -> Ballot {
-        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
-    }
-
-    /// The living members, by id, as of the last [`Self::muster`].
-    #[must_use]
-    pub fn members(&self) -> &[Member] {
-        &self.members
     }
 
     /// What a leader decides now: nothing, orders, or alternatives. `silent`: where drones that fell silent may hang, m.
@@ -397,8 +274,3 @@ impl Leading {
 
 /// Most members that answer a probe, besides the leader.
 const ANSWERS: usize = 4;
-
-/// Square of the distance to the nearest of these, m².
-fn nearest_m2<'m>(from: &Member, to: impl Iterator<Item = &'m Member>) -> f64 {
-    to.map(|m| (m.position - from.position).norm_squared()).fold(f64::INFINITY, f64::min)
-}

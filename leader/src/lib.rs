@@ -10,6 +10,7 @@ pub mod leading;
 pub mod ledger;
 pub mod membership;
 pub mod obstacles;
+mod parts;
 pub mod planner;
 mod reform;
 mod rhythm;

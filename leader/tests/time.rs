@@ -85,3 +85,26 @@ fn a_dead_leader_is_replaced() {
         assert!(times[times.len() - 1] <= limit_s, "{times:?}");
     }
 }
+
+#[test]
+fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
+    for loss in [0.0, 0.3] {
+        let mut swarm = Swarm::new(DEFAULT, Air { seed: 5, loss, ..Air::default() }, 8);
+        swarm.run(3.0);
+        let old = swarm.term(0).unwrap();
+        assert_eq!(old.claimant, DroneId(0));
+        swarm.own[0].velocity.x = 4.0;
+        let mut handed_over_s = None;
+        for _ in 0..(120.0 / DEFAULT.dt_s) as u64 {
+            swarm.step().unwrap();
+            let leaders = swarm.side(0).iter().filter(|(_, l)| l.election.leads()).count();
+            assert!(leaders >= 1, "nobody leads in {:?}", swarm.now());
+            handed_over_s = handed_over_s.or((swarm.term(0) != Some(old)).then(|| swarm.now().secs()));
+        }
+        assert_eq!(swarm.disunion(0), None);
+        let terms: Vec<_> = swarm.watch.unwrap().leaders.into_keys().filter(|&term| term > old).collect();
+        assert_eq!(terms.iter().map(|term| term.claimant).collect::<Vec<_>>(), [DroneId(1)], "loss {loss}");
+        // Last after 280 m at 6 m/s, and 3 s of patience.
+        assert!(handed_over_s.is_some_and(|t| (51.0..56.0).contains(&t)), "{handed_over_s:?}");
+    }
+}
