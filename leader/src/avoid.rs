@@ -221,10 +221,12 @@ fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<u16>]) -> Vec<u
 }
 
 /// The group of each member: its own, split by which of the routes its kin take, counted from the left. Whoever is of no
-/// part of the scope joins it. A plan that replaces another one splits nobody who stays on one route with all its kin.
+/// part of the scope joins it. A plan that replaces another one splits nobody who stays on one route with all its kin,
+/// and who joins a queue that is already flying joins the group there: a group is split as a whole, or not at all.
 fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], replan: bool) -> Vec<GroupId> {
     let parents: Vec<GroupId> =
         s.members.iter().map(|m| if s.scope.contains(m.group) { m.group } else { s.scope }).collect();
+    let keeps = |i: usize| kept[i].map(|part| part.group).filter(|group| s.scope.contains(*group));
     let child = |i: usize| {
         let mut taken: Vec<usize> =
             (0..chosen.len()).filter(|&j| parents[j] == parents[i]).map(|j| chosen[j]).collect();
@@ -236,6 +238,10 @@ fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], rep
         let number = taken.iter().position(|&route| route == chosen[i]).unwrap_or(0) + 1;
         parents[i].child(u8::try_from(number).unwrap_or(u8::MAX))
     };
-    let keeps = |i: usize| kept[i].map(|part| part.group).filter(|group| s.scope.contains(*group));
-    (0..chosen.len()).map(|i| keeps(i).unwrap_or_else(|| child(i))).collect()
+    let joins = |i: usize| {
+        let flying = (0..chosen.len()).filter_map(|j| Some((chosen[j] != chosen[i], keeps(j)?)));
+        let kin = flying.filter(|(_, group)| parents[i].contains(*group));
+        kin.filter(|(elsewhere, group)| !elsewhere || *group == parents[i]).min().map(|(_, group)| group)
+    };
+    (0..chosen.len()).map(|i| keeps(i).or_else(|| joins(i)).unwrap_or_else(|| child(i))).collect()
 }

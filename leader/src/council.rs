@@ -1,6 +1,7 @@
 //! What leaders tell each other before they plan for one obstacle set: the rows of the table they all split. Each
 //! applies the part about its own members.
 
+use crate::split::NEVER_S;
 use skein_protocol::payload::{ARRIVALS_ASK, Arrivals, MAX_ROUTES};
 use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
@@ -36,9 +37,11 @@ impl Council {
         Self { drones, repeat_s, heard: BTreeMap::new(), question: None, asked: None, next_answer: SimTime::ZERO }
     }
 
-    /// Hears a row. One that is older than what is known, from the future, or of nobody in the swarm is ignored.
+    /// Hears a row. One that is older than what is known, from the future, of nobody in the swarm, or of a drone that
+    /// could go nowhere is ignored.
     pub fn hear(&mut self, now: SimTime, row: &Arrivals) {
-        if row.drone.0 >= self.drones || row.stamp > now {
+        let somewhere = arrivals_s(row).iter().any(|s| s.abs() < NEVER_S);
+        if row.drone.0 >= self.drones || row.stamp > now || !somewhere {
             return;
         }
         if row.flags & ARRIVALS_ASK != 0 {
@@ -177,11 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_strangers_and_from_the_future_are_refused() {
+    fn rows_of_strangers_from_the_future_and_to_nowhere_are_refused() {
         let mut council = Council::new(4, 0.2);
         asking(&mut council, 1.0);
         council.hear(at(1.0), &row_of(9, 0.5, 7));
         council.hear(at(1.0), &row_of(2, 1.5, 7));
+        council.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
         assert!(council.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && council.heard.is_empty());
     }
 }

@@ -5,23 +5,25 @@
 //! Uniqueness of a leader for a ballot holds by construction: a ballot names its claimant, and the launcher gives each
 //! start of a process an incarnation of its own.
 
+use crate::rhythm::Rhythm;
 use skein_protocol::payload::{
     LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, LEADERSHIP_YIELD, Leadership,
 };
 use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
 
-/// A round that is farther than this above all rounds heard of is no honest one: rounds rise by one at a time.
-const FARTHEST_ROUND: u32 = 1 << 20;
+/// No honest swarm claims more often than this, 1/s: a round that is higher than what that gives since the start is
+/// refused, so that nobody drives rounds to where they cannot be raised any more.
+const CLAIMS_PER_S: f64 = 1000.0;
 
 /// Periods and time-outs.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectionParams {
     /// A leader says that it lives this often, s.
     pub heartbeat_period_s: f64,
-    /// A leader that is silent for so long is missed, s.
+    /// A leader that is silent for so long is missed, s; it is given more on a bad link.
     pub leader_timeout_s: f64,
     /// How long the closest member waits for objections before it claims, s; the next one waits as much longer, and so
-    /// on, so that one claim reaches all before the next is due.
+    /// on, so that one claim reaches all before the next is due. Longer if the air takes longer.
     pub wait_s: f64,
 }
 
@@ -49,8 +51,8 @@ pub enum Input {
     Tick {
         /// How many, not counting the leader whose silence started the election.
         closer: usize,
-        /// How long the leader may be silent, s: at least [`ElectionParams::leader_timeout_s`], more on a bad link.
-        patience_s: f64,
+        /// How long a message is on the air, s.
+        delay_s: f64,
     },
 }
 
@@ -67,8 +69,10 @@ pub struct Election {
     scope: GroupId,
     highest_round: u32,
     leads: bool,
-    /// Last sign of life of the leader, or the start.
+    /// Last sign of life of the leader, heard by itself or by another, or the start.
     heard: SimTime,
+    /// Of the leaders' own signs.
+    rhythm: Rhythm,
     next_heartbeat: SimTime,
     /// When it asked who has heard of the leader it misses.
     probed: Option<SimTime>,
@@ -90,6 +94,7 @@ impl Election {
             highest_round: 0,
             leads: false,
             heard: now,
+            rhythm: Rhythm::new(now),
             next_heartbeat: now,
             probed: None,
         }
@@ -119,20 +124,28 @@ impl Election {
         self.group
     }
 
-    /// Whether it leads, or the leader it obeys gave a sign of life within `patience_s`.
+    /// How long the leader may be silent, s: the time-out, or more if its signs come in rarely or irregularly.
     #[must_use]
-    pub fn has_leader(&self, now: SimTime, patience_s: f64) -> bool {
-        self.leads || (self.obeyed.is_some() && now.since(self.heard) <= patience_s)
+    pub fn patience_s(&self) -> f64 {
+        self.rhythm.patience_s(self.leader_timeout_s)
     }
 
-    /// When the machine next wants a [`Input::Tick`], if nothing is heard until then.
+    /// Whether it leads, or the leader it obeys is not silent for too long.
     #[must_use]
-    pub fn next_deadline(&self, closer: usize, patience_s: f64) -> SimTime {
+    pub fn has_leader(&self, now: SimTime) -> bool {
+        self.leads || (self.obeyed.is_some() && now.since(self.heard) <= self.patience_s())
+    }
+
+    /// When the machine next wants a [`Input::Tick`], if nothing is heard until then. Answers to a probe need the air's
+    /// delay twice, a claim needs it once.
+    #[must_use]
+    pub fn next_deadline(&self, closer: usize, delay_s: f64) -> SimTime {
+        let closer = closer as f64;
         match self.probed {
             _ if self.leads => self.next_heartbeat,
-            Some(probed) => probed.after(self.wait_s * (closer + 1) as f64),
-            None if self.obeyed.is_some() => self.heard.after(patience_s.max(self.leader_timeout_s)),
-            None => self.heard.after(self.wait_s * (closer + 1) as f64),
+            Some(probed) => probed.after(self.wait_s.max(2.0 * delay_s) + self.wait_s.max(delay_s) * closer),
+            None if self.obeyed.is_some() => self.heard.after(self.patience_s()),
+            None => self.heard.after(self.wait_s * (closer + 1.0)),
         }
     }
 
@@ -151,7 +164,7 @@ impl Election {
             }
             Input::Claim(scope) => self.claim(now, scope),
             Input::Yield(heir) => self.leads.then(|| self.message(LEADERSHIP_YIELD, now, epoch, heir)),
-            Input::Tick { closer, patience_s } => self.tick(now, epoch, closer, patience_s),
+            Input::Tick { closer, delay_s } => self.tick(now, epoch, closer, delay_s),
         }
     }
 
@@ -179,7 +192,7 @@ impl Election {
     }
 
     fn sign(&mut self, now: SimTime, ballot: Ballot, scope: GroupId, named: bool) {
-        if ballot.round > self.highest_round.saturating_add(FARTHEST_ROUND) {
+        if f64::from(ballot.round) > CLAIMS_PER_S * (1.0 + now.since(SimTime::ZERO)) {
             return;
         }
         self.highest_round = self.highest_round.max(ballot.round);
@@ -187,11 +200,16 @@ impl Election {
             self.obeyed = ballot;
             self.scope = scope;
             self.leads = false;
+            self.rhythm.turn(now);
         }
-        // Its group was split without it: whoever leads a part will take it in, and what it led is no more.
-        let parted = scope != self.group && self.group.contains(scope);
-        if parted && ballot > self.obeyed {
+        // Its group was split without it: whoever leads a part will take it in, and what it led is no more. One of an
+        // older term cannot.
+        let parted = ballot > self.obeyed && scope != self.group && self.group.contains(scope);
+        if parted {
             self.leads = false;
+        }
+        if ballot == self.obeyed {
+            self.rhythm.hear(now, self.patience_s());
         }
         if ballot == self.obeyed || parted {
             self.heard = now;
@@ -199,8 +217,8 @@ impl Election {
         }
     }
 
-    fn tick(&mut self, now: SimTime, epoch: u32, closer: usize, patience_s: f64) -> Option<Leadership> {
-        if now < self.next_deadline(closer, patience_s) {
+    fn tick(&mut self, now: SimTime, epoch: u32, closer: usize, delay_s: f64) -> Option<Leadership> {
+        if now < self.next_deadline(closer, delay_s) {
             return None;
         }
         if self.leads {

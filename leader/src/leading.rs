@@ -7,8 +7,9 @@
 
 use crate::election::{Election, ElectionParams, Input};
 use crate::ledger::{Ledger, Orders};
-use crate::membership::{Peers, extrapolated};
+use crate::membership::Peers;
 use crate::obstacles::Obstacles;
+use crate::parts::Due;
 use crate::planner::{Member, Planner, PlannerParams, Situation};
 use crate::talk::Talk;
 use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_LEADS, Pose};
@@ -57,8 +58,7 @@ pub struct Leading {
     pub(crate) me: DroneId,
     pub(crate) incarnation: u32,
     drones: u32,
-    wait_s: f64,
-    leader_timeout_s: f64,
+    pub(crate) wait_s: f64,
     /// Who is there.
     pub peers: Peers,
     /// What is in the way.
@@ -70,12 +70,9 @@ pub struct Leading {
     /// How groupings are chosen, should it lead.
     pub planner: Planner,
     pub(crate) talk: Talk,
-    members: Vec<Member>,
-    others: Vec<Member>,
-    /// Since when its part of a split group has a task and no leader of its own.
-    part_due: Option<SimTime>,
-    /// Since when the parts could be one again.
-    whole_due: Option<SimTime>,
+    pub(crate) members: Vec<Member>,
+    pub(crate) others: Vec<Member>,
+    pub(crate) due: Due,
 }
 
 impl Leading {
@@ -88,7 +85,6 @@ impl Leading {
             incarnation: params.incarnation,
             drones: params.drones,
             wait_s: params.election.wait_s,
-            leader_timeout_s: params.election.leader_timeout_s,
             peers: Peers::new(params.drones, params.peer_timeout_s),
             obstacles: Obstacles::new(params.drones, reach_m),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
@@ -97,8 +93,7 @@ impl Leading {
             talk: Talk::new(params.start, params.dt_s, params.beacon_period_s, params.repeat_period_s),
             members: Vec::new(),
             others: Vec::new(),
-            part_due: None,
-            whole_due: None,
+            due: Due::default(),
         }
     }
 
@@ -159,6 +154,8 @@ impl Leading {
             let scope = self.election.scope();
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
         }
+        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
+        self.due.belied |= self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
     }
 
     /// Claims and heartbeats count from the claimant alone.
@@ -186,8 +183,8 @@ impl Leading {
         if ballot.claimant.0 >= self.drones {
             return false;
         }
-        // Repeated by somebody else it is no sign that the leader lives.
-        if ballot.claimant == source || ballot > self.election.obeyed() {
+        // Repeated by somebody else it is no sign that the leader lives, nor that there is such a term.
+        if ballot.claimant == source {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named });
         }
         ballot == self.election.obeyed() && !self.election.leads()
@@ -216,138 +213,37 @@ impl Leading {
 
     /// Elections: heartbeats, probes, claims.
     pub fn elect(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
-        let suspect = self.election.obeyed().claimant;
-        let patience_s = self.peers.patience_s(suspect, self.leader_timeout_s);
-        let closer = if self.election.has_leader(now, patience_s) { 0 } else { self.closer(now, own, suspect) };
+        let (closer, delay_s) = (self.closer(now, own), self.peers.delay_s());
         let epoch = self.ledger.stamp().epoch;
-        let said = self.election.handle(now, epoch, Input::Tick { closer, patience_s });
+        let said = self.election.handle(now, epoch, Input::Tick { closer, delay_s });
         say.extend(said.map(Message::Leadership));
-        if let Some(scope) = self.claimable(now, own) {
-            let said = self.election.handle(now, epoch, Input::Claim(scope));
-            say.extend(said.map(Message::Leadership));
+        if let Some(input) = self.calls_for(now, own) {
+            say.extend(self.election.handle(now, epoch, input).map(Message::Leadership));
         }
     }
 
     /// When the machine next wants to be told the time, if nothing is heard until then.
     #[must_use]
     pub fn next_deadline(&self, now: SimTime, own: &Own) -> SimTime {
-        let suspect = self.election.obeyed().claimant;
-        let patience_s = self.peers.patience_s(suspect, self.leader_timeout_s);
-        let closer = if self.election.has_leader(now, patience_s) { 0 } else { self.closer(now, own, suspect) };
-        self.election.next_deadline(closer, patience_s)
+        self.election.next_deadline(self.closer(now, own), self.peers.delay_s())
     }
 
-    /// Living drones of the scope that are closer to the destination, `suspect` not counted.
-    fn closer(&self, now: SimTime, own: &Own, suspect: DroneId) -> usize {
+    /// Living drones of the scope that are closer to the destination, the suspect not counted; nobody has to be counted
+    /// while there is a leader.
+    fn closer(&self, now: SimTime, own: &Own) -> usize {
+        if self.election.has_leader(now) {
+            return 0;
+        }
         let mine = self.key(own.position, self.me);
-        let (scope, obeys) = (self.election.scope(), self.election.obeyed().is_some());
-        let rivals = self.living(now).filter(|m| (!obeys || m.id != suspect) && scope.contains(m.group));
+        let (scope, suspect) = (self.election.scope(), self.election.obeyed());
+        let rivals =
+            self.living(now).filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
         rivals.filter(|m| self.key(m.position, m.id) < mine).count()
     }
 
     /// Order of claims: by distance to the destination, ties by id.
-    fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
+    pub(crate) fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
         (self.planner.params.destination.distance_m(position), id)
-    }
-
-    /// The group that this drone is to lead by now although another leader may be well: its part of a split group, with
-    /// an obstacle ahead; or the whole swarm, when it leads a part and nobody has an obstacle ahead any more.
-    fn claimable(&mut self, now: SimTime, own: &Own) -> Option<GroupId> {
-        let (scope, group) = (self.election.scope(), self.election.group());
-        let me = self.myself(own);
-        let part = scope != group && scope.contains(group) && self.part_has_ahead(now, &me);
-        let whole = scope != GroupId::ALL && self.election.leads() && !self.all_have_ahead(now, &me);
-        let rank = match (part, whole) {
-            (true, _) => self.rank_in_part(now, &me),
-            (false, true) => self.rank_of_leaders(now, &me),
-            (false, false) => 0,
-        };
-        let due = |since: &mut Option<SimTime>, condition: bool| {
-            *since = condition.then(|| since.unwrap_or(now));
-            since.is_some_and(|since| now.since(since) >= self.wait_s * rank as f64)
-        };
-        let (mut part_due, mut whole_due) = (self.part_due, self.whole_due);
-        let (claim_part, claim_whole) = (due(&mut part_due, part), due(&mut whole_due, whole && !part));
-        (self.part_due, self.whole_due) = (part_due, whole_due);
-        if claim_part { Some(group) } else { claim_whole.then_some(GroupId::ALL) }
-    }
-
-    fn myself(&self, own: &Own) -> Member {
-        let Own { position, velocity, .. } = *own;
-        Member { id: self.me, position, speed_mps: velocity.norm(), velocity, group: self.ledger.group() }
-    }
-
-    /// Living peers by now. The group is the one the plan puts a peer in, unless its beacon shows that it is on already.
-    fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
-        let (stamp, parts) = (self.ledger.stamp(), self.ledger.obeyed().map(|orders| &orders.parts));
-        self.peers.living(now).map(move |(id, pose)| {
-            let planned = parts.filter(|_| pose.obeyed < stamp).and_then(|parts| parts.get(&id));
-            let group = planned.map_or(pose.group, |part| part.group);
-            let velocity = Vec2::from(pose.velocity_mps);
-            Member { id, position: extrapolated(pose, now), speed_mps: velocity.norm(), velocity, group }
-        })
-    }
-
-    /// Living peers in this drone's part.
-    fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> {
-        let group = me.group;
-        self.living(now).filter(move |m| group.contains(m.group))
-    }
-
-    /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
-    fn part_has_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let named = self.ledger.part().is_some_and(|part| part.leader == self.me);
-        let kin: Vec<Member> = self.kin(now, me).filter(|_| named).collect();
-        self.planner.has_ahead(&self.obstacles, kin.iter().chain([me]))
-    }
-
-    fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let all: Vec<Member> = self.living(now).collect();
-        self.planner.has_ahead(&self.obstacles, all.iter().chain([me]))
-    }
-
-    /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
-    /// destination.
-    fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
-        let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
-        let mine = (me.id != named, self.key(me.position, me.id));
-        self.kin(now, me).filter(|m| (m.id != named, self.key(m.position, m.id)) < mine).count()
-    }
-
-    /// Leaders closer to the destination.
-    fn rank_of_leaders(&self, now: SimTime, me: &Member) -> usize {
-        let mine = self.key(me.position, me.id);
-        let leaders = self.peers.living(now).filter(|(_, pose)| pose.flags & POSE_LEADS != 0);
-        leaders.filter(|(id, pose)| self.key(extrapolated(pose, now), *id) < mine).count()
-    }
-
-    /// Takes stock of who is there, before a leader decides. A drone of no part joins the one of the nearest drone.
-    pub fn muster(&mut self, now: SimTime, own: &Own) {
-        let scope = self.election.scope();
-        let (mut members, mut others, mut orphans) = (vec![self.myself(own)], Vec::new(), Vec::new());
-        for peer in self.living(now) {
-            if scope.contains(peer.group) {
-                members.push(peer);
-            } else if peer.group.contains(scope) {
-                orphans.push(peer);
-            } else {
-                others.push(peer);
-            }
-        }
-        orphans.retain(|orphan| nearest_m2(orphan, &members) <= nearest_m2(orphan, &others));
-        members.append(&mut orphans);
-        (self.members, self.others) = (members, others);
-        self.members.sort_by_key(|member| member.id);
-        for set in self.ledger.sets() {
-            let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
-            past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
-        }
-    }
-
-    /// The living members, by id, as of the last [`Self::muster`].
-    #[must_use]
-    pub fn members(&self) -> &[Member] {
-        &self.members
     }
 
     /// What a leader decides now: nothing, orders, or alternatives. `silent`: where drones that fell silent may hang, m.
@@ -379,8 +275,3 @@ impl Leading {
 
 /// Most members that answer a probe, besides the leader.
 const ANSWERS: usize = 4;
-
-/// Square of the distance to the nearest of these, m².
-fn nearest_m2(from: &Member, to: &[Member]) -> f64 {
-    to.iter().map(|m| (m.position - from.position).norm_squared()).fold(f64::INFINITY, f64::min)
-}

@@ -1,23 +1,22 @@
 //! Who is there: the last beacon of each peer, and how old it is. Bounded by the size of the swarm.
 
+use crate::rhythm::Rhythm;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
-/// A peer counts as gone after this many times the usual gap between two of its beacons, if that is longer than the
-/// time-out: at 50 % loss the chance that so many are lost in a row is one in ten million.
-const PATIENCE: f64 = 12.0;
-/// Weight of a new gap in the running mean.
+/// Weight of a new delay in the running mean.
 const NOVELTY: f64 = 0.1;
+/// A beacon that was on the air for longer tells nothing about the air, s.
+const MOST_DELAY_S: f64 = 60.0;
 
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
     pose: Pose,
-    /// When its last beacon came in, however long it was on the air.
-    heard: SimTime,
-    /// Running mean of the time between two beacons that came in, s.
-    gap_s: f64,
+    /// Of its beacons, by when they came in, however long they were on the air.
+    rhythm: Rhythm,
 }
 
 /// The last beacon heard of each peer.
@@ -38,15 +37,23 @@ impl Peers {
     }
 
     /// Takes a beacon. One that is older than what is known, from the future, or of nobody in the swarm is ignored.
+    /// Simulated time alone tells what is older: a process that is started again says everything later.
     pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
-        if source.0 >= self.drones || pose.stamp > now {
+        let delay_s = now.since(pose.stamp);
+        if source.0 >= self.drones || !(0.0..=MOST_DELAY_S).contains(&delay_s) {
             return;
         }
-        let known = self.last.entry(source).or_insert(Peer { pose, heard: now, gap_s: 0.0 });
-        if (pose.incarnation, pose.stamp) > (known.pose.incarnation, known.pose.stamp) {
-            let gap_s = known.gap_s + NOVELTY * (now.since(known.heard) - known.gap_s);
-            *known = Peer { pose, heard: now, gap_s };
-            self.delay_s += NOVELTY * (now.since(pose.stamp) - self.delay_s);
+        match self.last.entry(source) {
+            Entry::Vacant(place) => {
+                place.insert(Peer { pose, rhythm: Rhythm::new(now) });
+            }
+            Entry::Occupied(mut place) if pose.stamp > place.get().pose.stamp => {
+                let longest_s = place.get().rhythm.patience_s(self.timeout_s);
+                place.get_mut().pose = pose;
+                place.get_mut().rhythm.hear(now, longest_s);
+                self.delay_s += NOVELTY * (delay_s - self.delay_s);
+            }
+            Entry::Occupied(_) => {}
         }
     }
 
@@ -61,12 +68,6 @@ impl Peers {
         self.last.remove(&peer);
     }
 
-    /// How long a peer may be silent before it counts as gone, s: `base_s`, or more if its beacons come in rarely.
-    #[must_use]
-    pub fn patience_s(&self, peer: DroneId, base_s: f64) -> f64 {
-        self.last.get(&peer).map_or(base_s, |known| base_s.max(PATIENCE * known.gap_s))
-    }
-
     /// Whether a beacon of the peer came in lately.
     #[must_use]
     pub fn is_living(&self, peer: DroneId, now: SimTime) -> bool {
@@ -74,7 +75,7 @@ impl Peers {
     }
 
     fn lives(&self, peer: &Peer, now: SimTime) -> bool {
-        now.since(peer.heard) <= self.timeout_s.max(PATIENCE * peer.gap_s)
+        now.since(peer.rhythm.last()) <= peer.rhythm.patience_s(self.timeout_s)
     }
 
     /// The last beacon of a peer, however old.
@@ -148,15 +149,23 @@ mod tests {
 
     #[test]
     fn a_long_way_on_the_air_is_no_silence_and_rare_beacons_are_waited_for() {
-        let mut peers = Peers::new(4, 1.0);
-        for i in 0..200 {
-            let now = 3.0 + 0.5 * f64::from(i);
-            peers.hear(SimTime::from_secs(now), DroneId(1), pose(now - 3.0, 0.0));
-            assert!(peers.is_living(DroneId(1), SimTime::from_secs(now + 0.4)));
+        let mut peers = Peers::new(4, 0.4);
+        let mut heard = 0.0;
+        for i in 0..2000u32 {
+            // As if every other beacon were lost.
+            heard += 0.1 * f64::from(1 + i.wrapping_mul(0x9e37_79b9).leading_zeros());
+            peers.hear(SimTime::from_secs(heard), DroneId(1), pose(heard - 0.1, 0.0));
         }
-        let last = 3.0 + 0.5 * 199.0;
-        assert!(peers.is_living(DroneId(1), SimTime::from_secs(last + 5.9)));
-        assert!(!peers.is_living(DroneId(1), SimTime::from_secs(last + 6.1)));
-        assert!((peers.patience_s(DroneId(1), 1.0) - 6.0).abs() < 1e-3);
+        assert!(peers.is_living(DroneId(1), SimTime::from_secs(heard + 1.5)));
+        assert!(!peers.is_living(DroneId(1), SimTime::from_secs(heard + 4.0)));
+    }
+
+    #[test]
+    fn a_beacon_that_boasts_of_its_incarnation_does_not_silence_the_next() {
+        let mut peers = Peers::new(4, 1.0);
+        let now = SimTime::from_secs(3.0);
+        peers.hear(now, DroneId(1), Pose { incarnation: u32::MAX, ..pose(1.0, 1.0) });
+        peers.hear(now, DroneId(1), pose(2.0, 2.0));
+        assert_eq!(peers.last(DroneId(1)).unwrap().position_m[0], 2.0);
     }
 }

@@ -194,19 +194,26 @@ impl Planner {
     }
 
     /// The first set, in flight order, that somebody still has to pass and that is not planned for in this term. A group
-    /// that is split leaves that to the leaders of its parts.
+    /// that is split leaves that to the leaders of its parts, but for members of no part.
     fn need(&self, s: &Situation<'_>) -> Need {
         let split = s.members.iter().any(|m| m.group != s.scope && s.scope.contains(m.group));
+        let homeless = |m: &&Member| !s.scope.contains(m.group) || (split && m.group == s.scope);
         let mut need = Need::Formation;
         for set in s.obstacles.sets() {
             let exit_x_m = self.exit_x_m(s.obstacles, set);
             let past = |m: &Member| s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
-            let mut waiting = s.members.iter().filter(|m| !past(m)).peekable();
-            if waiting.peek().is_none() {
+            if s.members.iter().all(past) {
                 continue;
             }
-            let mut planned = s.ledger.sets().iter().filter(|p| p.ids == *set && holds(p, s));
-            if !split && !planned.next().is_some_and(|p| waiting.all(|m| p.parts.contains_key(&m.id))) {
+            let planned = s.ledger.sets().iter().find(|p| p.ids == *set && holds(p, s));
+            // Who is past it all the same joins those who are not.
+            let joins = |m: &&Member| planned.is_some() && homeless(m);
+            let waiting: Vec<&Member> = s.members.iter().filter(|m| !past(m) || joins(m)).collect();
+            let has_part = |m: &&Member| planned.is_some_and(|p| p.parts.contains_key(&m.id)) && !homeless(m);
+            let others_wait =
+                if planned.is_some() { !waiting.iter().any(homeless) } else { !waiting.iter().all(homeless) };
+            let left_to_parts = split && others_wait;
+            if !left_to_parts && !waiting.iter().all(has_part) {
                 return Need::Plan(set.clone());
             }
             need = Need::Wait;

@@ -11,6 +11,8 @@ use skein_protocol::{GroupId, SimTime, Vec2};
 const DEAD_BERTH: f64 = 1.05;
 /// While a slot is too near to one, or to an obstacle, the anchor moves on in such steps, m.
 const ANCHOR_STEP_M: f64 = 5.0;
+/// So often at most: obstacles beyond all measure do not hold up the leader.
+const MOST_ANCHOR_STEPS: u32 = 10_000;
 /// A formation in which somebody cannot reach a slot opens its ranks by this, as a factor.
 const OPEN_RANKS: f64 = 1.6;
 /// Nobody moves faster than this, m/s, …
@@ -113,8 +115,10 @@ impl Planner {
                 || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
         };
         let blocked = |anchor: Vec2| shape.iter().any(|slot| shut(slot + anchor));
-        while phase == PHASE_REFORM && blocked(anchor) {
+        let mut steps = 0;
+        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && blocked(anchor) {
             anchor.x += ANCHOR_STEP_M;
+            steps += 1;
         }
         anchor
     }

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 const MICROS: f64 = 1e6;
 /// Arrivals later than this (s) count as never; it keeps all sums in range.
-const NEVER_S: f64 = 1e6;
+pub(crate) const NEVER_S: f64 = 1e6;
 
 /// What is wrong with a table of arrivals.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]

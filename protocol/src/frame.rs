@@ -80,6 +80,12 @@ mod tests {
         let mut nan = good;
         nan.payload[..8].copy_from_slice(&f64::NAN.to_le_bytes());
         assert_eq!(Message::decode(&nan), Err(DecodeError::Field("shape")));
+        let mut far = good;
+        far.payload[..8].copy_from_slice(&1e10f64.to_le_bytes());
+        assert_eq!(Message::decode(&far), Err(DecodeError::Field("shape")));
+        let group = crate::GroupId([0, 0, 3, 0, 0, 0, 0, 0]);
+        let lost = Message::Assignment(payload::Assignment { group, ..bytemuck::Zeroable::zeroed() });
+        assert_eq!(Message::decode(&lost.encode()), Err(DecodeError::Field("group")));
     }
 
     proptest! {

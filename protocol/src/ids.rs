@@ -94,6 +94,12 @@ impl GroupId {
         Self(path)
     }
 
+    /// Whether this is a lineage: nothing after the last split.
+    #[must_use]
+    pub fn is_lineage(self) -> bool {
+        self.0[self.depth()..].iter().all(|&digit| digit == 0)
+    }
+
     /// Whether `other` is this group or was split from it.
     #[must_use]
     pub fn contains(self, other: Self) -> bool {
@@ -142,6 +148,8 @@ mod tests {
         assert_eq!(GroupId::ALL.child(1).child(2).parent(), GroupId::ALL.child(1));
         assert_eq!(GroupId::ALL.parent(), GroupId::ALL);
         assert_eq!(GroupId::ALL.child(12).to_string(), "N[12]");
+        assert!(GroupId::ALL.is_lineage() && (0..9).fold(GroupId::ALL, |group, _| group.child(2)).is_lineage());
+        assert!(!GroupId([1, 0, 2, 0, 0, 0, 0, 0]).is_lineage());
     }
 
     #[test]

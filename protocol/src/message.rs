@@ -1,6 +1,7 @@
 //! What drones say. Soft state: repeated until superseded, idempotent, safe to lose, repeat and reorder.
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
+use crate::ids::GroupId;
 use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,9 @@ pub enum Message {
     Passed(Passed),
 }
 
+/// No coordinate, speed or time is greater than this, m, m/s or s.
+pub const MOST: f64 = 1e9;
+
 /// Why a frame is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum DecodeError {
@@ -70,7 +74,7 @@ pub enum DecodeError {
     /// The length does not fit the kind.
     #[error("frame of {0} bytes, expected {1}")]
     Length(u32, usize),
-    /// A number that is not finite, a count out of range, or an unknown flag.
+    /// A number that is not finite or beyond [`MOST`], a count out of range, a group without lineage, or an unknown flag.
     #[error("frame with an invalid {0}")]
     Field(&'static str),
 }
@@ -135,19 +139,28 @@ impl Message {
 
     fn check(&self) -> Result<(), DecodeError> {
         let finite = |values: &[f64], name| {
-            if values.iter().all(|v| v.is_finite()) { Ok(()) } else { Err(DecodeError::Field(name)) }
+            if values.iter().all(|v| v.abs() <= MOST) { Ok(()) } else { Err(DecodeError::Field(name)) }
         };
         let below = |value: u32, limit: u32, name| if value < limit { Ok(()) } else { Err(DecodeError::Field(name)) };
+        let lineage = |group: GroupId| if group.is_lineage() { Ok(()) } else { Err(DecodeError::Field("group")) };
         let set_limit = payload::MAX_SET as u32 + 1;
         match self {
             Self::Pose(p) => {
+                lineage(p.group)?;
                 finite(&p.position_m, "position")?;
                 finite(&p.velocity_mps, "velocity")?;
                 p.queue.iter().try_for_each(|place| finite(&[place.remaining_m], "remaining path"))
             }
-            Self::Obstacle(o) => o.shape.check().map_err(|_| DecodeError::Field("shape")),
-            Self::Leadership(l) => below(l.kind.wrapping_sub(1), 5, "kind of leadership"),
+            Self::Obstacle(o) => {
+                o.shape.check().map_err(|_| DecodeError::Field("shape"))?;
+                let (low, high) = o.shape.bounds();
+                finite(&[low.x, low.y, high.x, high.y], "shape")
+            }
+            Self::Leadership(l) => {
+                lineage(l.group).and_then(|()| below(l.kind.wrapping_sub(1), 5, "kind of leadership"))
+            }
             Self::Plan(p) => {
+                lineage(p.group)?;
                 finite(&p.anchor_m, "anchor")?;
                 finite(&p.anchor_mps, "anchor velocity")?;
                 if p.anchor_stop_x_m.is_nan() {
@@ -157,10 +170,13 @@ impl Message {
                 below(p.set_count, set_limit, "obstacle count")
             }
             Self::Assignment(a) => {
+                lineage(a.scope)?;
+                lineage(a.group)?;
                 finite(&a.slot_m, "slot")?;
                 finite(&[a.arrival_s], "arrival")
             }
             Self::Arrivals(a) => {
+                lineage(a.group)?;
                 below(a.routes, payload::MAX_ROUTES as u32 + 1, "route count")?;
                 let never = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
                 if a.gate_s.iter().any(never) { Err(DecodeError::Field("arrival")) } else { Ok(()) }

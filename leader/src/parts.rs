@@ -1,0 +1,187 @@
+//! Who is in which part of the swarm, and when a drone takes up leading, or gives it up, although the leader is well.
+
+use crate::election::Input;
+use crate::leading::{Leading, Own};
+use crate::membership::extrapolated;
+use crate::planner::Member;
+use skein_protocol::payload::POSE_LEADS;
+use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, Vec2};
+
+/// A leader that has been behind for so long asks another one to take over, s.
+const BEHIND_S: f64 = 3.0;
+
+/// What a drone waits for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Due {
+    /// Since when its part of a split group has a task and no leader of its own.
+    part: Option<SimTime>,
+    /// Since when the parts could be one again.
+    whole: Option<SimTime>,
+    /// Since when this leader has been behind.
+    behind: Option<SimTime>,
+    /// Somebody obeys what this leader never said: a new term puts an end to that.
+    pub belied: bool,
+}
+
+impl Leading {
+    /// What else there is to do about leading by now.
+    pub(crate) fn calls_for(&mut self, now: SimTime, own: &Own) -> Option<Input> {
+        if std::mem::take(&mut self.due.belied) && self.election.leads() {
+            return Some(Input::Claim(self.election.scope()));
+        }
+        let claim = self.claimable(now, own).map(Input::Claim);
+        claim.or_else(|| self.heir(now, own).map(Input::Yield))
+    }
+
+    /// Who is to take over from this leader, which fell behind in formation: it has been the last of several for a
+    /// while, and so far behind its own slot and the first one that it lost touch. Asked again until somebody does.
+    fn heir(&mut self, now: SimTime, own: &Own) -> Option<DroneId> {
+        let heir = if self.election.leads() { self.first_if_behind(now, own) } else { None };
+        let since = heir.map(|_| self.due.behind.unwrap_or(now));
+        self.due.behind = since;
+        let due = since.is_some_and(|since| now.since(since) >= BEHIND_S);
+        if due {
+            self.due.behind = Some(now.after(self.wait_s - BEHIND_S));
+        }
+        heir.filter(|_| due)
+    }
+
+    fn first_if_behind(&self, now: SimTime, own: &Own) -> Option<DroneId> {
+        let (orders, part) = (self.ledger.obeyed()?, self.ledger.part()?);
+        let (anchor, moves) = (Vec2::from(orders.plan.anchor_m), Vec2::from(orders.plan.anchor_mps));
+        let moved = anchor + moves * now.since(orders.plan.stamp);
+        let anchor = Vec2::new(moved.x.min(orders.plan.anchor_stop_x_m.max(anchor.x)), moved.y);
+        let distance_m = |position| self.planner.params.destination.distance_m(position);
+        let (mine_m, spacing_m) = (distance_m(own.position), self.planner.params.spacing_m);
+        let slot_m = distance_m(anchor + Vec2::from(part.slot_m));
+        let scope = self.election.scope();
+        let members: Vec<Member> = self.living(now).filter(|m| scope.contains(m.group)).collect();
+        let last = members.iter().all(|m| distance_m(m.position) < mine_m);
+        if !self.ledger.sets().is_empty() || !last || mine_m - slot_m <= spacing_m {
+            return None;
+        }
+        let follower = |m: &&Member| self.term_of(m.id) == self.election.obeyed();
+        let nearer =
+            |a: &&Member, b: &&Member| distance_m(a.position).total_cmp(&distance_m(b.position)).then(a.id.cmp(&b.id));
+        let first = members.iter().filter(follower).min_by(nearer)?;
+        (mine_m - distance_m(first.position) > spacing_m).then_some(first.id)
+    }
+
+    /// The group that this drone is to lead by now although another leader may be well: its part of a split group, with
+    /// an obstacle ahead; or the whole swarm, when it leads a part and nobody has an obstacle ahead any more.
+    fn claimable(&mut self, now: SimTime, own: &Own) -> Option<GroupId> {
+        let (scope, group) = (self.election.scope(), self.election.group());
+        let me = self.myself(own);
+        let part = scope != group && scope.contains(group) && self.part_has_ahead(now, &me);
+        let whole = scope != GroupId::ALL && self.election.leads() && !self.all_have_ahead(now, &me);
+        let rank = match (part, whole) {
+            (true, _) => self.rank_in_part(now, &me),
+            (false, true) => self.rank_of_leaders(now, &me),
+            (false, false) => 0,
+        };
+        let due = |since: &mut Option<SimTime>, condition: bool| {
+            *since = condition.then(|| since.unwrap_or(now));
+            since.is_some_and(|since| now.since(since) >= self.wait_s * rank as f64)
+        };
+        let mut since = self.due;
+        let (claim_part, claim_whole) = (due(&mut since.part, part), due(&mut since.whole, whole && !part));
+        self.due = since;
+        if claim_part { Some(group) } else { claim_whole.then_some(GroupId::ALL) }
+    }
+
+    fn myself(&self, own: &Own) -> Member {
+        let Own { position, velocity, .. } = *own;
+        Member { id: self.me, position, speed_mps: velocity.norm(), velocity, group: self.ledger.group() }
+    }
+
+    /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
+    /// its beacon shows that it is on already or will not obey it.
+    pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
+        let plans = [self.ledger.obeyed(), self.ledger.origin()];
+        self.peers.living(now).map(move |(id, pose)| {
+            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && pose.term <= plan.ballot;
+            let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
+            let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
+            let group = group.unwrap_or(pose.group);
+            let velocity = Vec2::from(pose.velocity_mps);
+            Member { id, position: extrapolated(pose, now), speed_mps: velocity.norm(), velocity, group }
+        })
+    }
+
+    /// Living peers in this drone's part.
+    fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> {
+        let group = me.group;
+        self.living(now).filter(move |m| group.contains(m.group))
+    }
+
+    /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
+    fn part_has_ahead(&self, now: SimTime, me: &Member) -> bool {
+        let named = self.ledger.part().is_some_and(|part| part.leader == self.me);
+        let kin: Vec<Member> = self.kin(now, me).filter(|_| named).collect();
+        self.planner.has_ahead(&self.obstacles, kin.iter().chain([me]))
+    }
+
+    fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
+        let all: Vec<Member> = self.living(now).collect();
+        self.planner.has_ahead(&self.obstacles, all.iter().chain([me]))
+    }
+
+    /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
+    /// destination.
+    fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
+        let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
+        let mine = (me.id != named, self.key(me.position, me.id));
+        self.kin(now, me).filter(|m| (m.id != named, self.key(m.position, m.id)) < mine).count()
+    }
+
+    /// Leaders closer to the destination.
+    fn rank_of_leaders(&self, now: SimTime, me: &Member) -> usize {
+        let mine = self.key(me.position, me.id);
+        let leaders = self.peers.living(now).filter(|(_, pose)| pose.flags & POSE_LEADS != 0);
+        leaders.filter(|(id, pose)| self.key(extrapolated(pose, now), *id) < mine).count()
+    }
+
+    /// Takes stock of who is there, before a leader decides. A drone of no part joins the one of the nearest drone.
+    pub fn muster(&mut self, now: SimTime, own: &Own) {
+        let scope = self.election.scope();
+        let (mut members, mut others, mut orphans) = (vec![self.myself(own)], Vec::new(), Vec::new());
+        for peer in self.living(now) {
+            if scope.contains(peer.group) {
+                members.push(peer);
+            } else if peer.group.contains(scope) && self.term_of(peer.id) < self.election.obeyed() {
+                orphans.push(peer);
+            } else {
+                others.push(peer);
+            }
+        }
+        // Whoever is of another lineage, or obeys an older term, does not take it in.
+        orphans.retain(|orphan| {
+            let later = |m: &Member| self.term_of(m.id) > self.term_of(orphan.id);
+            let kin = others.iter().filter(|m| orphan.group.contains(m.group) && later(m));
+            nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
+        });
+        members.append(&mut orphans);
+        (self.members, self.others) = (members, others);
+        self.members.sort_by_key(|member| member.id);
+        for set in self.ledger.sets() {
+            let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
+            past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));
+        }
+    }
+
+    /// The term that a peer obeys, by its last beacon.
+    fn term_of(&self, peer: DroneId) -> Ballot {
+        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
+    }
+
+    /// The living members, by id, as of the last [`Self::muster`].
+    #[must_use]
+    pub fn members(&self) -> &[Member] {
+        &self.members
+    }
+}
+
+/// Square of the distance to the nearest of these, m².
+fn nearest_m2<'m>(from: &Member, to: impl Iterator<Item = &'m Member>) -> f64 {
+    to.map(|m| (m.position - from.position).norm_squared()).fold(f64::INFINITY, f64::min)
+}

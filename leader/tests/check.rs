@@ -1,0 +1,38 @@
+//! What must hold in every course of a mission, checked over the machine that flies: see `model/mod.rs`.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod model;
+mod swarm;
+
+use model::{Faults, Mission};
+use stateright::{Checker, Model};
+
+/// Explores all courses; all properties must hold. The number of different states is told, so that nothing is left out
+/// unnoticed.
+fn explore(drones: u32, walls: u32, steps: u32, faults: Faults, states: usize) {
+    let checker = Mission { drones, walls, steps, faults }.checker().threads(2).spawn_dfs().join();
+    println!("{drones} drones, {walls} walls, {steps} steps, {faults:?}: {} states", checker.unique_state_count());
+    checker.assert_properties();
+    assert_eq!(checker.unique_state_count(), states);
+}
+
+#[test]
+fn nothing_goes_wrong() {
+    explore(3, 2, 16, Faults::default(), 17);
+    explore(5, 2, 18, Faults::default(), 19);
+}
+
+#[test]
+fn a_message_is_lost_late_or_doubled() {
+    explore(3, 2, 16, Faults { messages: 1, ..Faults::default() }, 0);
+}
+
+#[test]
+fn a_drone_dies_and_is_started_again() {
+    explore(3, 2, 18, Faults { crashes: 1, ..Faults::default() }, 4519);
+}
+
+#[test]
+fn the_swarm_is_cut_in_two_and_healed() {
+    explore(3, 2, 18, Faults { cuts: 1, ..Faults::default() }, 0);
+}

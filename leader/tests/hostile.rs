@@ -1,0 +1,260 @@
+//! Rubbish and hostile frames: nothing that is heard makes a drone panic, and honest drones keep one leader among
+//! themselves, or regain it once the noise is over.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod swarm;
+
+use bytemuck::Zeroable;
+use proptest::prelude::*;
+use skein_protocol::frame::{FRAME_PAYLOAD, Frame};
+use skein_protocol::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use swarm::air::{Air, Swarm};
+use swarm::{DEFAULT, Periods, discord, wall};
+
+const PERIODS: Periods = Periods { dt_s: 0.05, ..DEFAULT };
+/// Honest drones; the id after theirs is the villain's.
+const HONEST: usize = 4;
+
+/// Numbers as they are, at the edges, and beyond all reason.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        3 => -300.0..300.0,
+        1 => prop::sample::select(vec![0.0, -0.0, f64::MAX, f64::MIN, f64::MIN_POSITIVE, 1e9, -1e9, 1e300]),
+        1 => any::<f64>().prop_filter("finite", |x| x.is_finite()),
+    ]
+}
+
+fn instant() -> impl Strategy<Value = SimTime> {
+    prop_oneof![3 => (0.0..10.0).prop_map(SimTime::from_secs), 1 => any::<i64>().prop_map(SimTime)]
+}
+
+fn drone() -> impl Strategy<Value = DroneId> {
+    prop_oneof![4 => (0..=HONEST as u32).prop_map(DroneId), 1 => any::<u32>().prop_map(DroneId)]
+}
+
+fn ballot() -> impl Strategy<Value = Ballot> {
+    let round = prop_oneof![3 => 0..40u32, 1 => (u32::MAX - 3)..=u32::MAX, 1 => any::<u32>()];
+    (round, prop_oneof![0..3u32, any::<u32>()], drone()).prop_map(|(round, incarnation, claimant)| Ballot {
+        round,
+        incarnation,
+        claimant,
+    })
+}
+
+fn stamp() -> impl Strategy<Value = PlanStamp> {
+    (ballot(), prop_oneof![0..9u32, any::<u32>()]).prop_map(|(ballot, epoch)| PlanStamp { ballot, epoch })
+}
+
+fn group() -> impl Strategy<Value = GroupId> {
+    let lineage = prop::collection::vec(1..3u8, 0..4);
+    let honest = lineage.prop_map(|digits| digits.into_iter().fold(GroupId::ALL, GroupId::child));
+    prop_oneof![4 => honest, 1 => any::<[u8; 8]>().prop_map(GroupId)]
+}
+
+fn set() -> impl Strategy<Value = ([ObstacleId; payload::MAX_SET], u32)> {
+    let ids = prop::collection::vec((0..5u32).prop_map(ObstacleId), payload::MAX_SET);
+    (ids, prop_oneof![0..4u32, any::<u32>()]).prop_map(|(ids, count)| (ids.try_into().unwrap(), count))
+}
+
+fn shape() -> impl Strategy<Value = ConvexShape> {
+    let disc = (number(), number(), number())
+        .prop_filter_map("a disc", |(x, y, r)| ConvexShape::circle(Vec2::new(x, y), r).ok());
+    let bar = (number(), number(), number(), number())
+        .prop_filter_map("a bar", |(x, y, a, b)| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(a, b), 0.3).ok());
+    prop_oneof![disc, bar]
+}
+
+fn pose() -> impl Strategy<Value = Pose> {
+    ((instant(), number(), number(), number(), number()), stamp(), group(), ballot(), any::<u32>(), any::<u32>())
+        .prop_map(|((stamp, x, y, vx, vy), obeyed, group, term, incarnation, flags)| Pose {
+            stamp,
+            position_m: [x, y],
+            velocity_mps: [vx, vy],
+            obeyed,
+            group,
+            term,
+            incarnation,
+            flags,
+            ..Pose::zeroed()
+        })
+}
+
+fn plan() -> impl Strategy<Value = Plan> {
+    (instant(), stamp(), group(), 0..4u32, any::<u32>(), (number(), number(), number()), set()).prop_map(
+        |(stamp, id, group, phase, members, (x, y, v), (set, set_count))| Plan {
+            stamp,
+            id,
+            group,
+            phase,
+            members,
+            anchor_m: [x, y],
+            anchor_mps: [v, 0.0],
+            anchor_stop_x_m: x,
+            set,
+            set_count,
+            ..Plan::zeroed()
+        },
+    )
+}
+
+fn assignment() -> impl Strategy<Value = Assignment> {
+    (stamp(), group(), group(), drone(), drone(), (number(), number()), any::<u16>(), any::<u16>()).prop_map(
+        |(id, scope, group, drone, leader, (x, y), route, rank)| Assignment {
+            id,
+            scope,
+            group,
+            drone,
+            leader,
+            slot_m: [x, y],
+            arrival_s: x,
+            route,
+            rank,
+            reserved: 0,
+        },
+    )
+}
+
+fn arrivals() -> impl Strategy<Value = Arrivals> {
+    let gate = prop_oneof![0.0..30.0f32, Just(f32::INFINITY), Just(f32::MAX), any::<f32>()];
+    let set = prop_oneof![(0..3u32).prop_map(|i| payload::set_tag(&[ObstacleId(i)])), any::<u32>()];
+    (instant(), ballot(), drone(), group(), set, any::<u32>(), 0..40u32, gate).prop_map(
+        |(stamp, ballot, drone, group, set, flags, routes, gate)| Arrivals {
+            stamp,
+            ballot,
+            drone,
+            group,
+            set,
+            routes,
+            flags,
+            gate_s: [gate; payload::MAX_ROUTES],
+        },
+    )
+}
+
+/// A message with fields of its kind, honest ones and others.
+fn message() -> impl Strategy<Value = Message> {
+    let leadership = (instant(), ballot(), 0..8u32, group(), any::<u32>(), drone());
+    let passed = (instant(), set());
+    prop_oneof![
+        pose().prop_map(Message::Pose),
+        (shape(), 0..8u32, drone()).prop_map(|(shape, id, witness)| Message::Obstacle(Obstacle {
+            shape,
+            id: ObstacleId(id),
+            witness
+        })),
+        leadership.prop_map(|(stamp, ballot, kind, group, epoch, heir)| Message::Leadership(Leadership {
+            stamp,
+            ballot,
+            kind,
+            group,
+            epoch,
+            heir
+        })),
+        plan().prop_map(Message::Plan),
+        assignment().prop_map(Message::Assignment),
+        arrivals().prop_map(Message::Arrivals),
+        passed.prop_map(|(stamp, (set, set_count))| Message::Passed(Passed { stamp, set, set_count, reserved: 0 })),
+    ]
+}
+
+/// A frame: a message, a message with a few bytes changed, or random bytes.
+fn frame() -> impl Strategy<Value = Frame> {
+    let changed =
+        (message(), prop::collection::vec((0..FRAME_PAYLOAD, any::<u8>()), 1..4)).prop_map(|(message, bytes)| {
+            let mut frame = message.encode();
+            bytes.into_iter().for_each(|(at, byte)| frame.payload[at] = byte);
+            frame
+        });
+    let random =
+        (0..9u16, 0..400u32, prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)).prop_map(|(kind, len, bytes)| Frame {
+            kind,
+            version: payload::VERSION,
+            len,
+            payload: bytes.try_into().unwrap(),
+        });
+    prop_oneof![6 => message().prop_map(|m| m.encode()), 2 => changed, 1 => random]
+}
+
+/// A swarm in flight whose last drone says nothing by itself, with a wall ahead.
+fn swarm(seed: u64, ticks: u64) -> Swarm {
+    let mut swarm = Swarm::new(PERIODS, Air { seed, loss: 0.1, ..Air::default() }, HONEST + 1);
+    swarm.kill(HONEST);
+    swarm.scenery.push(wall(0, 80.0));
+    (0..ticks).for_each(|_| swarm.step().unwrap());
+    swarm
+}
+
+/// What a radio hands on of a frame; a frame is said by `source`, whatever it claims.
+fn hear(swarm: &mut Swarm, source: DroneId, frame: &Frame) {
+    let now = swarm.now();
+    let Ok(message) = Message::decode(frame) else { return };
+    for leading in swarm.drones.iter_mut().flatten() {
+        leading.hear(now, source, &message, &mut Vec::new());
+    }
+}
+
+/// Who obeys a plan that its leader never made.
+fn belied(swarm: &Swarm) -> Option<String> {
+    let leader = |ballot: Ballot| swarm.drones.get(ballot.claimant.index())?.as_ref();
+    let drones = swarm.side(0);
+    let liar = drones.iter().find(|(_, drone)| {
+        let stamp = drone.ledger.stamp();
+        let made = leader(stamp.ballot).map(|leader| leader.ledger.stamp()).filter(|made| made.ballot == stamp.ballot);
+        drone.election.obeyed() == stamp.ballot && made.is_none_or(|made| stamp.epoch > made.epoch)
+    });
+    liar.map(|(id, drone)| format!("{id} obeys {:?}", drone.ledger.stamp()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: ProptestConfig::default().cases.max(300), failure_persistence: None, ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn noise_of_a_member_is_survived(
+        seed in any::<u64>(), start in 0..120u64, noise in prop::collection::vec((frame(), 0..4u8), 1..120),
+    ) {
+        let mut swarm = swarm(seed, start);
+        swarm.watch = None;
+        for (frame, ticks) in &noise {
+            hear(&mut swarm, DroneId(HONEST as u32), frame);
+            for _ in 0..*ticks {
+                swarm.step().unwrap();
+            }
+        }
+        let regained = swarm.until(20.0, |s| discord(&s.side(0)).or_else(|| belied(s)));
+        prop_assert!(regained.is_ok(), "{regained:?}");
+    }
+
+    #[test]
+    fn a_stranger_is_not_heard(noise in prop::collection::vec(frame(), 1..60), source in HONEST as u32 + 1..) {
+        let mut noisy = swarm(1, 100);
+        let quiet = format!("{:?}", noisy.drones);
+        noise.iter().for_each(|frame| hear(&mut noisy, DroneId(source), frame));
+        prop_assert_eq!(quiet, format!("{:?}", noisy.drones));
+    }
+
+    #[test]
+    fn old_frames_said_again_change_no_leader(seed in any::<u64>(), picks in prop::collection::vec(any::<usize>(), 1..200)) {
+        let mut swarm = swarm(seed, 0);
+        swarm.scenery.clear();
+        let mut tape = Vec::new();
+        for _ in 0..200 {
+            tape.extend(swarm.posts().iter().map(|((_, from, _, _), message)| (*from, *message)));
+            swarm.step().unwrap();
+        }
+        let before: Vec<_> = (0..HONEST).map(|i| swarm.term(i)).collect();
+        for pick in picks {
+            let (from, message) = tape[pick % tape.len()];
+            let now = swarm.now();
+            for to in (0..HONEST).filter(|&to| to != from) {
+                swarm.drones[to].as_mut().unwrap().hear(now, DroneId(from as u32), &message, &mut Vec::new());
+            }
+            swarm.step().unwrap();
+        }
+        prop_assert_eq!(before, (0..HONEST).map(|i| swarm.term(i)).collect::<Vec<_>>());
+        prop_assert_eq!(discord(&swarm.side(0)), None);
+    }
+}

@@ -1,0 +1,344 @@
+//! The shipping machine under a model checker: every course of a short mission in which the air, processes and links
+//! do their worst, up to a number of faults.
+//!
+//! Time goes in steps of one heartbeat. In a step every living drone hears what is due and then acts, as the pilot
+//! does. Between two steps the adversary may lose, delay by a step or double any single message that is due (later ones
+//! overtake a delayed one), kill a drone, start it again with nothing in its memory, cut the swarm in two and heal it.
+//! The time is part of the state and bounded, so nothing has to be abstracted from it: all courses within the bounds
+//! are explored to the end, in whatever order.
+
+use crate::swarm::{Breach, Periods, Watch, discord, disunion, hash, params, step, wall};
+use skein_leader::leading::{Leading, Own};
+use skein_protocol::payload::PHASE_REFORM;
+use skein_protocol::{DroneId, GroupId, Message, SimTime, Vec2};
+use stateright::{Model, Property};
+use std::fmt::Write;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+/// All periods are one step.
+const PERIODS: Periods = Periods {
+    dt_s: 0.2,
+    beacon_s: 0.2,
+    heartbeat_s: 0.2,
+    repeat_s: 0.2,
+    wait_s: 0.2,
+    leader_timeout_s: 0.4,
+    peer_timeout_s: 0.6,
+    debounce_s: 0.0,
+};
+/// Faster than real drones, so that a mission is short: 20 m a step.
+const SPEED_MPS: f64 = 100.0;
+/// So many steps after the last fault all must be one again, at the latest.
+const PATIENCE: u32 = 60;
+
+/// What the adversary may still do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Faults {
+    /// Messages lost, delayed or doubled.
+    pub messages: u8,
+    /// Drones killed; each may be started again.
+    pub crashes: u8,
+    /// Cuts of the swarm in two; each may be healed.
+    pub cuts: u8,
+}
+
+/// A mission of few drones, and what may go wrong.
+#[derive(Clone, Debug)]
+pub struct Mission {
+    /// How many drones, in a column, alternately left and right of the course.
+    pub drones: u32,
+    /// Steps explored; what comes after is fair.
+    pub steps: u32,
+    /// Walls ahead: one splits the swarm, a second one is planned for by two leaders jointly.
+    pub walls: u32,
+    /// The adversary's means.
+    pub faults: Faults,
+}
+
+/// One drone's process.
+#[derive(Clone, Debug)]
+struct Process {
+    /// `None`: dead.
+    machine: Option<Arc<Leading>>,
+    /// Hash of all the machine remembers.
+    print: u64,
+    incarnation: u32,
+}
+
+/// A message on its way to one drone. The order is that of hearing.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+struct Post {
+    due: u32,
+    from: u32,
+    number: u32,
+    to: u32,
+    print: u64,
+}
+
+/// Everything there is at one moment.
+#[derive(Clone, Debug)]
+pub struct State {
+    step: u32,
+    processes: Vec<Process>,
+    posts: Vec<(Post, Arc<Message>)>,
+    left: Faults,
+    /// One bit a drone: its side of the cut.
+    cut: Option<u32>,
+    watch: Arc<Watch>,
+    /// What must not happen and did.
+    pub breach: Option<Breach>,
+}
+
+impl State {
+    fn key(&self) -> impl Hash + PartialEq + '_ {
+        let machines: Vec<(u64, u32)> = self.processes.iter().map(|p| (p.print, p.incarnation)).collect();
+        let posts: Vec<&Post> = self.posts.iter().map(|(post, _)| post).collect();
+        (self.step, machines, posts, self.left, self.cut, &*self.watch, &self.breach)
+    }
+
+    fn now(&self) -> SimTime {
+        SimTime::from_secs(f64::from(self.step) * PERIODS.dt_s)
+    }
+
+    fn hear_each_other(&self, a: u32, b: u32) -> bool {
+        self.cut.is_none_or(|cut| cut >> a & 1 == cut >> b & 1)
+    }
+
+    /// The living, side by side.
+    fn sides(&self) -> Vec<Vec<(DroneId, &Leading)>> {
+        let side = |bit: u32| {
+            let of_side = move |id: &u32| self.cut.map_or(0, |cut| cut >> id & 1) == bit;
+            let ids = (0..self.processes.len() as u32).filter(of_side);
+            ids.filter_map(|id| Some((DroneId(id), &**self.processes[id as usize].machine.as_ref()?))).collect()
+        };
+        (0..2).map(side).collect()
+    }
+
+    /// The groups that are led, by whoever leads.
+    fn led(&self) -> Vec<GroupId> {
+        let leading = self.processes.iter().filter_map(|p| p.machine.as_ref()).filter(|l| l.election.leads());
+        leading.map(|l| l.election.scope()).collect()
+    }
+}
+
+impl PartialEq for State {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Hash for State {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        self.key().hash(hasher);
+    }
+}
+
+/// What happens next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// All hear and act.
+    Step,
+    /// This message, by its place on the air, is lost.
+    Lose(usize),
+    /// It comes a step later.
+    Delay(usize),
+    /// It comes now and a step later.
+    Double(usize),
+    /// A process dies.
+    Kill(u32),
+    /// It is started again.
+    Restart(u32),
+    /// Two sides do not hear each other any more.
+    Cut(u32),
+    /// They do again.
+    Heal,
+}
+
+/// Hash of all that a machine remembers: of what `derive(Debug)` writes, which leaves out no field.
+fn print_of(machine: &Leading) -> u64 {
+    struct Sink(Vec<u8>);
+    impl Write for Sink {
+        fn write_str(&mut self, s: &str) -> std::fmt::Result {
+            self.0.extend_from_slice(s.as_bytes());
+            Ok(())
+        }
+    }
+    let mut sink = Sink(Vec::with_capacity(1 << 14));
+    write!(sink, "{machine:?}").unwrap();
+    hash(&sink.0)
+}
+
+impl Mission {
+    fn start(&self, id: u32, incarnation: u32, now: SimTime) -> Process {
+        let machine = Leading::new(&params(&PERIODS, self.drones, id, incarnation, now));
+        Process { print: print_of(&machine), machine: Some(Arc::new(machine)), incarnation }
+    }
+
+    fn own(id: u32, step: u32) -> Own {
+        let y_m = if id.is_multiple_of(2) { 30.0 } else { -30.0 };
+        let x_m = 20.0 - 20.0 * f64::from(id) + SPEED_MPS * PERIODS.dt_s * f64::from(step);
+        Own { tick: u64::from(step), position: Vec2::new(x_m, y_m), velocity: Vec2::new(SPEED_MPS, 0.0) }
+    }
+
+    /// All hear what is due, then all act.
+    fn step(&self, state: &mut State) {
+        let now = state.now();
+        let later = state.posts.partition_point(|(post, _)| post.due <= state.step);
+        let due: Vec<_> = state.posts.drain(..later).collect();
+        let (mut said, mut number) = (Vec::new(), 0);
+        for id in 0..self.drones {
+            let process = &state.processes[id as usize];
+            let Some(machine) = &process.machine else { continue };
+            let (mut machine, mut say) = (Leading::clone(machine), Vec::new());
+            for (post, message) in due.iter().filter(|(post, _)| post.to == id && state.hear_each_other(post.from, id))
+            {
+                machine.hear(now, DroneId(post.from), message, &mut say);
+            }
+            // The first one senses, the others are told.
+            for wall in (0..self.walls).filter(|w| id == 0 && state.step >= 2 + 3 * w) {
+                let (obstacle, shape) = wall_at(wall);
+                machine.sense(now, obstacle, shape);
+            }
+            step(&mut machine, now, &Self::own(id, state.step), DroneId(id), &mut say);
+            let seen = Arc::make_mut(&mut state.watch).see(DroneId(id), process.incarnation, &machine);
+            state.breach = state.breach.take().or(seen.err());
+            let process = &mut state.processes[id as usize];
+            (process.print, process.machine) = (print_of(&machine), Some(Arc::new(machine)));
+            for message in say.into_iter().map(Arc::new) {
+                let print = hash(bytemuck::bytes_of(&message.encode()));
+                number += 1;
+                for to in (0..self.drones).filter(|&to| to != id) {
+                    said.push((Post { due: state.step + 1, from: id, number, to, print }, message.clone()));
+                }
+            }
+        }
+        state.posts.extend(said);
+        state.posts.sort_by(|a, b| a.0.cmp(&b.0));
+        state.step += 1;
+    }
+
+    /// Whether all become one when nothing goes wrong any more: each side for itself, then, healed, the whole swarm.
+    fn becomes_one(&self, state: &State) -> bool {
+        let mut state = state.clone();
+        let apart = !state.cut.is_some() || self.settles(&mut state);
+        state.cut = None;
+        apart && self.settles(&mut state)
+    }
+
+    fn settles(&self, state: &mut State) -> bool {
+        let past = Self::own(self.drones - 1, 0).position.x;
+        (0..PATIENCE).any(|_| {
+            self.step(state);
+            let ahead = past + SPEED_MPS * PERIODS.dt_s * f64::from(state.step) < 250.0;
+            !ahead && state.breach.is_none() && state.sides().iter().all(|side| disunion(side).is_none())
+        })
+    }
+}
+
+fn wall_at(number: u32) -> (skein_protocol::ObstacleId, skein_protocol::shape::ConvexShape) {
+    wall(number, 105.0 + 70.0 * f64::from(number))
+}
+
+impl Model for Mission {
+    type State = State;
+    type Action = Event;
+
+    fn init_states(&self) -> Vec<State> {
+        vec![State {
+            step: 0,
+            processes: (0..self.drones).map(|id| self.start(id, 1, SimTime::ZERO)).collect(),
+            posts: Vec::new(),
+            left: self.faults,
+            cut: None,
+            watch: Arc::default(),
+            breach: None,
+        }]
+    }
+
+    fn actions(&self, state: &State, events: &mut Vec<Event>) {
+        if state.step == self.steps || state.breach.is_some() {
+            return;
+        }
+        events.push(Event::Step);
+        let due = state.posts.partition_point(|(post, _)| post.due <= state.step);
+        if state.left.messages > 0 {
+            events.extend((0..due).flat_map(|i| [Event::Lose(i), Event::Delay(i), Event::Double(i)]));
+        }
+        for id in 0..self.drones {
+            match state.processes[id as usize].machine {
+                Some(_) => events.extend((state.left.crashes > 0).then_some(Event::Kill(id))),
+                None => events.push(Event::Restart(id)),
+            }
+        }
+        match state.cut {
+            Some(_) => events.push(Event::Heal),
+            // The last drone is always on side 0: each cut once.
+            None if state.left.cuts > 0 => events.extend((1..1 << (self.drones - 1)).map(Event::Cut)),
+            None => {}
+        }
+    }
+
+    fn next_state(&self, before: &State, event: Event) -> Option<State> {
+        let mut state = before.clone();
+        match event {
+            Event::Step => self.step(&mut state),
+            Event::Lose(i) => {
+                state.left.messages -= 1;
+                state.posts.remove(i);
+            }
+            Event::Delay(i) => {
+                state.left.messages -= 1;
+                state.posts[i].0.due += 1;
+            }
+            Event::Double(i) => {
+                state.left.messages -= 1;
+                let (post, message) = state.posts[i].clone();
+                state.posts.push((Post { due: post.due + 1, ..post }, message));
+            }
+            Event::Kill(id) => {
+                state.left.crashes -= 1;
+                let process = &mut state.processes[id as usize];
+                (process.machine, process.print) = (None, 0);
+                state.posts.retain(|(post, _)| post.to != id);
+            }
+            Event::Restart(id) => {
+                let incarnation = state.processes[id as usize].incarnation + 1;
+                state.processes[id as usize] = self.start(id, incarnation, state.now());
+            }
+            Event::Cut(side) => {
+                state.left.cuts -= 1;
+                state.cut = Some(side);
+            }
+            Event::Heal => state.cut = None,
+        }
+        state.posts.sort_by(|a, b| a.0.cmp(&b.0));
+        Some(state)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always("nobody obeys two assignments under one (ballot, epoch)", |_, s: &State| {
+                !matches!(s.breach, Some(Breach::TwoPlans { .. }))
+            }),
+            Property::always("what is obeyed never goes back", |_, s: &State| {
+                !matches!(s.breach, Some(Breach::WentBack { .. } | Breach::NotOfTheTerm { .. }))
+            }),
+            Property::always("no two lead under one ballot", |_, s: &State| {
+                !matches!(s.breach, Some(Breach::TwoLeaders { .. }))
+            }),
+            Property::always("on a fair network all become one", |mission: &Self, s: &State| {
+                s.step < mission.steps || mission.becomes_one(s)
+            }),
+            Property::sometimes("two groups have leaders of their own", |_, s: &State| {
+                let led = s.led();
+                (1..=2).all(|number| led.contains(&GroupId::ALL.child(number)))
+            }),
+            Property::sometimes("all fly in formation again", |_, s: &State| {
+                let part = |l: &Leading| l.ledger.obeyed().is_some_and(|orders| orders.plan.phase == PHASE_REFORM);
+                let all = s.processes.iter().all(|p| p.machine.as_ref().is_some_and(|l| part(l)));
+                all && s.sides().iter().all(|side| discord(side).is_none())
+            }),
+        ]
+    }
+}

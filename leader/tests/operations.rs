@@ -1,0 +1,158 @@
+//! Whatever happens to a swarm, in whatever order: what must always hold holds, and once it is over the swarm is one.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod swarm;
+
+use proptest::prelude::*;
+use skein_protocol::SimTime;
+use swarm::air::{Air, Swarm};
+use swarm::{DEFAULT, Periods, wall};
+
+/// Coarser than a flight, so that much happens in little time.
+const PERIODS: Periods = Periods { dt_s: 0.05, ..DEFAULT };
+/// Once all is well again and nothing is ahead, the swarm is one after so long, s.
+const FAIR_S: f64 = 20.0;
+
+/// Something that happens. Numbers are taken modulo what there is.
+#[derive(Clone, Debug)]
+enum Operation {
+    /// So many ticks go by.
+    Run(u8),
+    Kill(u8),
+    Restart(u8),
+    Freeze(u8),
+    Wake(u8),
+    /// One bit a drone.
+    Cut(u8),
+    Heal,
+    /// From now on the air loses this part in 16, and takes this many ticks, give or take.
+    Weather {
+        loss: u8,
+        delay: u8,
+        jitter: u8,
+    },
+    /// A message on the air is lost, comes this much later, or comes again this much later.
+    Lose(u16),
+    Delay(u16, u8),
+    Double(u16, u8),
+    /// A drone is moved along and across the course, m.
+    Move(u8, i8, i8),
+    /// A wall stands so far ahead of the first drone, m.
+    Wall(u8),
+}
+
+fn operation() -> impl Strategy<Value = Operation> {
+    use Operation::*;
+    prop_oneof![
+        10 => (1..60u8).prop_map(Run),
+        2 => any::<u8>().prop_map(Kill),
+        2 => any::<u8>().prop_map(Restart),
+        1 => any::<u8>().prop_map(Freeze),
+        1 => any::<u8>().prop_map(Wake),
+        1 => any::<u8>().prop_map(Cut),
+        1 => Just(Heal),
+        1 => (0..10u8, 0..20u8, 0..10u8).prop_map(|(loss, delay, jitter)| Weather { loss, delay, jitter }),
+        2 => any::<u16>().prop_map(Lose),
+        2 => (any::<u16>(), 1..40u8).prop_map(|(i, ticks)| Delay(i, ticks)),
+        2 => (any::<u16>(), 1..100u8).prop_map(|(i, ticks)| Double(i, ticks)),
+        2 => (any::<u8>(), any::<i8>(), any::<i8>()).prop_map(|(i, x, y)| Move(i, x, y)),
+        1 => (40..200u8).prop_map(Wall),
+    ]
+}
+
+fn apply(swarm: &mut Swarm, operation: &Operation) -> Result<(), TestCaseError> {
+    let drones = swarm.drones.len();
+    let drone = |i: u8| usize::from(i) % drones;
+    match *operation {
+        Operation::Run(ticks) => {
+            for _ in 0..ticks {
+                swarm.step().map_err(|breach| TestCaseError::fail(format!("{breach:?}")))?;
+            }
+        }
+        Operation::Kill(i) => swarm.kill(drone(i)),
+        Operation::Restart(i) if swarm.drones[drone(i)].is_none() => swarm.restart(drone(i)),
+        Operation::Restart(_) => {}
+        Operation::Freeze(i) => swarm.frozen[drone(i)] = swarm.drones[drone(i)].is_some(),
+        Operation::Wake(i) => swarm.frozen[drone(i)] = false,
+        Operation::Cut(bits) => swarm.sides = (0..drones).map(|i| bits >> i & 1).collect(),
+        Operation::Heal => swarm.sides.fill(0),
+        Operation::Weather { loss, delay, jitter } => {
+            swarm.air.loss = f64::from(loss) / 16.0;
+            swarm.air.delay_s = f64::from(delay) * PERIODS.dt_s;
+            swarm.air.jitter_s = f64::from(jitter.min(delay)) * PERIODS.dt_s;
+        }
+        Operation::Lose(i) => drop(swarm.take_post(i.into())),
+        Operation::Delay(i, ticks) => {
+            let post = swarm.take_post(i.into());
+            post.into_iter().for_each(|((due, from, number, to), message)| {
+                swarm.posts().insert((due + u64::from(ticks), from, number, to), message);
+            });
+        }
+        Operation::Double(i, ticks) => {
+            if let Some(((due, from, number, to), message)) = swarm.take_post(i.into()) {
+                swarm.posts().insert((due, from, number, to), message);
+                swarm.posts().insert((due + u64::from(ticks), from, number, to), message);
+            }
+        }
+        Operation::Move(i, x, y) => {
+            swarm.own[drone(i)].position += skein_protocol::Vec2::new(f64::from(x), f64::from(y));
+        }
+        Operation::Wall(ahead) => {
+            let first = swarm.own.iter().map(|own| own.position.x).fold(f64::NEG_INFINITY, f64::max);
+            let id = swarm.scenery.len() as u32;
+            swarm.scenery.push(wall(id, first + f64::from(ahead)));
+        }
+    }
+    Ok(())
+}
+
+/// All faults end; the dead stay dead, the frozen wake.
+fn peace(swarm: &mut Swarm) {
+    swarm.frozen.fill(false);
+    swarm.sides.fill(0);
+    swarm.air = Air { seed: swarm.air.seed, ..Air::default() };
+}
+
+/// Flies on until everybody is past everything.
+fn pass(swarm: &mut Swarm) -> Result<(), TestCaseError> {
+    let rear = swarm.scenery.iter().map(|(_, shape)| shape.bounds().1.x).fold(f64::NEG_INFINITY, f64::max);
+    while swarm.own.iter().any(|own| own.position.x < rear + 25.0) {
+        apply(swarm, &Operation::Run(20))?;
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.max(300), failure_persistence: None, max_shrink_iters: 2000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_swarm_becomes_one(
+        drones in 2..9usize, seed in any::<u64>(), operations in prop::collection::vec(operation(), 1..40),
+    ) {
+        let mut swarm = Swarm::new(PERIODS, Air { seed, ..Air::default() }, drones);
+        for operation in &operations {
+            apply(&mut swarm, operation)?;
+        }
+        peace(&mut swarm);
+        let before = swarm.clone().until(FAIR_S, |s| swarm::discord(&s.side(0)));
+        prop_assert!(before.is_ok(), "{before:?} in {:?}", swarm.now());
+        pass(&mut swarm)?;
+        let after = swarm.until(FAIR_S, |s| s.disunion(0));
+        prop_assert!(after.is_ok(), "{after:?} in {:?}", swarm.now());
+    }
+
+    #[test]
+    fn memory_is_bounded(operations in prop::collection::vec(operation(), 1..60), seed in any::<u64>()) {
+        let mut swarm = Swarm::new(PERIODS, Air { seed, ..Air::default() }, 4);
+        for operation in &operations {
+            apply(&mut swarm, operation)?;
+        }
+        let walls = swarm.scenery.len();
+        for leading in swarm.drones.iter().flatten() {
+            let orders = [leading.ledger.obeyed(), leading.ledger.origin()];
+            prop_assert!(orders.into_iter().flatten().all(|orders| orders.parts.len() <= 4));
+            prop_assert!(leading.ledger.sets().len() <= walls && leading.obstacles.iter().count() <= walls);
+            prop_assert!(leading.peers.living(SimTime::ZERO).count() <= 3);
+        }
+    }
+}

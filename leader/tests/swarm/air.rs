@@ -1,0 +1,207 @@
+//! A swarm in simulated time, with the air between the drones.
+
+use super::{Breach, Periods, SPEED_MPS, Watch, disunion, params, step};
+use skein_leader::leading::{Leading, Own};
+use skein_protocol::digest::Digest;
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, Message, ObstacleId, SimTime, Vec2};
+use std::collections::BTreeMap;
+
+/// What the air does to messages; drawn by a keyed hash.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Air {
+    pub seed: u64,
+    pub loss: f64,
+    pub delay_s: f64,
+    /// The delay is this much longer or shorter at most, s.
+    pub jitter_s: f64,
+}
+
+impl Air {
+    fn draw(&self, purpose: u64, sequence: u64, to: usize) -> f64 {
+        let mut digest = Digest::default();
+        digest.word(self.seed).word(purpose).word(sequence).word(to as u64);
+        (digest.value() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// When a message comes in, s after it was said; `None`: never.
+    fn delay_s(&self, sequence: u64, to: usize) -> Option<f64> {
+        let heard = self.draw(1, sequence, to) >= self.loss;
+        heard.then(|| self.delay_s + self.jitter_s * (2.0 * self.draw(2, sequence, to) - 1.0))
+    }
+}
+
+/// When due, who said it, running number, to whom.
+pub type Post = (u64, usize, u64, usize);
+
+/// Machines, their bodies, and the air between them.
+#[derive(Clone)]
+pub struct Swarm {
+    pub periods: Periods,
+    pub air: Air,
+    pub tick: u64,
+    /// The dead are `None`.
+    pub drones: Vec<Option<Leading>>,
+    /// Alive, but they do nothing and hear nothing.
+    pub frozen: Vec<bool>,
+    pub incarnations: Vec<u32>,
+    pub own: Vec<Own>,
+    /// Drones of different sides do not hear each other.
+    pub sides: Vec<u8>,
+    pub scenery: Vec<(ObstacleId, ConvexShape)>,
+    /// How far a drone senses obstacles, m.
+    pub range_m: f64,
+    /// `None`: what happens is not honest, and nobody looks.
+    pub watch: Option<Watch>,
+    posts: BTreeMap<Post, Message>,
+    sequence: u64,
+}
+
+impl Swarm {
+    /// Drones in a column 40 m apart, the first ahead, all just started.
+    pub fn new(periods: Periods, air: Air, drones: usize) -> Self {
+        let own = |i: usize| {
+            let position = Vec2::new(-40.0 * i as f64, 7.0 * i as f64 - 3.0 * drones as f64);
+            Own { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0) }
+        };
+        let machine = |i| Some(Leading::new(&params(&periods, drones as u32, i, 1, SimTime::ZERO)));
+        Self {
+            periods,
+            air,
+            tick: 0,
+            drones: (0..drones as u32).map(machine).collect(),
+            frozen: vec![false; drones],
+            incarnations: vec![1; drones],
+            own: (0..drones).map(own).collect(),
+            sides: vec![0; drones],
+            scenery: Vec::new(),
+            range_m: 100.0,
+            watch: Some(Watch::default()),
+            posts: BTreeMap::new(),
+            sequence: 0,
+        }
+    }
+
+    pub fn now(&self) -> SimTime {
+        SimTime::from_secs(self.tick as f64 * self.periods.dt_s)
+    }
+
+    pub fn kill(&mut self, drone: usize) {
+        self.drones[drone] = None;
+        self.frozen[drone] = false;
+        self.posts.retain(|post, _| post.3 != drone);
+    }
+
+    pub fn restart(&mut self, drone: usize) {
+        self.incarnations[drone] += 1;
+        let params = params(&self.periods, self.own.len() as u32, drone as u32, self.incarnations[drone], self.now());
+        self.drones[drone] = Some(Leading::new(&params));
+    }
+
+    /// Puts what a drone says on the air, to all who can hear it.
+    pub fn send(&mut self, from: usize, message: Message) {
+        self.sequence += 1;
+        for to in (0..self.own.len()).filter(|&to| to != from) {
+            let Some(delay_s) = self.air.delay_s(self.sequence, to) else { continue };
+            let due = self.tick + ((delay_s / self.periods.dt_s).ceil().max(1.0)) as u64;
+            self.posts.insert((due, from, self.sequence, to), message);
+        }
+    }
+
+    /// Messages on the air, the next due first.
+    pub fn posts(&mut self) -> &mut BTreeMap<Post, Message> {
+        &mut self.posts
+    }
+
+    /// Takes a message off the air: the `index`-th, modulo how many there are.
+    pub fn take_post(&mut self, index: usize) -> Option<(Post, Message)> {
+        let index = index.checked_rem(self.posts.len())?;
+        let post = *self.posts.keys().nth(index)?;
+        self.posts.remove_entry(&post)
+    }
+
+    /// One tick: all hear what is due, then all act.
+    pub fn step(&mut self) -> Result<(), Breach> {
+        self.deliver();
+        let now = self.now();
+        let mut said = Vec::new();
+        for i in 0..self.drones.len() {
+            let Some(leading) = self.drones[i].as_mut().filter(|_| !self.frozen[i]) else { continue };
+            self.own[i].tick = self.tick;
+            let own = self.own[i];
+            for (id, shape) in &self.scenery {
+                if (shape.centre() - own.position).norm() <= self.range_m {
+                    leading.sense(now, *id, *shape);
+                }
+            }
+            let mut say = Vec::new();
+            step(leading, now, &own, DroneId(i as u32), &mut say);
+            if let Some(watch) = &mut self.watch {
+                watch.see(DroneId(i as u32), self.incarnations[i], leading)?;
+            }
+            said.extend(say.into_iter().map(|message| (i, message)));
+        }
+        for (from, message) in said {
+            self.send(from, message);
+        }
+        for own in &mut self.own {
+            own.position += own.velocity * self.periods.dt_s;
+        }
+        self.tick += 1;
+        Ok(())
+    }
+
+    fn deliver(&mut self) {
+        let later = self.posts.split_off(&(self.tick + 1, 0, 0, 0));
+        let (now, mut answers) = (self.now(), Vec::new());
+        for ((_, from, _, to), message) in std::mem::replace(&mut self.posts, later) {
+            if self.sides[from] != self.sides[to] || self.frozen[to] {
+                continue;
+            }
+            let Some(leading) = &mut self.drones[to] else { continue };
+            let mut say = Vec::new();
+            leading.hear(now, DroneId(from as u32), &message, &mut say);
+            answers.extend(say.into_iter().map(|message| (to, message)));
+        }
+        for (from, message) in answers {
+            self.send(from, message);
+        }
+    }
+
+    /// Goes on for so long, s.
+    pub fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds / self.periods.dt_s).round() as u64 {
+            self.step().unwrap();
+        }
+    }
+
+    /// Goes on until `done` holds; after how long it did, s, or what is wrong if not within `limit_s`.
+    pub fn until(&mut self, limit_s: f64, wrong: impl Fn(&Self) -> Option<String>) -> Result<f64, String> {
+        let start = self.tick;
+        loop {
+            let passed_s = (self.tick - start) as f64 * self.periods.dt_s;
+            match wrong(self) {
+                None => return Ok(passed_s),
+                Some(what) if passed_s >= limit_s => return Err(format!("after {passed_s} s: {what}")),
+                Some(_) => self.step().map_err(|breach| format!("{breach:?}"))?,
+            }
+        }
+    }
+
+    /// The living and waking drones of one side.
+    pub fn side(&self, side: u8) -> Vec<(DroneId, &Leading)> {
+        let of_side = |&i: &usize| self.sides[i] == side && !self.frozen[i];
+        let living = |i: usize| self.drones[i].as_ref().map(|leading| (DroneId(i as u32), leading));
+        (0..self.drones.len()).filter(of_side).filter_map(living).collect()
+    }
+
+    /// What keeps the drones of a side from being one.
+    pub fn disunion(&self, side: u8) -> Option<String> {
+        disunion(&self.side(side))
+    }
+
+    /// Who leads a living drone, and in which term.
+    pub fn term(&self, drone: usize) -> Option<Ballot> {
+        self.drones[drone].as_ref().map(|leading| leading.election.obeyed())
+    }
+}

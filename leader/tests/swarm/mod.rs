@@ -1,0 +1,188 @@
+//! Machines as the pilot runs them, and what must always hold between them. Shared by the tests of leadership.
+#![allow(dead_code, reason = "each test uses a part of it")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+pub mod air;
+
+use skein_leader::election::ElectionParams;
+use skein_leader::leading::{Leading, LeadingParams, Own};
+use skein_leader::planner::{Destination, PlannerParams, Strategy};
+use skein_leader::routes::RouteParams;
+use skein_leader::slots::Reformation;
+use skein_protocol::digest::Digest;
+use skein_protocol::formation::Shape;
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use std::collections::BTreeMap;
+
+/// Nominal speed, m/s.
+pub const SPEED_MPS: f64 = 10.0;
+
+/// Periods and time-outs of a swarm, s.
+#[derive(Clone, Copy, Debug)]
+pub struct Periods {
+    pub dt_s: f64,
+    pub beacon_s: f64,
+    pub heartbeat_s: f64,
+    pub repeat_s: f64,
+    pub wait_s: f64,
+    pub leader_timeout_s: f64,
+    pub peer_timeout_s: f64,
+    pub debounce_s: f64,
+}
+
+/// Those that a scenario has by default.
+pub const DEFAULT: Periods = Periods {
+    dt_s: 0.02,
+    beacon_s: 0.1,
+    heartbeat_s: 0.2,
+    repeat_s: 0.2,
+    wait_s: 0.2,
+    leader_timeout_s: 1.0,
+    peer_timeout_s: 1.5,
+    debounce_s: 0.1,
+};
+
+/// What the machine of drone `me` is told when it starts.
+pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTime) -> LeadingParams {
+    LeadingParams {
+        me: DroneId(me),
+        drones,
+        incarnation,
+        start,
+        dt_s: p.dt_s,
+        election: ElectionParams {
+            heartbeat_period_s: p.heartbeat_s,
+            leader_timeout_s: p.leader_timeout_s,
+            wait_s: p.wait_s,
+        },
+        planner: PlannerParams {
+            strategy: Strategy::CongestionAware,
+            speed_mps: SPEED_MPS,
+            headway_s: 4.0,
+            routes: RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 },
+            shape: Shape::V,
+            spacing_m: 40.0,
+            reformation: Reformation::Optimal,
+            arrival_error_m: 2.0,
+            safe_distance_m: 20.0,
+            course_y_m: 0.0,
+            destination: Destination::Hold { stop_x_m: f64::INFINITY },
+            debounce_s: p.debounce_s,
+        },
+        beacon_period_s: p.beacon_s,
+        repeat_period_s: p.repeat_s,
+        peer_timeout_s: p.peer_timeout_s,
+    }
+}
+
+/// A wall across the course line at `x_m`, with a way past it on either side.
+pub fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
+    let shape = ConvexShape::rectangle(Vec2::new(x_m, 0.0), Vec2::new(5.0, 50.0), 0.0).unwrap();
+    (ObstacleId(id), shape)
+}
+
+/// What a drone does in a tick after it has heard: the order of the pilot.
+pub fn step(leading: &mut Leading, now: SimTime, own: &Own, me: DroneId, say: &mut Vec<Message>) {
+    leading.elect(now, own, say);
+    if leading.election.leads() {
+        leading.muster(now, own);
+        let mut orders = leading.decide(now, &[], say);
+        if !orders.is_empty() {
+            leading.adopt(now, orders.swap_remove(0));
+        }
+    }
+    for set in leading.ledger.sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m()) {
+        leading.obstacles.note_passed(me, &set.ids);
+    }
+    leading.speak(now, own, &Default::default(), say);
+}
+
+/// What must never happen.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Breach {
+    /// Two drones know, or obey, different things under one (ballot, epoch).
+    TwoPlans { drone: DroneId, of: DroneId, stamp: PlanStamp },
+    /// What a drone obeys went back within an incarnation.
+    WentBack { drone: DroneId, from: (Ballot, PlanStamp), to: (Ballot, PlanStamp) },
+    /// Two drones lead under one ballot, or one under another's.
+    TwoLeaders { drone: DroneId, other: DroneId, ballot: Ballot },
+    /// A plan of a later term is obeyed than the term itself.
+    NotOfTheTerm { drone: DroneId, term: Ballot, stamp: PlanStamp },
+}
+
+/// What must always hold, and what was seen so far.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Watch {
+    /// Hash of each drone's part in each plan; under [`DroneId::NONE`] the plan's own.
+    parts: BTreeMap<(PlanStamp, DroneId), u64>,
+    /// Who led under which ballot.
+    pub leaders: BTreeMap<Ballot, DroneId>,
+    /// What each incarnation of each drone obeyed last.
+    obeyed: BTreeMap<(DroneId, u32), (Ballot, PlanStamp)>,
+}
+
+impl Watch {
+    /// Looks at a drone.
+    pub fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
+        let (term, stamp) = (leading.election.obeyed(), leading.ledger.stamp());
+        let (from, to) = (self.obeyed.insert((drone, incarnation), (term, stamp)).unwrap_or_default(), (term, stamp));
+        if from.0 > to.0 || from.1 > to.1 {
+            return Err(Breach::WentBack { drone, from, to });
+        }
+        if leading.election.leads() {
+            let first = *self.leaders.entry(term).or_insert(drone);
+            if let Some(&other) = [first, term.claimant].iter().find(|&&other| other != drone) {
+                return Err(Breach::TwoLeaders { drone, other, ballot: term });
+            }
+        }
+        if stamp.ballot > term {
+            return Err(Breach::NotOfTheTerm { drone, term, stamp });
+        }
+        let Some(orders) = leading.ledger.obeyed() else { return Ok(()) };
+        let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&orders.plan)));
+        let parts = orders.parts.iter().map(|(&of, part)| (of, hash(bytemuck::bytes_of(part))));
+        for (of, value) in std::iter::once(plan).chain(parts) {
+            if *self.parts.entry((stamp, of)).or_insert(value) != value {
+                return Err(Breach::TwoPlans { drone, of, stamp });
+            }
+        }
+        Ok(())
+    }
+}
+
+pub fn hash(bytes: &[u8]) -> u64 {
+    let mut digest = Digest::default();
+    digest.bytes(bytes);
+    digest.value()
+}
+
+/// What is wrong among drones that hear each other, by id: each is to obey the highest term for its group that one of
+/// them leads.
+pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
+    let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.election.leads()).collect();
+    for (id, leading) in drones {
+        let group = leading.election.group();
+        let mine = leaders.iter().filter(|(_, l)| l.election.scope().contains(group));
+        let highest = mine.map(|(_, l)| l.election.obeyed()).max();
+        if highest != Some(leading.election.obeyed()) {
+            return Some(format!("{id} of {group} obeys {:?}, the highest is {highest:?}", leading.election.obeyed()));
+        }
+    }
+    None
+}
+
+/// What is wrong with drones that hear each other and have nothing ahead: one is to lead, and all to obey one plan for
+/// all of them.
+pub fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
+    if let Some(discord) = discord(drones) {
+        return Some(discord);
+    }
+    let terms = |(id, l): &(DroneId, &Leading)| (*id, l.election.obeyed(), l.election.scope(), l.ledger.stamp());
+    let all: Vec<_> = drones.iter().map(terms).collect();
+    let (_, ballot, _, stamp) = *all.first()?;
+    let one = all.iter().all(|(_, other, _, plan)| (*other, *plan) == (ballot, stamp));
+    let members = drones[0].1.ledger.obeyed().map_or(0, |orders| orders.plan.members as usize);
+    (!one || members != drones.len() || stamp.ballot != ballot)
+        .then(|| format!("{} drones, a plan for {members}, terms {all:?}", drones.len()))
+}

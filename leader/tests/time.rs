@@ -1,0 +1,110 @@
+//! Leadership in simulated time, over a lossy and slow air: nobody healthy is deposed, the dead are replaced, and what
+//! was apart becomes one.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod swarm;
+
+use skein_protocol::{Ballot, DroneId};
+use std::collections::BTreeSet;
+use swarm::air::{Air, Swarm};
+use swarm::{DEFAULT, Periods};
+
+/// Terms that began after the swarm had settled.
+fn false_elections(air: Air, settle_s: f64, seconds: f64) -> Vec<(Ballot, DroneId)> {
+    let mut swarm = Swarm::new(DEFAULT, air, 8);
+    swarm.run(settle_s);
+    let settled: BTreeSet<Ballot> = swarm.watch.as_ref().unwrap().leaders.keys().copied().collect();
+    swarm.run(seconds);
+    assert_eq!(swarm.disunion(0), None);
+    swarm.watch.unwrap().leaders.into_iter().filter(|(ballot, _)| !settled.contains(ballot)).collect()
+}
+
+#[test]
+fn no_false_election_in_an_hour_at_10_percent_loss_and_100_ms() {
+    let air = Air { seed: 1, loss: 0.1, delay_s: 0.1, jitter_s: 0.05 };
+    assert_eq!(false_elections(air, 5.0, 3600.0), []);
+}
+
+#[test]
+fn no_false_election_in_ten_minutes_at_50_percent_loss_and_1_s() {
+    for seed in 0..4 {
+        let air = Air { seed, loss: 0.5, delay_s: 1.0, jitter_s: 0.0 };
+        assert_eq!(false_elections(air, 20.0, 600.0), [], "seed {seed}");
+    }
+}
+
+#[test]
+fn sides_of_a_partition_lead_themselves_and_become_one_within_a_second() {
+    for seed in 0..20 {
+        let mut swarm = Swarm::new(DEFAULT, Air { seed, ..Air::default() }, 8);
+        swarm.run(3.0 + 0.1 * seed as f64);
+        swarm.sides = vec![0, 0, 0, 0, 1, 1, 1, 1];
+        for side in 0..2 {
+            swarm.clone().until(5.0, |s| s.disunion(side)).unwrap();
+        }
+        swarm.run(8.0);
+        swarm.sides = vec![0; 8];
+        let leads = |s: &Swarm| {
+            let leaders: Vec<_> = s.side(0).iter().filter(|(_, l)| l.election.leads()).map(|(id, _)| *id).collect();
+            let terms: BTreeSet<_> = (0..8).map(|i| s.term(i)).collect();
+            (leaders.len() != 1 || terms.len() != 1).then(|| format!("{leaders:?} lead, {terms:?} are obeyed"))
+        };
+        swarm.until(1.0, leads).unwrap();
+        swarm.until(1.0, |s| s.disunion(0)).unwrap();
+    }
+}
+
+/// Seconds from the death of the leader, at 40 moments, until all others follow another one; ascending.
+fn failovers(periods: Periods, air: Air) -> Vec<f64> {
+    let mut times: Vec<f64> = (0..40)
+        .map(|i| {
+            let mut swarm = Swarm::new(periods, Air { seed: i, ..air }, 8);
+            swarm.run(6.0 + periods.dt_s * i as f64);
+            let old = swarm.term(7).unwrap();
+            swarm.kill(old.claimant.index());
+            let follows = |s: &Swarm| {
+                let terms: BTreeSet<_> = s.side(0).iter().map(|(_, l)| l.election.obeyed()).collect();
+                let one = terms.len() == 1 && terms.iter().all(|t| *t != old && s.drones[t.claimant.index()].is_some());
+                (!one).then(|| format!("{terms:?}"))
+            };
+            swarm.until(20.0, follows).unwrap()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times
+}
+
+#[test]
+fn a_dead_leader_is_replaced() {
+    let fast = Periods { heartbeat_s: 0.02, leader_timeout_s: 0.06, wait_s: 0.02, ..DEFAULT };
+    for (name, periods, loss, limit_s) in
+        [("default", DEFAULT, 0.0, 2.0), ("50 Hz", fast, 0.0, 0.25), ("50 Hz", fast, 0.5, 1.0)]
+    {
+        let times = failovers(periods, Air { loss, ..Air::default() });
+        println!("{name}, loss {loss}: p50 {:.2} s, worst {:.2} s", times[times.len() / 2], times[times.len() - 1]);
+        assert!(times[times.len() - 1] <= limit_s, "{times:?}");
+    }
+}
+
+#[test]
+fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
+    for loss in [0.0, 0.3] {
+        let mut swarm = Swarm::new(DEFAULT, Air { seed: 5, loss, ..Air::default() }, 8);
+        swarm.run(3.0);
+        let old = swarm.term(0).unwrap();
+        assert_eq!(old.claimant, DroneId(0));
+        swarm.own[0].velocity.x = 4.0;
+        let mut handed_over_s = None;
+        for _ in 0..(120.0 / DEFAULT.dt_s) as u64 {
+            swarm.step().unwrap();
+            let leaders = swarm.side(0).iter().filter(|(_, l)| l.election.leads()).count();
+            assert!(leaders >= 1, "nobody leads in {:?}", swarm.now());
+            handed_over_s = handed_over_s.or((swarm.term(0) != Some(old)).then(|| swarm.now().secs()));
+        }
+        assert_eq!(swarm.disunion(0), None);
+        let terms: Vec<_> = swarm.watch.unwrap().leaders.into_keys().filter(|&term| term > old).collect();
+        assert_eq!(terms.iter().map(|term| term.claimant).collect::<Vec<_>>(), [DroneId(1)], "loss {loss}");
+        // Last after 280 m at 6 m/s, and 3 s of patience.
+        assert!(handed_over_s.is_some_and(|t| (51.0..56.0).contains(&t)), "{handed_over_s:?}");
+    }
+}
