@@ -35,7 +35,7 @@ unsafe impl ZeroCopySend for DownWord {
 // SAFETY: an integer, self-contained and of one layout.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
-        "skein.record.v1"
+        "skein.record.v2"
     }
 }
 

@@ -68,10 +68,11 @@ impl Process {
             flags: alive * flags,
             phase: slot.phase,
             heard: alive * slot.heard,
+            dropped: slot.dropped.map(|count| alive * count),
             step_ns: alive * slot.step_ns,
             route: slot.route,
             rank: slot.rank,
-            reserved: 0,
+            reserved: Default::default(),
         }
     }
 }

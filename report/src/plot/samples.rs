@@ -3,6 +3,8 @@
 use super::curves::Band;
 use crate::close::Sweep;
 use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::formation;
 use crate::trace::{self, TraceRow};
 use skein_protocol::Vec2;
 use std::collections::BTreeMap;
@@ -12,6 +14,8 @@ use std::path::Path;
 const EVERY_S: f64 = 0.1;
 /// Most points of all tracks together: a plot of a thousand drones must still open.
 const MAX_POINTS: usize = 60_000;
+/// The slot error is drawn for no more drones: the best assignment takes their number to the third.
+const FORMATION_MAX: usize = 100;
 
 /// What the plots show.
 #[derive(Default)]
@@ -22,6 +26,10 @@ pub(super) struct Samples {
     pub speed: Vec<Band>,
     /// Of the distances of all pairs, m.
     pub distance: Vec<Band>,
+    /// Of what the drones have used, J.
+    pub energy: Vec<Band>,
+    /// Time, and the largest slot error, m.
+    pub formation: Vec<(f64, f64)>,
     /// By drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
@@ -43,11 +51,11 @@ pub(super) struct Track {
 
 impl Samples {
     /// Reads trace.csv.
-    pub fn read(path: &Path) -> Result<Self, ReportError> {
+    pub fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
         let (mut samples, mut sweep, mut bin) = (Self::default(), Sweep::default(), None);
         trace::read(path, |rows| {
             let now = (rows[0].t_s / EVERY_S + 1e-6).floor() as i64;
-            samples.take(rows, bin.replace(now) != Some(now), &mut sweep);
+            samples.take(rows, bin.replace(now) != Some(now), &mut sweep, facts);
         })?;
         for track in samples.tracks.values_mut() {
             track.points.push(track.last_m);
@@ -56,7 +64,7 @@ impl Samples {
         Ok(samples)
     }
 
-    fn take(&mut self, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
+    fn take(&mut self, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep, facts: &RunFacts) {
         let t_s = rows[0].t_s;
         self.end_s = t_s;
         let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
@@ -80,6 +88,10 @@ impl Samples {
             let pair = |i: usize| positions[..i].iter().map(move |other| (i, other));
             let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
             self.distance.extend(band(t_s, distances));
+            self.energy.extend(band(t_s, rows.iter().map(|row| row.energy_j)));
+            if rows.len() <= FORMATION_MAX {
+                self.formation.extend(formation::error(facts, &positions).map(|error| (t_s, error.largest_m)));
+            }
         }
     }
 
@@ -112,6 +124,7 @@ fn band(t_s: f64, values: impl Iterator<Item = f64>) -> Option<Band> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::facts;
 
     #[test]
     fn a_dip_between_samples_is_kept_and_tracks_end_where_they_end() {
@@ -129,7 +142,7 @@ mod tests {
             }
         }
         std::fs::write(&path, csv).unwrap();
-        let samples = Samples::read(&path).unwrap();
+        let samples = Samples::read(&path, &facts(8)).unwrap();
         let least: Vec<f64> = samples.separation.iter().map(|&(_, m)| m).collect();
         assert_eq!(least, [40.0, 30.0]);
         let (mean, deviation) = (samples.speed[0].mean, samples.speed[0].deviation);

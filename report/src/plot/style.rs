@@ -121,7 +121,7 @@ pub(super) enum Sign {
 }
 
 /// Text of a size in pixels, in ink.
-fn text(size: u32) -> TextStyle<'static> {
+pub(super) fn text(size: u32) -> TextStyle<'static> {
     TextStyle::from((FONT, px(size)).into_font()).color(&INK).pos(Pos::new(HPos::Left, VPos::Center))
 }
 
