@@ -1,6 +1,7 @@
 //! The flight as an animated SVG, for a page that shows pictures and runs no script.
 
 use super::samples::{Samples, Track};
+use super::style::px;
 use super::sweep::escaped;
 use super::tracks::{colours, frame, outline};
 use crate::facts::RunFacts;
@@ -26,7 +27,9 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
     if samples.tracks.is_empty() || samples.tracks.len() > MOST {
         return None;
     }
-    let (low, high, height) = frame(samples, facts, WIDTH);
+    let fine = f64::from(px(1));
+    let (low, high, height) = frame(samples, facts, WIDTH * fine);
+    let height = height / fine;
     let scale = WIDTH / (high.x - low.x);
     let place = |at: Vec2| [(at.x - low.x) * scale, TITLE + (high.y - at.y) * scale];
     let size = format!("{WIDTH:.0} {:.0}", height + TITLE);

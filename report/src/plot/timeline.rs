@@ -61,14 +61,11 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
     groups.dedup();
     let title = format!("Leadership: {}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
     let faults: Vec<f64> = events.iter().filter(|e| matches!(e.what, Happening::Fault { .. })).map(|e| e.t_s).collect();
-    let mut signs = vec![(Sign::Block(PALETTE[0]), "leads; the leader's number in the bar".to_owned())];
+    let mut signs = vec![(Sign::Block(PALETTE[0]), "leads the group; the leader's number in the bar".to_owned())];
     signs.extend((!faults.is_empty()).then(|| (Sign::Line(RED), "fault".to_owned())));
     let rows = groups.len() as f64;
-    let axes = Axes {
-        x: ("time (s)", 0.0..end_s.max(1e-3)),
-        y: ("group", 0.0..rows),
-        height: ROW * groups.len().max(2) as u32,
-    };
+    let axes =
+        Axes { x: ("time (s)", 0.0..end_s.max(1e-3)), y: ("", 0.0..rows), height: ROW * groups.len().max(2) as u32 };
     plot(&Heading::new(&title, signs), axes, |canvas, chart| {
         for at in &faults {
             let line = [(*at, 0.0), (*at, rows)];
@@ -86,7 +83,7 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
         }
         for (row, group) in groups.iter().rev().enumerate() {
             let (x, y) = chart.backend_coord(&(0.0, row as f64 + 0.5));
-            let label = Text::new((*group).to_owned(), (x - px(40) as i32, y), text(13));
+            let label = Text::new((*group).to_owned(), (x - px(50) as i32, y), text(13));
             canvas.draw(&label).map_err(words)?;
         }
         Ok(())
