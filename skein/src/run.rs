@@ -41,13 +41,13 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
     let reporting = Instant::now();
-    if !args.no_record {
-        page::write(&folder, &manifest, &summary).map_err(Failure::environment)?;
-    }
+    // A report that cannot be written does not cost the summary.
+    let reported = if args.no_record { Ok(Vec::new()) } else { page::write(&folder, &manifest, &summary) };
     summary.report_s = Some(reporting.elapsed().as_secs_f64());
     folder.write_summary(&summary).map_err(Failure::environment)?;
     print(args, &summary, &folder);
-    let trouble = end.failure.clone().or(end.sink_error.clone()).or(recorded.err().map(|error| error.to_string()));
+    let files = recorded.and(reported.map(|_| ())).err().map(|error| error.to_string());
+    let trouble = end.failure.clone().or(end.sink_error.clone()).or(files);
     if let Some(trouble) = &trouble {
         eprintln!("skein: {trouble}");
     }

@@ -58,7 +58,7 @@ pub(super) fn still(facts: &RunFacts) -> SceneUpdate {
 
 /// A colour for each group, in the order in which groups appear.
 #[derive(Default)]
-pub(super) struct Colours(BTreeMap<String, usize>);
+struct Colours(BTreeMap<String, usize>);
 
 impl Colours {
     fn of(&mut self, group: &str) -> (u8, u8, u8) {
@@ -72,11 +72,37 @@ impl Colours {
     }
 }
 
-/// Drones, danger zones, slots and radio links.
-pub(super) fn moving(facts: &RunFacts, sample: &Sample, at: Time, colours: &mut Colours) -> SceneUpdate {
+/// Danger zones, slots and radio links.
+pub(super) fn moving(facts: &RunFacts, sample: &Sample, at: Time) -> SceneUpdate {
     let state = &sample.state;
-    let entities = vec![drones(state, at, colours), zones(facts, state, at), slots(state, at), links(sample, at)];
-    SceneUpdate { deletions: Vec::new(), entities }
+    SceneUpdate { deletions: Vec::new(), entities: vec![zones(facts, state, at), slots(state, at), links(sample, at)] }
+}
+
+/// What a drone looks like: its group, what it leads, whether it lives.
+type Look = (String, Option<String>, u8);
+
+/// The drones' looks. Each drone is an entity in its own frame, so that `/tf` moves it, and is told anew only when it
+/// looks different.
+#[derive(Default)]
+pub(super) struct Drones {
+    looks: Vec<Option<Look>>,
+    colours: Colours,
+}
+
+impl Drones {
+    /// The drones that look different from before; `None` if none does.
+    pub fn changed(&mut self, state: &State, at: Time) -> Option<SceneUpdate> {
+        self.looks.resize(state.x_m.len(), None);
+        let mut entities = Vec::new();
+        for (drone, known) in self.looks.iter_mut().enumerate() {
+            let look = (&state.group[drone], &state.leads[drone], state.alive[drone]);
+            if known.as_ref().is_none_or(|known| (&known.0, &known.1, known.2) != look) {
+                *known = Some((look.0.clone(), look.1.clone(), look.2));
+                entities.push(dart(state, drone, at, &mut self.colours));
+            }
+        }
+        (!entities.is_empty()).then(|| SceneUpdate { deletions: Vec::new(), entities })
+    }
 }
 
 /// Where a drone is.
@@ -88,32 +114,30 @@ fn living(state: &State) -> impl Iterator<Item = usize> + '_ {
     (0..state.x_m.len()).filter(|&drone| state.alive[drone] == 1)
 }
 
-fn drones(state: &State, at: Time, colours: &mut Colours) -> SceneEntity {
-    let mut entity = SceneEntity::new("drones", at);
-    for drone in 0..state.x_m.len() {
-        let ([x, y], alive) = (place(state, drone), state.alive[drone] == 1);
-        let shade = if alive { colours.of(&state.group[drone]) } else { GREY };
-        let yaw = state.vy_mps[drone].atan2(state.vx_mps[drone]);
-        let (length, width) = DRONE_M;
-        entity.arrows.push(ArrowPrimitive {
-            pose: Pose::new(x, y, ALTITUDE_M, yaw),
-            shaft_length: length / 2.0,
-            shaft_diameter: width / 2.0,
-            head_length: length / 2.0,
-            head_diameter: width,
-            color: colour(shade, 1.0),
-        });
-        let led = state.leads[drone].as_ref().map_or(String::new(), |group| format!(" leads {group}"));
-        let text = if alive { format!("{drone}{led}") } else { format!("{drone} dead") };
-        entity.texts.push(TextPrimitive {
-            pose: Pose::new(x, fine(y + 5.0), ALTITUDE_M, 0.0),
-            billboard: true,
-            font_size: 12.0,
-            scale_invariant: true,
-            color: colour(shade, 1.0),
-            text,
-        });
-    }
+fn dart(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneEntity {
+    let alive = state.alive[drone] == 1;
+    let shade = if alive { colours.of(&state.group[drone]) } else { GREY };
+    let mut entity = SceneEntity::new(&format!("drone {drone}"), at);
+    entity.frame_id = format!("drone_{drone}");
+    entity.frame_locked = true;
+    let (length, width) = DRONE_M;
+    entity.arrows.push(ArrowPrimitive {
+        pose: Pose::new(0.0, 0.0, ALTITUDE_M, 0.0),
+        shaft_length: length / 2.0,
+        shaft_diameter: width / 2.0,
+        head_length: length / 2.0,
+        head_diameter: width,
+        color: colour(shade, 1.0),
+    });
+    let led = state.leads[drone].as_ref().map_or(String::new(), |group| format!(" leads {group}"));
+    entity.texts.push(TextPrimitive {
+        pose: Pose::new(0.0, 5.0, ALTITUDE_M, 0.0),
+        billboard: true,
+        font_size: 12.0,
+        scale_invariant: true,
+        color: colour(shade, 1.0),
+        text: if alive { format!("{drone}{led}") } else { format!("{drone} dead") },
+    });
     entity
 }
 

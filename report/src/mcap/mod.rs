@@ -2,8 +2,9 @@
 //!
 //! | topic | schema | when |
 //! |---|---|---|
-//! | `/tf`, `/drones` | `foxglove.FrameTransforms`, `foxglove.PosesInFrame` | every sample |
-//! | `/scene` | `foxglove.SceneUpdate`: obstacles, hulls, routes; then drones, danger zones, slots, radio links | once; every second sample |
+//! | `/tf` | `foxglove.FrameTransforms`: a frame `drone_3` for each drone, in the frame `world` | every sample |
+//! | `/drones` | `foxglove.PosesInFrame` | every fifth sample |
+//! | `/scene` | `foxglove.SceneUpdate`: obstacles, hulls, routes; drones; danger zones, slots, radio links | once; when they change; every fifth sample |
 //! | `/log` | `foxglove.Log` | every event |
 //! | `/skein/state`, `/skein/energy`, `/skein/radio` | `skein.State`, … : JSON, see [`Sample`] | every sample |
 //! | `/skein/groups`, `/skein/leadership`, `/skein/events` | `skein.Event`: a line of events.jsonl | every event |
@@ -22,7 +23,7 @@ use crate::facts::RunFacts;
 use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, fine, words};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
-use draw::Colours;
+use draw::Drones;
 use foxglove::{FrameTransform, FrameTransforms, Log, Pose, PosesInFrame, SceneUpdate, Time, Vector3, WORLD};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -43,8 +44,10 @@ pub(crate) const FILE: &str = "run.mcap";
 const RATE_HZ: f64 = 10.0;
 /// In a swarm of more drones than this, samples are as much rarer as it is larger.
 const RATE_DRONES: f64 = 100.0;
-/// Samples between two pictures of what moves.
-const SCENE_EVERY: u64 = 2;
+/// Samples between two pictures of what `/tf` does not move.
+const SCENE_EVERY: u64 = 5;
+/// Of zstd: a run must not wait for its recording.
+const LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
 const CHUNK: u64 = 1 << 20;
 const TOPICS: [&str; 10] = [
@@ -87,7 +90,7 @@ pub(crate) struct McapWriter {
     /// Ticks from one sample to the next.
     every: u64,
     samples: u64,
-    colours: Colours,
+    drones: Drones,
     json: Vec<u8>,
 }
 
@@ -103,7 +106,11 @@ impl McapWriter {
         let path = folder.join(FILE);
         let file = File::create(&path).map_err(ReportError::io(&path))?;
         // One thread, so that the bytes do not depend on the number of cores.
-        let options = WriteOptions::new().profile("skein").chunk_size(Some(CHUNK)).compression_threads(0);
+        let options = WriteOptions::new()
+            .profile("skein")
+            .chunk_size(Some(CHUNK))
+            .compression_level(LEVEL)
+            .compression_threads(0);
         let out = options.create(BufWriter::with_capacity(1 << 18, file)).map_err(ReportError::recording(&path))?;
         let mut writer = Self {
             out,
@@ -111,7 +118,7 @@ impl McapWriter {
             sequences: vec![0; TOPICS.len()],
             every: stride(facts),
             samples: 0,
-            colours: Colours::default(),
+            drones: Drones::default(),
             json: Vec::new(),
             observer: Observer::new(facts.clone()),
             facts: facts.clone(),
@@ -166,14 +173,16 @@ impl McapWriter {
     fn sample(&mut self, sample: &Sample, now: SimTime) -> McapResult<()> {
         let (at, state) = (Time::from(now), &sample.state);
         self.put(To::Transforms, now, &transforms(state, at))?;
-        self.put(To::Drones, now, &poses(state, at))?;
         self.put(To::State, now, state)?;
         self.put(To::Energy, now, &sample.energy)?;
         self.put(To::Radio, now, &sample.radio)?;
         self.samples += 1;
+        if let Some(changed) = self.drones.changed(state, at) {
+            self.put(To::Scene, now, &changed)?;
+        }
         if self.samples % SCENE_EVERY == 1 {
-            let scene = draw::moving(&self.facts, sample, at, &mut self.colours);
-            self.put(To::Scene, now, &scene)?;
+            self.put(To::Drones, now, &poses(state, at))?;
+            self.put(To::Scene, now, &draw::moving(&self.facts, sample, at))?;
         }
         Ok(())
     }

@@ -67,7 +67,7 @@ fn any_reader_finds_topics_schemas_and_the_scenario() {
     assert_eq!((attachment.name.as_str(), &scenario["name"]), ("scenario.json", &serde_json::json!("s1")));
     let counts = &summary.stats.unwrap().channel_message_counts;
     let count = |to: To| counts.iter().find(|(id, _)| summary.channels[id].topic == TOPICS[to as usize]).unwrap().1;
-    assert_eq!((*count(To::State), *count(To::Scene), *count(To::Log), *count(To::Events)), (20, 11, 2, 2));
+    assert_eq!((*count(To::State), *count(To::Scene), *count(To::Log), *count(To::Events)), (20, 6, 2, 2));
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn what_is_shown_is_where_drones_are() {
     assert_eq!(transforms["transforms"][2]["translation"]["y"], 60.0);
     let (_, scene) = &last["/scene"];
     let ids: Vec<_> = scene["entities"].as_array().unwrap().iter().map(|entity| entity["id"].clone()).collect();
-    assert_eq!(ids, ["drones", "danger zones", "slots", "radio links"]);
+    assert_eq!(ids, ["danger zones", "slots", "radio links"]);
     assert_eq!(last["/log"].1["message"], "reached: there");
 }
 
@@ -105,4 +105,25 @@ fn a_recording_reads_back_even_cut_short() {
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
     assert_eq!(look().0.len(), 20);
+}
+
+#[test]
+fn a_drone_is_drawn_anew_only_when_it_looks_different() {
+    let state = |alive: u8| State {
+        x_m: vec![0.0; 2],
+        group: vec!["N".to_owned(), "N1".to_owned()],
+        leads: vec![None, Some("N1".to_owned())],
+        alive: vec![1, alive],
+        ..State::default()
+    };
+    let mut drones = Drones::default();
+    let mut changed = |alive| drones.changed(&state(alive), Time::default()).map(|update| update.entities);
+    let first = changed(1).unwrap();
+    assert_eq!(
+        (first.len(), first[1].frame_id.as_str(), first[1].texts[0].text.as_str()),
+        (2, "drone_1", "1 leads N1")
+    );
+    assert!(changed(1).is_none());
+    let dead = changed(0).unwrap();
+    assert_eq!((dead.len(), dead[0].texts[0].text.as_str()), (1, "1 dead"));
 }
