@@ -290,7 +290,8 @@ fn a_runs_folder_holds_what_was_promised() {
     let done = place.run(&["run", &paper("s2-right"), "--json"]);
     let (summary, folder) = (done.summary(), place.join("runs/s2-right-1"));
     let found = names(&folder);
-    for file in ["events.jsonl", "manifest.json", "plots", "processes.json", "summary.json", "trace.csv"] {
+    let promised = ["events.jsonl", "manifest.json", "plots", "processes.json", "report.html", "run.mcap"];
+    for file in promised.into_iter().chain(["summary.json", "trace.csv"]) {
         assert!(found.iter().any(|name| name == file), "no {file} in {found:?}");
     }
     assert!(names(folder.join("plots")).iter().any(|name| name.ends_with(".svg")));

@@ -32,7 +32,7 @@ pub use mission::WorldState;
 pub use orders::{Order, OrderKind};
 pub use payload::UplinkHeader;
 pub use ports::{
-    DownlinkPublisher, DownlinkSubscriber, RecordPolicy, RecordPublisher, RecordRole, RecordSubscriber,
-    UplinkPublisher, UplinkSubscriber,
+    DownlinkPublisher, DownlinkSubscriber, RecordPolicy, RecordPublisher, RecordSubscriber, UplinkPublisher,
+    UplinkSubscriber, WatchPublisher,
 };
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};

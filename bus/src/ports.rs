@@ -8,11 +8,12 @@
 
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame, Word};
+use crate::services::Factory;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{LoanError, ReceiveError, SendError};
-use iceoryx2::prelude::{ZeroCopySend, ipc};
+use iceoryx2::prelude::{PortFactory as _, ZeroCopySend, ipc};
 use iceoryx2::sample::Sample;
 use skein_protocol::Tick;
 use skein_protocol::frame::Frame;
@@ -25,24 +26,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 pub type DownlinkPublisher = StreamPublisher<DownWord>;
 /// What a drone hears the world by.
 pub type DownlinkSubscriber = StreamSubscriber<DownWord>;
-/// What the recorder hears the world by.
+/// What the recorder and observers hear the world by.
 pub type RecordSubscriber = StreamSubscriber<RecordWord>;
 
-/// What the world does when the recorder's buffer is full. An observer's full buffer always just loses the sample.
+/// What the world does when the recorder's buffer is full.
 pub enum RecordPolicy {
     /// Waits for the recorder as long as the function says that it lives: for lockstep.
     Wait(Box<dyn Fn() -> bool + Send>),
     /// Drops the sample and counts it, see [`RecordPublisher::dropped`]: for the wall clock.
     Drop,
-}
-
-/// Who subscribes to the record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RecordRole {
-    /// The run's recorder: the world may wait for it.
-    Recorder,
-    /// Anybody else: the world never waits for it.
-    Observer,
 }
 
 /// Set by the degradation handlers. Without them iceoryx2 loses samples with no error, at the latest when the limit of
@@ -317,5 +309,28 @@ impl RecordPublisher {
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
+    }
+}
+
+/// Sends the record to observers.
+#[derive(Debug)]
+pub struct WatchPublisher {
+    pub(crate) stream: StreamPublisher<RecordWord>,
+    pub(crate) service: Factory<RecordWord, StreamHeader>,
+}
+
+impl WatchPublisher {
+    /// Whether anybody watches; asked in every tick, so that a run nobody watches pays nothing.
+    #[must_use]
+    pub fn watched(&self) -> bool {
+        self.service.dynamic_config().number_of_subscribers() > 0
+    }
+
+    /// As [`StreamPublisher::send`]; never waits.
+    ///
+    /// # Errors
+    /// As [`StreamPublisher::send`].
+    pub fn send(&self, tick: Tick, byte_len: usize, fill: impl FnOnce(&mut [u8])) -> Result<usize, BusError> {
+        self.stream.send(tick, byte_len, fill)
     }
 }

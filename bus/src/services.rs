@@ -4,13 +4,13 @@ use crate::domain::Domain;
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame};
 use crate::ports::{
-    DownlinkPublisher, DownlinkSubscriber, Health, Receiver, RecordPolicy, RecordPublisher, RecordRole,
-    RecordSubscriber, Sender, StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber,
+    DownlinkPublisher, DownlinkSubscriber, Health, Receiver, RecordPolicy, RecordPublisher, RecordSubscriber, Sender,
+    StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber, WatchPublisher,
 };
 use iceoryx2::port::{BackpressureAction, BackpressureInfo, DegradationAction};
 use iceoryx2::prelude::{
     AllocationStrategy, BackpressureStrategy, CallbackProgression, LogLevel, Node, NodeBuilder, NodeName, NodeState,
-    PortFactory as _, PortName, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
+    PortFactory as _, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
@@ -40,13 +40,14 @@ const HELD_CHUNKS: usize = 120;
 const UPLINK_FRAMES: usize = 16;
 /// Room for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
 const DOWNLINK_ROOM: usize = 448;
-/// The recorder's port name.
-const RECORDER: &str = "recorder";
+/// Observers at a time.
+const OBSERVERS: usize = 8;
 
 const DOWNLINK: &str = "skein/downlink";
 const RECORD: &str = "skein/record";
+const WATCH: &str = "skein/watch";
 
-type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
+pub(crate) type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
 
 /// Limits of one service.
 #[derive(Clone, Copy)]
@@ -73,6 +74,7 @@ struct Kept {
     _downlink: Factory<DownWord, StreamHeader>,
     _uplinks: Vec<Factory<WireFrame, UplinkHeader>>,
     _record: Factory<RecordWord, StreamHeader>,
+    _watch: Factory<RecordWord, StreamHeader>,
 }
 
 /// Number of uplink shards; drone i is on shard i / [`SHARD_DRONES`].
@@ -94,6 +96,7 @@ impl Services {
                 .map(|shard| create(&node, &uplink_name(shard), uplink_limits()))
                 .collect::<Result<_, _>>()?,
             _record: create(&node, RECORD, record_limits())?,
+            _watch: create(&node, WATCH, watch_limits())?,
         };
         Ok(Self { node, drones, _kept: Some(kept) })
     }
@@ -122,7 +125,7 @@ impl Services {
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
     pub fn downlink_subscriber(&self) -> Result<DownlinkSubscriber, BusError> {
-        Ok(StreamSubscriber(self.receiver(DOWNLINK, "")?))
+        Ok(StreamSubscriber(self.receiver(DOWNLINK)?))
     }
 
     /// A drone's.
@@ -140,7 +143,7 @@ impl Services {
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
     pub fn uplink_subscriber(&self, shard: usize) -> Result<UplinkSubscriber, BusError> {
-        Ok(UplinkSubscriber(self.receiver(&uplink_name(shard), "")?))
+        Ok(UplinkSubscriber(self.receiver(&uplink_name(shard))?))
     }
 
     /// The world's.
@@ -149,39 +152,40 @@ impl Services {
     /// [`BusError::Service`], [`BusError::Degraded`].
     pub fn record_publisher(&self, policy: RecordPolicy) -> Result<RecordPublisher, BusError> {
         let dropped = Arc::new(AtomicU64::new(0));
-        let room = (size_of::<RecordHead>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>();
-        let handler = self.record_handler(policy, Arc::clone(&dropped))?;
-        Ok(RecordPublisher { stream: StreamPublisher(self.sender(RECORD, room, handler)?), dropped })
+        let handler = record_handler(policy, Arc::clone(&dropped));
+        Ok(RecordPublisher { stream: StreamPublisher(self.sender(RECORD, self.record_room(), handler)?), dropped })
     }
 
-    /// The recorder's, or an observer's; a buffer of 64.
+    /// The recorder's: the launcher's, and nobody else's, since the world may wait for it. A buffer of 64.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
-    pub fn record_subscriber(&self, role: RecordRole) -> Result<RecordSubscriber, BusError> {
-        let name = if role == RecordRole::Recorder { RECORDER } else { "" };
-        Ok(StreamSubscriber(self.receiver(RECORD, name)?))
+    pub fn record_subscriber(&self) -> Result<RecordSubscriber, BusError> {
+        Ok(StreamSubscriber(self.receiver(RECORD)?))
     }
 
-    /// What happens when a subscriber's buffer is full: by the policy for the recorder, and observers just lose.
-    fn record_handler(
-        &self,
-        policy: RecordPolicy,
-        dropped: Arc<AtomicU64>,
-    ) -> Result<impl Fn(&BackpressureInfo) -> BackpressureAction + Send + use<>, BusError> {
-        let service: Factory<RecordWord, StreamHeader> = open(&self.node, RECORD)?;
-        Ok(move |info: &BackpressureInfo| {
-            if !is_recorder(&service, info.receiver_port_id) {
-                return BackpressureAction::DiscardData;
-            }
-            match &policy {
-                RecordPolicy::Wait(alive) if alive() => BackpressureAction::Retry,
-                _ => {
-                    dropped.fetch_add(1, Ordering::Relaxed);
-                    BackpressureAction::DiscardData
-                }
-            }
-        })
+    /// The world's, for observers.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], [`BusError::Degraded`].
+    pub fn watch_publisher(&self) -> Result<WatchPublisher, BusError> {
+        let service: Factory<RecordWord, StreamHeader> = open(&self.node, WATCH)?;
+        let stream = StreamPublisher(self.sender(WATCH, self.record_room(), |_| BackpressureAction::DiscardData)?);
+        Ok(WatchPublisher { stream, service })
+    }
+
+    /// An observer's: the record of each tick from now on. It never holds up the world: if its buffer of 64 is full it
+    /// loses the oldest.
+    ///
+    /// # Errors
+    /// [`BusError::Service`], also if there are eight observers already; [`BusError::Degraded`].
+    pub fn watch_subscriber(&self) -> Result<RecordSubscriber, BusError> {
+        Ok(StreamSubscriber(self.receiver(WATCH)?))
+    }
+
+    /// Words of a record without many frames.
+    fn record_room(&self) -> usize {
+        (size_of::<RecordHead>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>()
     }
 
     /// Opens a service and makes a publisher whose first segment has `room` elements a sample. `on_full` says what
@@ -214,7 +218,7 @@ impl Services {
     }
 
     /// Opens a service and makes a subscriber.
-    fn receiver<P, H>(&self, name: &str, port_name: &str) -> Result<Receiver<P, H>, BusError>
+    fn receiver<P, H>(&self, name: &str) -> Result<Receiver<P, H>, BusError>
     where
         P: ZeroCopySend + Debug + 'static,
         H: ZeroCopySend + Debug,
@@ -222,8 +226,7 @@ impl Services {
         let service: Factory<P, H> = open(&self.node, name)?;
         let health = Health::default();
         let degraded = health.clone();
-        let port_name = PortName::new(port_name).map_err(failed("name a subscriber of", name))?;
-        let builder = service.subscriber_builder().name(&port_name).set_degradation_handler(move |_, _| {
+        let builder = service.subscriber_builder().set_degradation_handler(move |_, _| {
             degraded.degrade();
             DegradationAction::DegradeAndFail
         });
@@ -259,9 +262,24 @@ fn uplink_limits() -> Limits {
     Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer: BUFFER, overflow: false }
 }
 
+/// A second subscriber is for a second launcher.
 fn record_limits() -> Limits {
-    let subscribers = 1 + SPARE;
-    Limits { publishers: 1 + 1, subscribers, nodes: subscribers + 3, buffer: RECORD_BUFFER, overflow: false }
+    Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer: RECORD_BUFFER, overflow: false }
+}
+
+fn watch_limits() -> Limits {
+    Limits { publishers: 1 + 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: RECORD_BUFFER, overflow: true }
+}
+
+/// What happens when the recorder's buffer is full.
+fn record_handler(policy: RecordPolicy, dropped: Arc<AtomicU64>) -> impl Fn(&BackpressureInfo) -> BackpressureAction {
+    move |_| match &policy {
+        RecordPolicy::Wait(alive) if alive() => BackpressureAction::Retry,
+        _ => {
+            dropped.fetch_add(1, Ordering::Relaxed);
+            BackpressureAction::DiscardData
+        }
+    }
 }
 
 fn builder<P, H>(node: &Node<ipc::Service>, name: &str) -> Result<Builder<[P], H, ipc::Service>, BusError>
@@ -296,15 +314,6 @@ where
     H: ZeroCopySend + Debug,
 {
     builder(node, name)?.open().map_err(failed("open the service", name))
-}
-
-fn is_recorder(service: &Factory<RecordWord, StreamHeader>, port: u128) -> bool {
-    let mut found = false;
-    service.dynamic_config().list_subscribers(|details| {
-        found |= details.subscriber_id.value() == port && details.subscriber_name.as_str() == RECORDER;
-        CallbackProgression::Continue
-    });
-    found
 }
 
 /// For `map_err` on what iceoryx2 refuses.

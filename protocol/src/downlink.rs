@@ -65,10 +65,7 @@ impl SenseHead {
     /// Why its radio cannot hear a frame at all, if it cannot.
     #[must_use]
     pub fn cut_off(&self, frame: &AirFrame) -> Option<DropReason> {
-        if self.cuts.deaf != 0 || frame.cuts.mute != 0 {
-            return Some(DropReason::Deaf);
-        }
-        self.cuts.sides.apart(frame.cuts.sides).then_some(DropReason::Partition)
+        self.cuts.cut_off(frame.cuts)
     }
 }
 

@@ -2,6 +2,8 @@
 
 use crate::frame::AirFrame;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
+use crate::radio::DROP_REASONS;
+use crate::sides::Cuts;
 use crate::time::{SimTime, Tick};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
@@ -61,14 +63,18 @@ pub struct DroneRow {
     pub phase: u32,
     /// Messages heard in this tick.
     pub heard: u32,
+    /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
+    pub dropped: [u32; DROP_REASONS],
+    /// What faults do to its radio.
+    pub cuts: Cuts,
     /// How long its step took, ns of wall time.
     pub step_ns: u32,
     /// Route, [`crate::payload::NO_ROUTE`] if none.
     pub route: u16,
     /// Place in the queue.
     pub rank: u16,
-    /// Always 0.
-    pub reserved: u32,
+    /// Always 0; keeps the row a multiple of eight bytes.
+    pub reserved: [u32; 1 + DROP_REASONS % 2],
 }
 
 impl DroneRow {
@@ -172,7 +178,7 @@ pub struct Totals {
     /// Messages heard for the second time, over all receivers.
     pub duplicates: u64,
     /// Not heard, by [`crate::radio::DropReason`] in its order.
-    pub dropped: [u64; crate::radio::DROP_REASONS],
+    pub dropped: [u64; DROP_REASONS],
     /// From sending to hearing.
     pub delay_s: Spread,
     /// Age of a peer's last known pose.

@@ -1,5 +1,6 @@
 //! Which side of each partition a drone is on, and whether its radio works: what cuts the air by script.
 
+use crate::radio::DropReason;
 use bytemuck::{Pod, Zeroable};
 
 /// Partitions that can be told apart.
@@ -45,6 +46,17 @@ pub struct Cuts {
     pub mute: u16,
     /// 1 if it hears nobody.
     pub deaf: u16,
+}
+
+impl Cuts {
+    /// Why a drone with this radio cannot hear a frame that was sent with `sender`'s, if it cannot.
+    #[must_use]
+    pub fn cut_off(self, sender: Self) -> Option<DropReason> {
+        if self.deaf != 0 || sender.mute != 0 {
+            return Some(DropReason::Deaf);
+        }
+        self.sides.apart(sender.sides).then_some(DropReason::Partition)
+    }
 }
 
 #[cfg(test)]

@@ -90,21 +90,19 @@ impl Accumulator {
         }
     }
 
-    /// Takes one record. True if its rows are of a new tick: the last record may repeat them.
-    pub fn take(&mut self, record: RecordView<'_>) -> Result<bool, String> {
+    /// Takes one record and its events. True if its rows are of a new tick: the last record may repeat them.
+    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<bool, String> {
         let tick = record.head.tick;
         let fresh = !record.rows.is_empty() && self.counts.tick.is_none_or(|last| tick > last);
         if fresh && record.rows.len() != self.facts.drones as usize {
             return Err(format!("tick {tick}: a record of {} rows, expected {}", record.rows.len(), self.facts.drones));
         }
-        let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line);
-        let events = record.parse_events(parse).map_err(|error| format!("tick {tick}: not an event: {error}"))?;
         self.counts.digest = Some(record.head.digest);
         self.counts.lost += u64::from(record.head.lost);
         if fresh {
             self.stages.hear(record.frames);
         }
-        events.into_iter().for_each(|event| self.event(event, record.rows));
+        events.iter().for_each(|event| self.event(event.clone(), record.rows));
         if fresh {
             self.counts.sent += record.frames.len() as u64;
             self.rows(tick, seconds(record.head.now), record.rows);

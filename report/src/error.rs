@@ -30,6 +30,14 @@ pub enum ReportError {
         /// What is there, and where.
         found: String,
     },
+    /// A recording cannot be written or read.
+    #[error("{path}: {source}")]
+    Recording {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: mcap::McapError,
+    },
     /// A plot cannot be drawn.
     #[error("{path}: cannot be drawn: {reason}")]
     Plot {
@@ -44,5 +52,10 @@ impl ReportError {
     /// For `map_err`: an I/O error at `path`.
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }
+    }
+    /// For `map_err`: an error with the recording at `path`.
+    pub(crate) fn recording(path: &Path) -> impl FnOnce(mcap::McapError) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self::Recording { path, source }
     }
 }

@@ -1,5 +1,6 @@
 //! What is known of a run before it starts, and the record stream does not carry.
 
+use crate::scene::SceneFacts;
 use serde::{Deserialize, Serialize};
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -45,6 +46,9 @@ pub struct RunFacts {
     /// The obstacles; an obstacle's id is its place.
     #[serde(with = "outlines")]
     pub obstacles: Vec<ConvexShape>,
+    /// What a picture of it shows beside the drones.
+    #[serde(default)]
+    pub scene: SceneFacts,
 }
 
 /// Where a mission ends.

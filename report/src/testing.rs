@@ -25,6 +25,7 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
         radio_range_m: None,
         landing_s: None,
         obstacles: Vec::new(),
+        scene: Default::default(),
     }
 }
 

@@ -17,7 +17,8 @@ pub fn summary(summary: &Summary, colour: bool) -> String {
     text
 }
 
-fn verdict(summary: &Summary, colour: bool) -> String {
+/// The outcome in a line.
+pub(crate) fn verdict(summary: &Summary, colour: bool) -> String {
     let (word, shade, why) = match summary.outcome {
         Outcome::Reached => ("reached", 32, "the formation is closed and every invariant held".to_owned()),
         Outcome::Timeout => ("timeout", 33, "the goal was not reached".to_owned()),
@@ -47,7 +48,8 @@ fn broken(summary: &Summary) -> String {
     often + &first.unwrap_or_default()
 }
 
-fn lines(summary: &Summary) -> Vec<(String, String)> {
+/// What comes after the verdict: labels and lines.
+pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     let mut lines = vec![("run".to_owned(), run(summary))];
     for (number, stage) in summary.stages.iter().enumerate() {
         lines.push((format!("stage {}", number + 1), passed(stage)));

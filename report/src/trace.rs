@@ -68,6 +68,7 @@ pub(crate) struct TraceRow {
     pub position_m: Vec2,
     pub velocity_mps: Vec2,
     pub group: String,
+    pub energy_j: f64,
 }
 
 /// Reads a trace tick by tick: the rows of one time are handed over together.
@@ -100,7 +101,8 @@ fn parse(line: &str) -> Option<TraceRow> {
     let (t_s, drone) = (number()?, number()?);
     let (position_m, velocity_mps) = (Vec2::new(number()?, number()?), Vec2::new(number()?, number()?));
     let group = fields.next()?.to_owned();
-    (fields.count() == 2).then_some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, group })
+    let energy_j = fields.nth(1)?.parse().ok()?;
+    (fields.count() == 0).then_some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, group, energy_j })
 }
 
 #[cfg(test)]

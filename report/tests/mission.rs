@@ -41,6 +41,7 @@ fn facts() -> RunFacts {
         radio_range_m: None,
         landing_s: None,
         obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
+        scene: Default::default(),
     }
 }
 
@@ -338,7 +339,7 @@ fn the_runs_folder_holds_trace_and_events() {
     let root = tempfile::tempdir().unwrap();
     let folder = RunFolder::numbered(root.path(), "disc").unwrap();
     folder.write_manifest(&Manifest::new(facts(), serde_json::json!({}), "0.1.0", None)).unwrap();
-    let mut recorder = Recorder::in_folder(facts(), &folder).unwrap();
+    let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
     fly(&mut recorder, 0..=LAST);
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
     let (summary, files) = recorder.finish(&ending());
@@ -362,7 +363,7 @@ fn files_that_cannot_be_written_do_not_cost_the_summary() {
     let root = tempfile::tempdir().unwrap();
     let folder = RunFolder::numbered(root.path(), "disc").unwrap();
     std::os::unix::fs::symlink("/dev/full", folder.path().join("trace.csv")).unwrap();
-    let mut recorder = Recorder::in_folder(facts(), &folder).unwrap();
+    let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
     fly(&mut recorder, 0..=LAST);
     let (summary, files) = recorder.finish(&ending());
     assert_eq!(summary.ticks, 100);

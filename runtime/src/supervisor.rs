@@ -6,8 +6,8 @@ use crate::drone_process::scenario_path;
 use crate::world_process::DISMISSED;
 use crate::{Clock, RunEnd, RuntimeError, mission};
 use skein_bus::{
-    Control, ControlSpec, Domain, Order, OrderKind, PinMode, RecordRole, RecordSubscriber, Services, WaitMode,
-    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
+    Control, ControlSpec, Domain, Order, OrderKind, PinMode, RecordSubscriber, Services, WaitMode, WorldState,
+    allowed_cores, clean_dead_nodes, raise_file_limit,
 };
 use skein_protocol::record::{RecordSink, RecordView};
 use skein_protocol::{DroneId, Tick};
@@ -69,7 +69,7 @@ pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, Runt
     };
     let control = Control::create(ControlSpec { drones, cores, wait: launch.wait })?;
     let services = Services::create(&domain, drones, "launcher")?;
-    let record = services.record_subscriber(RecordRole::Recorder)?;
+    let record = services.record_subscriber()?;
     let path = scenario_path(domain.path());
     let json = serde_json::to_vec(launch.scenario).map_err(|error| RuntimeError::Process(error.to_string()))?;
     std::fs::write(&path, json).map_err(RuntimeError::system(format!("writing {}", path.display())))?;

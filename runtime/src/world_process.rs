@@ -4,7 +4,7 @@ use crate::drone_process::ChildArgs;
 use crate::{Clock, RuntimeError, clock::Pacer, mission};
 use skein_bus::{
     Answer, Control, Domain, DownlinkPublisher, Order, OrderKind, Patience, RecordPolicy, RecordPublisher,
-    SHARD_DRONES, Services, UplinkSubscriber, WorldState, pin_to_core, raise_file_limit, shards,
+    SHARD_DRONES, Services, UplinkSubscriber, WatchPublisher, WorldState, pin_to_core, raise_file_limit, shards,
 };
 use skein_protocol::DroneId;
 use skein_protocol::record::{FaultKind, RecordHead, RecordView};
@@ -47,6 +47,7 @@ pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
         down: services.downlink_publisher()?,
         up: (0..shards(drones)).map(|shard| services.uplink_subscriber(shard)).collect::<Result<_, _>>()?,
         record: services.record_publisher(policy)?,
+        watch: services.watch_publisher()?,
         control,
         world: mission::world(&scenario)?,
         answers: vec![Answer::Pending; drones],
@@ -75,6 +76,7 @@ struct Air {
     down: DownlinkPublisher,
     up: Vec<UplinkSubscriber>,
     record: RecordPublisher,
+    watch: WatchPublisher,
     control: Arc<Control>,
     world: World,
     answers: Vec<Answer>,
@@ -231,12 +233,23 @@ impl Air {
     /// Sends the record of the tick that ended. One that a full recorder drops (wall clock only) is counted in the next
     /// that gets through, and its events go along with that.
     fn tell(&mut self) -> Result<(), RuntimeError> {
+        self.show()?;
         self.untold.extend_from_slice(self.world.record().events);
         if self.send_record()? {
             self.lost = 0;
             self.untold.clear();
         } else {
             self.lost += 1;
+        }
+        Ok(())
+    }
+
+    /// Shows the tick to observers, who have a service of their own: whether the recorder has got a record must not
+    /// depend on who else looks on.
+    fn show(&self) -> Result<(), RuntimeError> {
+        if self.watch.watched() {
+            let record = self.world.record();
+            self.watch.send(record.head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;
         }
         Ok(())
     }
@@ -253,6 +266,7 @@ impl Air {
 
     /// Sends the last record, which must get through. The launcher ends this process if it does not want it.
     fn tell_last(&mut self) -> Result<(), RuntimeError> {
+        self.show()?;
         self.untold.extend_from_slice(self.world.record().events);
         while !self.send_record()? {
             std::thread::sleep(DISMISSAL_LOOK);

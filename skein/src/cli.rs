@@ -38,8 +38,18 @@ pub enum Command {
     Reproduce(crate::reproduce::ReproduceArgs),
     /// Print the TOML of a random scene
     Scene(crate::sweep::SceneArgs),
-    /// Draw the plots of a recorded run and print its summary
+    /// Write report.html and the plots of a recorded run, and print its summary
     Report(ReportArgs),
+    /// Fly a recorded run again from its manifest and compare the digests
+    Replay(crate::replay::ReplayArgs),
+    /// Show a running swarm, or a recorded run, in the browser
+    View(crate::view::ViewArgs),
+    /// Watch the running swarms in the terminal
+    Top(crate::top::TopArgs),
+    /// Tap what a running swarm says: list, echo, hz
+    Topic(crate::topic::TopicArgs),
+    /// Say what of this machine limits a swarm
+    Doctor(crate::doctor::DoctorArgs),
     /// Remove what dead runs left behind
     Clean,
     /// Print a JSON schema
@@ -137,7 +147,7 @@ pub struct RunArgs {
     /// Print nothing but errors
     #[arg(long)]
     pub quiet: bool,
-    /// Write no trace, events and plots
+    /// Write no trace, events, recording, plots and report
     #[arg(long)]
     pub no_record: bool,
     /// Keep each process to one core

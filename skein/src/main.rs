@@ -2,18 +2,25 @@
 
 mod check;
 mod cli;
+mod doctor;
 mod exit;
 mod facts;
 mod housekeeping;
 mod input;
 mod interrupt;
+mod outlook;
 mod progress;
+mod replay;
 mod report;
 mod reproduce;
 mod roles;
 mod run;
 mod schema;
 mod sweep;
+mod tap;
+mod top;
+mod topic;
+mod view;
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -46,6 +53,11 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::Scene(args) => sweep::scene(&args),
         Command::Report(args) => report::report(&args),
+        Command::Replay(args) => replay::replay(&args),
+        Command::View(args) => view::view(&args),
+        Command::Top(args) => top::top(&args),
+        Command::Topic(args) => topic::topic(&args),
+        Command::Doctor(args) => doctor::doctor(&args),
         Command::Clean => housekeeping::clean(),
         Command::Schema { of } => schema::schema(of),
         Command::Completions { shell } => schema::completions(shell),

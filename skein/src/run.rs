@@ -7,7 +7,7 @@ use crate::input;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use skein_protocol::record::{Outcome, RecordSink};
-use skein_report::{Ending, Manifest, ProcessEntry, Recorder, Role, RunFacts, RunFolder, Summary, plot, text};
+use skein_report::{Ending, Manifest, ProcessEntry, Recorder, Role, RunFacts, RunFolder, Summary, page, text};
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
 use skein_runtime::{RunEnd, RuntimeError, inline};
 use skein_scenario::Scenario;
@@ -26,10 +26,10 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let facts = facts(&scenario, runtime, &args.clock.to_string())?;
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
-    write_manifest(&folder, &facts, &scenario)?;
+    let manifest = write_manifest(&folder, &facts, &scenario)?;
     let recorder = match args.no_record {
         true => Recorder::in_memory(facts.clone()),
-        false => Recorder::in_folder(facts.clone(), &folder).map_err(Failure::environment)?,
+        false => Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?,
     };
     let ticks = (scenario.time.timeout_s / scenario.time.dt_s).ceil() as u64;
     let mut sink = Progress::new(recorder, args.quiet || args.json, ticks);
@@ -41,13 +41,13 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
     let reporting = Instant::now();
-    if !args.no_record {
-        plot::write(&folder, &facts).map_err(Failure::environment)?;
-    }
+    // A report that cannot be written does not cost the summary.
+    let reported = if args.no_record { Ok(Vec::new()) } else { page::write(&folder, &manifest, &summary) };
     summary.report_s = Some(reporting.elapsed().as_secs_f64());
     folder.write_summary(&summary).map_err(Failure::environment)?;
     print(args, &summary, &folder);
-    let trouble = end.failure.clone().or(end.sink_error.clone()).or(recorded.err().map(|error| error.to_string()));
+    let files = recorded.and(reported.map(|_| ())).err().map(|error| error.to_string());
+    let trouble = end.failure.clone().or(end.sink_error.clone()).or(files);
     if let Some(trouble) = &trouble {
         eprintln!("skein: {trouble}");
     }
@@ -67,11 +67,12 @@ fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure
 }
 
 /// Writes what was ordered into the run's folder.
-pub fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<(), Failure> {
+pub fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> {
     let resolved = serde_json::to_value(scenario).map_err(Failure::environment)?;
     let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
     let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
-    folder.write_manifest(&manifest).map_err(Failure::environment)
+    folder.write_manifest(&manifest).map_err(Failure::environment)?;
+    Ok(manifest)
 }
 
 fn fly(

@@ -1,6 +1,7 @@
 //! A place of its own for each test, and the `skein` binary started in it under a watchdog.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
+pub mod browser;
 pub mod process;
 
 use process::{Role, is_alive, shared_files};

@@ -3,6 +3,7 @@
 use crate::body::Body;
 use crate::invariants::Obedience;
 use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED};
+use skein_protocol::sides::Cuts;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
 
 /// How a drone has answered in the current tick.
@@ -67,7 +68,7 @@ impl Process {
     }
 
     /// The drone at the end of a tick. Of a dead one's answers only what it obeyed is left.
-    pub fn row(&self, body: &Body) -> DroneRow {
+    pub fn row(&self, body: &Body, cuts: Cuts) -> DroneRow {
         let (slot, alive) = (&self.slot, u32::from(body.alive));
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let flags = flag(slot.flags & SLOT_LEADS != 0, ROW_LEADS)
@@ -85,10 +86,12 @@ impl Process {
             flags: alive * flags,
             phase: slot.phase,
             heard: alive * slot.heard,
+            dropped: slot.dropped.map(|count| alive * count),
+            cuts,
             step_ns: alive * slot.step_ns,
             route: slot.route,
             rank: slot.rank,
-            reserved: 0,
+            reserved: Default::default(),
         }
     }
 }

@@ -352,7 +352,9 @@ impl World {
 
     fn close_tick(&mut self, end: SimTime) {
         self.rows.clear();
-        self.rows.extend(self.bodies.iter().zip(&self.processes).map(|(body, process)| process.row(body)));
+        for ((body, process), id) in self.bodies.iter().zip(&self.processes).zip(0..) {
+            self.rows.push(process.row(body, self.faults.standing(DroneId(id)).cuts));
+        }
         self.processes.iter_mut().for_each(|process| process.answer = Answer::Awaited);
         std::mem::swap(&mut self.down.frames, &mut self.sent);
         self.sent.clear();

@@ -2,10 +2,11 @@
 
 use super::burst::Burst;
 use super::key::Draws;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::SQRT_2;
 
 /// What the air does to a frame. The default is ideal.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Air {
     /// Time on the air; a frame takes at least one tick.
     pub delay: Delay,
@@ -20,7 +21,7 @@ pub struct Air {
 }
 
 /// How a delay is distributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DelayModel {
     /// Always its mean.
     #[default]
@@ -34,7 +35,7 @@ pub enum DelayModel {
 }
 
 /// Time on the air.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Delay {
     /// Its distribution.
     pub model: DelayModel,
@@ -63,7 +64,7 @@ impl Delay {
 }
 
 /// How far a frame is heard: log-distance path loss with log-normal shadowing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
     /// Distance at which half of all frames are heard, m; without shadowing none is beyond it, and all are within.
     pub half_m: f64,

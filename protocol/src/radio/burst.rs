@@ -4,13 +4,14 @@ use super::Link;
 use super::key::Draws;
 use crate::ids::DroneId;
 use crate::time::SimTime;
+use serde::{Deserialize, Serialize};
 
 /// A block of time lasts so many mean bursts. The state is drawn from its stationary distribution at a block's start and
 /// evolves within the block by draws of the block's own key, so it can be told for any instant by itself.
 pub const BLOCK_BURSTS: f64 = 64.0;
 
 /// Whom a burst befalls together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Scope {
     /// One direction of one link.
     #[default]
@@ -22,7 +23,7 @@ pub enum Scope {
 }
 
 /// Losses that come together.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Burst {
     /// Share of time that bursts take, 0 to 1.
     pub share: f64,

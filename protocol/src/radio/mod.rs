@@ -53,7 +53,7 @@ impl DropReason {
 }
 
 /// What the air does to frames between any two drones. The default is ideal: nothing is lost, a frame takes one tick.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Radio {
     /// Key of all verdicts.
     pub seed: u64,

@@ -3,10 +3,11 @@
 use super::{Air, Link};
 use crate::ids::DroneId;
 use crate::message::Topic;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 /// Another air for the frames that it is about: those that meet all of its conditions.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
     /// Of these topics; `None`: of all.
     pub topics: Option<BTreeSet<Topic>>,

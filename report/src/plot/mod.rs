@@ -2,11 +2,15 @@
 //! that colour-blind people tell apart (Okabe and Ito).
 
 mod curves;
+mod flight;
+mod lines;
 pub mod reproduce;
 mod samples;
 mod style;
 pub mod surface;
 pub mod sweep;
+mod timeline;
+mod told;
 mod tracks;
 
 use crate::error::ReportError;
@@ -17,24 +21,38 @@ use curves::{Band, Curve, Figure};
 use samples::Samples;
 use std::path::PathBuf;
 use style::{BLUE, RED};
+use told::Told;
+pub(crate) use tracks::outline;
 
-/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones, distance from
-/// the target shape, bending energy.
-pub const FILES: [&str; 6] =
-    ["trace.svg", "separation.svg", "speed.svg", "distance.svg", "disturbance.svg", "bending.svg"];
+/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones, energy,
+/// slot error, who led, messages; the flight, animated; distance from the target shape, bending energy.
+pub const FILES: [&str; 11] = [
+    "trace.svg",
+    "separation.svg",
+    "speed.svg",
+    "distance.svg",
+    "energy.svg",
+    "formation.svg",
+    "leaders.svg",
+    "messages.svg",
+    "flight.svg",
+    "disturbance.svg",
+    "bending.svg",
+];
 
-/// Draws the plots of a run from its trace.csv, and writes formation.csv beside it: how far the swarm was from its target
-/// shape. Plots that have no data are left out: all of them for an empty trace, those of distances for a lone drone,
-/// those of the shape for a very large swarm.
+/// Draws the plots of a run from its trace.csv, and from the events and counts in its run.mcap, and writes formation.csv
+/// beside it: how far the swarm was from its target shape. Plots that have no data are left out: all of them for an empty
+/// trace, those of distances for a lone drone, those of the shape for a very large swarm.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Plot`].
+/// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Recording`], [`ReportError::Plot`].
 pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
     let samples = Samples::read(&folder.path().join(crate::trace::FILE), facts)?;
     crate::morph::write(folder.path(), &samples.morphing.samples)?;
+    let told = Told::read(folder)?;
     let plots = folder.plots()?;
     let mut written = Vec::new();
-    for (name, svg) in FILES.iter().zip(draw(&samples, facts)) {
+    for (name, svg) in FILES.iter().zip(draw(&samples, &told, facts)) {
         let path = plots.join(name);
         if let Some(svg) = svg {
             let svg = svg.map_err(|reason| ReportError::Plot { path: path.clone(), reason })?;
@@ -45,10 +63,15 @@ pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, Repor
     Ok(written)
 }
 
+/// The colours of groups, in order, as red, green and blue.
+pub(crate) fn palette() -> [(u8, u8, u8); 7] {
+    style::PALETTE.map(|colour| (colour.0, colour.1, colour.2))
+}
+
 /// A drawn plot, or why it cannot be drawn; `None` without data.
 type Drawn = Option<Result<String, String>>;
 
-fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 6] {
+fn draw(samples: &Samples, told: &Told, facts: &RunFacts) -> [Drawn; 11] {
     let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
     let safe = || Curve {
         label: format!("safe distance, {} m", facts.safe_distance_m),
@@ -59,7 +82,7 @@ fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 6] {
         title: format!("Least separation: {run}"),
         y_label: "distance between the two nearest drones (m)",
         line_label: "least separation",
-        band: samples.separation.iter().map(|&(t_s, m)| Band { t_s, mean: m, deviation: 0.0 }).collect(),
+        band: exact(&samples.separation),
         level: Some(safe()),
     };
     let speed = Figure {
@@ -93,9 +116,37 @@ fn draw(samples: &Samples, facts: &RunFacts) -> [Drawn; 6] {
         "of the thin-plate spline that takes the target shape to the drones",
         |morph| morph.bending,
     );
+    let energy = Figure {
+        title: format!("Energy: {run}"),
+        y_label: "energy used by a drone (J)",
+        line_label: "mean over drones",
+        band: samples.energy.clone(),
+        level: None,
+    };
+    let formation = Figure {
+        title: format!("Largest slot error, after the best translation: {run}"),
+        y_label: "distance from the slot (m)",
+        line_label: "drone farthest from its slot",
+        band: exact(&samples.formation),
+        level: Some(Curve {
+            label: format!("closed, {} m", facts.arrival_error_m),
+            colour: RED,
+            level: facts.arrival_error_m,
+        }),
+    };
     let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
     let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
-    [tracks, curve(separation), curve(speed), curve(distance), curve(disturbance), curve(bending)]
+    let terms = timeline::terms(&told.events, samples.end_s);
+    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, &told.events, facts, samples.end_s));
+    let messages = told.any().then(|| lines::draw(&format!("Messages: {run}"), "messages a second", &told.lines()));
+    let [separation, speed, distance, energy, formation] = [separation, speed, distance, energy, formation].map(curve);
+    let flight = flight::draw(samples, facts).map(Ok);
+    let (disturbance, bending) = (curve(disturbance), curve(bending));
+    [tracks, separation, speed, distance, energy, formation, leaders, messages, flight, disturbance, bending]
+}
+
+fn exact(points: &[(f64, f64)]) -> Vec<Band> {
+    points.iter().map(|&(t_s, mean)| Band { t_s, mean, deviation: 0.0 }).collect()
 }
 
 #[cfg(test)]
@@ -117,6 +168,9 @@ mod tests {
             }
         }
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
+        // A recording in which nothing is said.
+        let scenario = serde_json::json!({});
+        crate::mcap::McapWriter::create(folder.path(), &facts(drones), &scenario).unwrap().finish().unwrap();
         (root, folder)
     }
 
@@ -126,7 +180,8 @@ mod tests {
         let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
         let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!(names, FILES);
+        let silent = |name: &&str| !["leaders.svg", "messages.svg"].contains(name);
+        assert_eq!(names, FILES.into_iter().filter(silent).collect::<Vec<_>>());
         let text = |i: usize| std::fs::read_to_string(&written[i]).unwrap();
         for group in ["N1", "N2", "N3", "start", "end", "obstacle", "x (m)"] {
             assert!(text(0).contains(group), "{group} is not in the legend");
@@ -143,7 +198,8 @@ mod tests {
         assert_eq!(write(&folder, &facts(3)).unwrap(), Vec::<PathBuf>::new());
         let (_root, folder) = flown(1, 10);
         let written = write(&folder, &facts(1)).unwrap();
-        assert!(written.len() == 2 && written[1].ends_with("speed.svg"), "{written:?}");
+        let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["trace.svg", "speed.svg", "energy.svg", "formation.svg", "flight.svg"]);
     }
 
     #[test]

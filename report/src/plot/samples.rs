@@ -4,6 +4,7 @@ use super::curves::Band;
 use crate::close::Sweep;
 use crate::error::ReportError;
 use crate::facts::RunFacts;
+use crate::formation;
 use crate::morph::Morphing;
 use crate::trace::{self, TraceRow};
 use skein_protocol::Vec2;
@@ -14,6 +15,8 @@ use std::path::Path;
 const EVERY_S: f64 = 0.1;
 /// Most points of all tracks together: a plot of a thousand drones must still open.
 const MAX_POINTS: usize = 60_000;
+/// The slot error is drawn for no more drones: the best assignment takes their number to the third.
+const FORMATION_MAX: usize = 100;
 
 /// What the plots show.
 #[derive(Default)]
@@ -26,6 +29,10 @@ pub(super) struct Samples {
     pub distance: Vec<Band>,
     /// How far the swarm was from its shape.
     pub morphing: Morphing,
+    /// Of what the drones have used, J.
+    pub energy: Vec<Band>,
+    /// Time, and the largest slot error, m.
+    pub formation: Vec<(f64, f64)>,
     /// By drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
@@ -85,6 +92,10 @@ impl Samples {
             let pair = |i: usize| positions[..i].iter().map(move |other| (i, other));
             let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
             self.distance.extend(band(t_s, distances));
+            self.energy.extend(band(t_s, rows.iter().map(|row| row.energy_j)));
+            if rows.len() <= FORMATION_MAX {
+                self.formation.extend(formation::error(facts, &positions).map(|error| (t_s, error.largest_m)));
+            }
         }
     }
 
@@ -117,6 +128,7 @@ fn band(t_s: f64, values: impl Iterator<Item = f64>) -> Option<Band> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::facts;
 
     #[test]
     fn a_dip_between_samples_is_kept_and_tracks_end_where_they_end() {
@@ -134,7 +146,7 @@ mod tests {
             }
         }
         std::fs::write(&path, csv).unwrap();
-        let samples = Samples::read(&path, &crate::testing::facts(2)).unwrap();
+        let samples = Samples::read(&path, &facts(8)).unwrap();
         let least: Vec<f64> = samples.separation.iter().map(|&(_, m)| m).collect();
         assert_eq!(least, [40.0, 30.0]);
         let (mean, deviation) = (samples.speed[0].mean, samples.speed[0].deviation);

@@ -50,7 +50,7 @@ pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ran
 pub(super) struct Axes<'a> {
     /// What stands below, and from where to where it goes.
     pub x: (&'a str, Range<f64>),
-    /// The same for what stands left.
+    /// The same for what stands left; without a word there, an axis without numbers.
     pub y: (&'a str, Range<f64>),
     /// Height of the plotting area.
     pub height: u32,
@@ -79,6 +79,9 @@ pub(super) fn plot(
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(axes.x.0).y_desc(axes.y.0).label_style(text(13)).axis_desc_style(text(14));
         mesh.x_labels(12).y_labels((axes.height / px(50)).max(4) as usize);
+        if axes.y.0.is_empty() {
+            mesh.y_labels(0).disable_y_mesh();
+        }
         mesh.x_label_formatter(&number).y_label_formatter(&number).set_all_tick_mark_size(px(5));
         let (grid, axis) = (GRID.stroke_width(px(1)), INK.stroke_width(px(1)));
         mesh.bold_line_style(grid).light_line_style(TRANSPARENT).axis_style(axis).draw().map_err(words)?;
@@ -121,7 +124,7 @@ pub(super) enum Sign {
 }
 
 /// Text of a size in pixels, in ink.
-fn text(size: u32) -> TextStyle<'static> {
+pub(super) fn text(size: u32) -> TextStyle<'static> {
     TextStyle::from((FONT, px(size)).into_font()).color(&INK).pos(Pos::new(HPos::Left, VPos::Center))
 }
 

@@ -45,7 +45,7 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<S
 }
 
 /// A colour for each group in which drones ended.
-fn colours(samples: &Samples) -> BTreeMap<&str, RGBColor> {
+pub(super) fn colours(samples: &Samples) -> BTreeMap<&str, RGBColor> {
     let mut colours: BTreeMap<&str, RGBColor> =
         samples.tracks.values().map(|track| (track.group.as_str(), INK)).collect();
     colours.values_mut().zip(PALETTE.iter().cycle()).for_each(|(colour, &fresh)| *colour = fresh);
@@ -69,7 +69,7 @@ fn signs(samples: &Samples, facts: &RunFacts, colours: &BTreeMap<&str, RGBColor>
 }
 
 /// Corners of what is shown, m, and the plotting area's height, so that a metre is as long either way.
-fn frame(samples: &Samples, facts: &RunFacts, width: f64) -> (Vec2, Vec2, f64) {
+pub(super) fn frame(samples: &Samples, facts: &RunFacts, width: f64) -> (Vec2, Vec2, f64) {
     let ways = samples.tracks.values().flat_map(|track| track.points.iter().copied());
     let corners = facts.obstacles.iter().map(ConvexShape::bounds).flat_map(|(low, high)| [low, high]);
     let nothing = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
@@ -119,7 +119,7 @@ fn draw_tracks(
 }
 
 /// The outline with its rounding: about each vertex an arc from one edge's normal to the next one's.
-pub(super) fn outline(shape: &ConvexShape) -> Vec<(f64, f64)> {
+pub(crate) fn outline(shape: &ConvexShape) -> Vec<(f64, f64)> {
     let vertices: Vec<Vec2> = shape.vertices().collect();
     let n = vertices.len();
     let normal = |from: Vec2, to: Vec2| {

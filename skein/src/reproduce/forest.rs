@@ -38,8 +38,9 @@ impl Forest {
         let scenario = Flight::new("forest", PAPER).resolve().map_err(Failure::environment)?;
         let facts = facts(&scenario, "inline", "lockstep")?;
         let folder = RunFolder::at(path, true).map_err(Failure::usage)?;
-        write_manifest(&folder, &facts, &scenario)?;
-        let mut recorder = Recorder::in_folder(facts.clone(), &folder).map_err(Failure::environment)?;
+        let manifest = write_manifest(&folder, &facts, &scenario)?;
+        let mut recorder =
+            Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?;
         let end = inline::run(&scenario, &mut recorder, || interrupt.signal()).map_err(Failure::environment)?;
         let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
         let (summary, recorded) = recorder.finish(&ending);

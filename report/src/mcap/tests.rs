@@ -1,0 +1,129 @@
+use super::*;
+use crate::testing::{facts, row};
+use skein_protocol::DroneId;
+use skein_protocol::record::{DroneRow, FaultKind, Outcome, ROW_LEADS, RecordHead, Totals};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{GroupId, Vec2};
+
+fn ordered_facts() -> RunFacts {
+    let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
+    RunFacts { obstacles: vec![block], ..facts(3) }
+}
+
+/// Two seconds of three drones; `wall` is how long everything took on the wall.
+fn record(folder: &Path, wall: u32) -> PathBuf {
+    let mut writer = McapWriter::create(folder, &ordered_facts(), &serde_json::json!({"name": "s1"})).unwrap();
+    for tick in 0..100u64 {
+        let rows: Vec<DroneRow> = (0..3)
+            .map(|drone| {
+                let leads = if drone == 1 { ROW_LEADS } else { 0 };
+                let at = row(tick as f64 * 0.2, f64::from(drone) * 30.0);
+                DroneRow { step_ns: wall, group: GroupId::ALL.child(1), flags: at.flags | leads, ..at }
+            })
+            .collect();
+        let head = RecordHead { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHead::default() };
+        let events = events(tick, wall);
+        writer.take(RecordView { head: &head, rows: &rows, frames: &[], events: &[] }, &events).unwrap();
+    }
+    writer.finish().unwrap();
+    folder.join(FILE)
+}
+
+fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
+    let totals = Totals { wall_s: f64::from(wall), ..Totals::default() };
+    let what = match tick {
+        40 => Happening::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: "asked".into() },
+        99 => Happening::End { outcome: Outcome::Reached, reason: "there".into(), totals: Box::new(totals) },
+        _ => return Vec::new(),
+    };
+    vec![RunEvent { t_s: (tick + 1) as f64 * 0.02, what }]
+}
+
+#[test]
+fn equal_runs_make_equal_files() {
+    let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let bytes = |path: PathBuf| std::fs::read(path).unwrap();
+    assert!(bytes(record(one.path(), 7)) == bytes(record(other.path(), 8000)), "wall times are in the recording");
+}
+
+#[test]
+fn any_reader_finds_topics_schemas_and_the_scenario() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(record(folder.path(), 1)).unwrap();
+    let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
+    let mut topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+    topics.sort_unstable();
+    let mut wanted = TOPICS.to_vec();
+    wanted.sort_unstable();
+    assert_eq!(topics, wanted);
+    for channel in summary.channels.values() {
+        let schema = channel.schema.as_ref().unwrap();
+        assert_eq!((channel.message_encoding.as_str(), schema.encoding.as_str()), ("json", "jsonschema"));
+        let text = String::from_utf8(schema.data.to_vec()).unwrap();
+        assert!(!text.contains("$ref"), "{}: {text}", schema.name);
+    }
+    let attachment = ::mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    let scenario: serde_json::Value = serde_json::from_slice(&attachment.data).unwrap();
+    assert_eq!((attachment.name.as_str(), &scenario["name"]), ("scenario.json", &serde_json::json!("s1")));
+    let counts = &summary.stats.unwrap().channel_message_counts;
+    let count = |to: To| counts.iter().find(|(id, _)| summary.channels[id].topic == TOPICS[to as usize]).unwrap().1;
+    assert_eq!((*count(To::State), *count(To::Scene), *count(To::Log), *count(To::Events)), (20, 6, 2, 2));
+}
+
+#[test]
+fn what_is_shown_is_where_drones_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(record(folder.path(), 1)).unwrap();
+    let mut last = BTreeMap::new();
+    for message in ::mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+        let json: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        last.insert(message.channel.topic.clone(), (message.log_time, json));
+    }
+    let (time, state) = &last["/skein/state"];
+    assert_eq!((*time, state["x_m"][2].as_f64(), state["leads"][1].as_str()), (2_000_000_000, Some(19.8), Some("N")));
+    let (_, transforms) = &last["/tf"];
+    assert_eq!(transforms["transforms"][2]["child_frame_id"], "drone_2");
+    assert_eq!(transforms["transforms"][2]["translation"]["y"], 60.0);
+    let (_, scene) = &last["/scene"];
+    let ids: Vec<_> = scene["entities"].as_array().unwrap().iter().map(|entity| entity["id"].clone()).collect();
+    assert_eq!(ids, ["danger zones", "slots", "radio links"]);
+    assert_eq!(last["/log"].1["message"], "reached: there");
+}
+
+#[test]
+fn a_recording_reads_back_even_cut_short() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = record(folder.path(), 1);
+    let look = || {
+        let (mut times, mut events) = (Vec::new(), Vec::new());
+        read(folder.path(), |sample| times.push(sample.state.t_s), |event| events.push(event)).unwrap();
+        (times, events)
+    };
+    let (times, events) = look();
+    assert_eq!((times.len(), times[0], times[19]), (20, 0.1, 2.0));
+    assert!(matches!(events[0].what, Happening::Fault { target: DroneId(2), .. }));
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
+    assert_eq!(look().0.len(), 20);
+}
+
+#[test]
+fn a_drone_is_drawn_anew_only_when_it_looks_different() {
+    let state = |alive: u8| State {
+        x_m: vec![0.0; 2],
+        group: vec!["N".to_owned(), "N1".to_owned()],
+        leads: vec![None, Some("N1".to_owned())],
+        alive: vec![1, alive],
+        ..State::default()
+    };
+    let mut drones = Drones::default();
+    let mut changed = |alive| drones.changed(&state(alive), Time::default()).map(|update| update.entities);
+    let first = changed(1).unwrap();
+    assert_eq!(
+        (first.len(), first[1].frame_id.as_str(), first[1].texts[0].text.as_str()),
+        (2, "drone_1", "1 leads N1")
+    );
+    assert!(changed(1).is_none());
+    let dead = changed(0).unwrap();
+    assert_eq!((dead.len(), dead[0].texts[0].text.as_str()), (1, "1 dead"));
+}

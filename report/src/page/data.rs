@@ -1,0 +1,71 @@
+//! What the page is fed with: lines of JSON, the same from a recording and from a running swarm.
+
+use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::folder::RunFolder;
+use crate::mcap;
+use crate::plot::outline;
+use crate::scene::{Sample, words};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use serde::Serialize;
+use serde_json::json;
+use skein_protocol::record::{Happening, RunEvent};
+use std::io::Write;
+
+/// Most numbers of drones and samples in a page: beyond, samples are left out evenly.
+const MOST: usize = 300_000;
+
+/// What was ordered, with the obstacles' outlines. Begins a run.
+#[must_use]
+pub fn facts_line(facts: &RunFacts) -> String {
+    let mut line = json!({ "facts": facts });
+    line["facts"]["outlines"] = json!(facts.obstacles.iter().map(outline).collect::<Vec<_>>());
+    line.to_string()
+}
+
+/// A sample.
+#[must_use]
+pub fn sample_line(sample: &Sample) -> String {
+    #[derive(Serialize)]
+    struct Line<'a> {
+        sample: &'a Sample,
+    }
+    // Keys are strings: nothing of a sample fails to become JSON.
+    serde_json::to_string(&Line { sample }).unwrap_or_default()
+}
+
+/// An event and what it means in words; `None` for a drone's part in a plan, of which there are too many to read.
+#[must_use]
+pub fn event_line(event: &RunEvent) -> Option<String> {
+    if matches!(event.what, Happening::Assigned { .. }) {
+        return None;
+    }
+    let weight = match words::weight(event) {
+        words::Weight::Info => "info",
+        words::Weight::Warning => "warning",
+        words::Weight::Error => "error",
+    };
+    Some(json!({ "event": event, "text": words::line(event), "weight": weight }).to_string())
+}
+
+/// A word in the page's head.
+#[must_use]
+pub fn status_line(status: &str) -> String {
+    json!({ "status": status }).to_string()
+}
+
+/// The recording of a run, deflated and in Base64.
+pub(super) fn packed(folder: &RunFolder, facts: &RunFacts) -> Result<String, ReportError> {
+    let (mut samples, mut lines) = (Vec::new(), vec![facts_line(facts)]);
+    mcap::read(folder.path(), |sample| samples.push(sample), |event| lines.extend(event_line(&event)))?;
+    let step = (samples.len() * facts.drones as usize).div_ceil(MOST).max(1);
+    let last = samples.len().saturating_sub(1);
+    let kept = samples.iter().enumerate().filter(|(place, _)| place % step == 0 || *place == last);
+    lines.extend(kept.map(|(_, sample)| sample_line(sample)));
+    let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
+    let packed = out.write_all(lines.join("\n").as_bytes()).and_then(|()| out.finish());
+    packed.map(|bytes| STANDARD.encode(bytes)).map_err(ReportError::io(folder.path()))
+}

@@ -1,0 +1,50 @@
+//! A run's plots in the page: the SVGs of its `plots` folder, in the colours of the page.
+
+use crate::error::ReportError;
+use std::path::PathBuf;
+
+/// Colours of the plots that mean paper and ink, and the page's names for them.
+const THEMED: [(&str, &str); 6] = [
+    ("#FFFFFF", "var(--paper)"),
+    ("#333333", "var(--ink)"),
+    ("#E8E8E8", "var(--grid)"),
+    ("#8C8C8C", "var(--grey)"),
+    ("#BEBEBE", "var(--block)"),
+    ("#CC1E14", "var(--bad)"),
+];
+
+/// The figures.
+pub(super) fn all(plots: &[PathBuf]) -> Result<String, ReportError> {
+    let mut html = "<h2>Figures</h2>".to_owned();
+    // The animation shows less than the replay does.
+    for path in plots.iter().filter(|path| !path.ends_with("flight.svg")) {
+        let svg = std::fs::read_to_string(path).map_err(ReportError::io(path))?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        html += &format!("<figure id=\"{name}\">{}</figure>", themed(&svg));
+    }
+    Ok(html)
+}
+
+/// Every colour in a plot is a whole attribute, so that a text that looks like one stays.
+fn themed(svg: &str) -> String {
+    let mut svg = svg.to_owned();
+    for (colour, name) in THEMED {
+        for attribute in ["fill", "stroke"] {
+            svg = svg.replace(&format!("{attribute}=\"{colour}\""), &format!("{attribute}=\"{name}\""));
+        }
+    }
+    svg
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paper_and_ink_follow_the_page() {
+        let svg = r##"<rect fill="#FFFFFF" stroke="#333333"/><path stroke="#0072B2"/><text>fill #FFFFFF</text>"##;
+        let wanted =
+            r##"<rect fill="var(--paper)" stroke="var(--ink)"/><path stroke="#0072B2"/><text>fill #FFFFFF</text>"##;
+        assert_eq!(themed(svg), wanted);
+    }
+}

@@ -1,0 +1,329 @@
+"use strict";
+// Draws one moment of the swarm on a canvas. World frame: x along the flight, y to the left of it, metres.
+
+// Okabe and Ito's colours, told apart by colour-blind people too; the same as in the plots.
+const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#785e3c", "#d55e00"];
+// Beyond so many drones, what is drawn a drone is kept to the least.
+const MANY = 150;
+// How far back a way is shown, s.
+const TRAIL_S = 8;
+
+class Colours {
+  constructor() { this.order = new Map(); }
+  of(group) {
+    let place = this.order.get(group);
+    if (place === undefined) this.order.set(group, place = this.order.size);
+    return PALETTE[place % PALETTE.length];
+  }
+}
+
+class Scene {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.pen = canvas.getContext("2d");
+    this.colours = new Colours();
+    this.facts = null;
+    this.view = { x: 0, y: 0, scale: 1 };
+    this.fitted = false;
+    this.shows = { routes: true, slots: true, zones: true, links: true, drops: true, trails: true, names: true };
+    this.readStyle();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.readStyle());
+  }
+
+  readStyle() {
+    const style = getComputedStyle(document.documentElement);
+    const read = name => style.getPropertyValue(name).trim();
+    this.ink = { ink: read("--ink"), soft: read("--soft-ink"), grid: read("--grid"), block: read("--block"), bad: read("--bad"),
+      grey: read("--grey"), focus: read("--focus") };
+  }
+
+  resize() {
+    const ratio = window.devicePixelRatio || 1;
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
+      this.canvas.width = Math.round(width * ratio);
+      this.canvas.height = Math.round(height * ratio);
+    }
+    this.ratio = ratio;
+    this.width = width;
+    this.height = height;
+  }
+
+  // Shows the box [x0, y0, x1, y1], m.
+  fit([x0, y0, x1, y1]) {
+    this.resize();
+    const pad = 24;
+    const wide = Math.max(x1 - x0, 20), high = Math.max(y1 - y0, 20);
+    this.view.scale = Math.min((this.width - 2 * pad) / wide, (this.height - 2 * pad) / high);
+    this.view.x = (x0 + x1) / 2;
+    this.view.y = (y0 + y1) / 2;
+  }
+
+  px(x) { return this.width / 2 + (x - this.view.x) * this.view.scale; }
+  py(y) { return this.height / 2 - (y - this.view.y) * this.view.scale; }
+  at(px, py) {
+    return [this.view.x + (px - this.width / 2) / this.view.scale, this.view.y - (py - this.height / 2) / this.view.scale];
+  }
+
+  zoom(factor, px, py) {
+    const [x, y] = this.at(px, py);
+    this.view.scale = Math.min(Math.max(this.view.scale * factor, 0.02), 60);
+    const [nx, ny] = this.at(px, py);
+    this.view.x += x - nx;
+    this.view.y += y - ny;
+  }
+
+  // moment: { x, y, vx, vy: arrays, sample, trails }, selected: a number or null.
+  draw(moment, selected) {
+    this.resize();
+    const pen = this.pen;
+    pen.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    pen.clearRect(0, 0, this.width, this.height);
+    this.grid();
+    if (this.facts) this.still();
+    if (!moment) return;
+    const many = moment.x.length > MANY;
+    if (this.shows.trails && moment.trails) this.trails(moment);
+    if (this.shows.zones && this.facts) this.zones(moment, many, selected);
+    if (this.shows.slots) this.slots(moment);
+    if (this.shows.links) this.links(moment, many, selected);
+    if (this.shows.drops) this.drops(moment, selected);
+    this.drones(moment, many, selected);
+  }
+
+  grid() {
+    const pen = this.pen;
+    const steps = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
+    const step = steps.find(s => s * this.view.scale >= 70) || 10000;
+    const [left, top] = this.at(0, 0), [right, bottom] = this.at(this.width, this.height);
+    pen.lineWidth = 1;
+    pen.strokeStyle = this.ink.grid;
+    pen.fillStyle = this.ink.soft;
+    pen.font = "11px system-ui,sans-serif";
+    pen.textBaseline = "alphabetic";
+    pen.textAlign = "left";
+    pen.beginPath();
+    const xs = [], ys = [];
+    for (let x = Math.ceil(left / step) * step; x <= right; x += step) xs.push(x);
+    for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) ys.push(y);
+    for (const x of xs) { pen.moveTo(this.px(x), 0); pen.lineTo(this.px(x), this.height); }
+    for (const y of ys) { pen.moveTo(0, this.py(y)); pen.lineTo(this.width, this.py(y)); }
+    pen.stroke();
+    for (const x of xs) pen.fillText(x + " m", this.px(x) + 3, this.height - 5);
+    for (const y of ys) pen.fillText(y + " m", 4, this.py(y) - 3);
+  }
+
+  path(points, closed) {
+    const pen = this.pen;
+    points.forEach(([x, y], i) => i ? pen.lineTo(this.px(x), this.py(y)) : pen.moveTo(this.px(x), this.py(y)));
+    if (closed) pen.closePath();
+  }
+
+  still() {
+    const pen = this.pen;
+    pen.fillStyle = this.ink.block;
+    pen.beginPath();
+    for (const outline of this.facts.outlines) this.path(outline, true);
+    pen.fill();
+    if (!this.shows.routes) return;
+    pen.lineWidth = 1;
+    pen.setLineDash([4, 4]);
+    pen.strokeStyle = this.ink.grey;
+    pen.beginPath();
+    for (const set of this.facts.scene.sets) for (const hull of set.hulls_m) this.path(hull, true);
+    pen.stroke();
+    pen.setLineDash([1, 5]);
+    pen.lineWidth = 2;
+    pen.strokeStyle = this.ink.focus;
+    pen.beginPath();
+    for (const set of this.facts.scene.sets) for (const route of set.routes_m) this.path(route, false);
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  byGroup(moment) {
+    const groups = new Map();
+    const state = moment.sample.state;
+    for (let i = 0; i < moment.x.length; i++) {
+      const key = state.alive[i] ? state.group[i] : "";
+      const members = groups.get(key);
+      if (members) members.push(i); else groups.set(key, [i]);
+    }
+    return groups;
+  }
+
+  colour(group) { return group === "" ? this.ink.grey : this.colours.of(group); }
+
+  trails(moment) {
+    const pen = this.pen;
+    pen.lineWidth = 1.5;
+    pen.globalAlpha = 0.5;
+    for (const [group, members] of this.byGroup(moment)) {
+      pen.strokeStyle = this.colour(group);
+      pen.beginPath();
+      for (const i of members) {
+        moment.trails.forEach((s, k) => k ? pen.lineTo(this.px(s.state.x_m[i]), this.py(s.state.y_m[i]))
+          : pen.moveTo(this.px(s.state.x_m[i]), this.py(s.state.y_m[i])));
+        pen.lineTo(this.px(moment.x[i]), this.py(moment.y[i]));
+      }
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  zones(moment, many, selected) {
+    const pen = this.pen, danger = this.facts.scene.danger_m, state = moment.sample.state;
+    pen.fillStyle = this.ink.bad;
+    pen.globalAlpha = 0.07;
+    for (let i = 0; i < moment.x.length; i++) {
+      if (!state.alive[i] || (many && i !== selected)) continue;
+      const v = Math.hypot(moment.vx[i], moment.vy[i]);
+      pen.beginPath();
+      pen.arc(this.px(moment.x[i]), this.py(moment.y[i]), (danger[0] + v * (danger[1] + v * danger[2])) * this.view.scale, 0, 7);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
+    if (many) return;
+    // Two of these circles that meet: drones closer than the safe distance.
+    pen.strokeStyle = this.ink.bad;
+    pen.lineWidth = 1;
+    pen.beginPath();
+    const radius = this.facts.safe_distance_m / 2 * this.view.scale;
+    for (let i = 0; i < moment.x.length; i++) {
+      if (!state.alive[i]) continue;
+      const x = this.px(moment.x[i]), y = this.py(moment.y[i]);
+      pen.moveTo(x + radius, y);
+      pen.arc(x, y, radius, 0, 7);
+    }
+    pen.globalAlpha = 0.35;
+    pen.stroke();
+    pen.globalAlpha = 1;
+  }
+
+  slots(moment) {
+    const pen = this.pen;
+    pen.strokeStyle = this.ink.soft;
+    pen.lineWidth = 1;
+    pen.beginPath();
+    for (const slot of moment.sample.state.slot_m) {
+      if (!slot) continue;
+      const x = this.px(slot[0]), y = this.py(slot[1]);
+      pen.moveTo(x - 4, y); pen.lineTo(x + 4, y);
+      pen.moveTo(x, y - 4); pen.lineTo(x, y + 4);
+    }
+    pen.stroke();
+  }
+
+  // From each leader to its followers; with a drone selected, from those it hears to it.
+  links(moment, many, selected) {
+    const pen = this.pen, state = moment.sample.state;
+    pen.lineWidth = 1;
+    pen.strokeStyle = this.ink.soft;
+    pen.globalAlpha = many ? 0.15 : 0.4;
+    pen.beginPath();
+    for (let i = 0; i < moment.x.length; i++) {
+      const leader = state.leader[i];
+      if (leader === null || leader === i || !state.alive[i] || leader >= moment.x.length) continue;
+      pen.moveTo(this.px(moment.x[leader]), this.py(moment.y[leader]));
+      pen.lineTo(this.px(moment.x[i]), this.py(moment.y[i]));
+    }
+    pen.stroke();
+    if (selected !== null && moment.heard) {
+      pen.strokeStyle = this.ink.focus;
+      pen.globalAlpha = 0.8;
+      pen.beginPath();
+      for (const source of moment.heard.keys()) {
+        pen.moveTo(this.px(moment.x[source]), this.py(moment.y[source]));
+        pen.lineTo(this.px(moment.x[selected]), this.py(moment.y[selected]));
+      }
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  // Frames that were lost on their way just now; with a drone selected, those to it.
+  drops(moment, selected) {
+    const pen = this.pen, radio = moment.sample.radio;
+    pen.strokeStyle = this.ink.bad;
+    pen.lineWidth = 1.2;
+    pen.globalAlpha = 0.55;
+    pen.setLineDash([3, 4]);
+    pen.beginPath();
+    for (const frame of radio.frames) {
+      for (let k = 0; k < frame.fate.length; k++) {
+        const to = radio.receiver === null ? k : radio.receiver;
+        if ("h-r".includes(frame.fate[k]) || (selected !== null && to !== selected)) continue;
+        pen.moveTo(this.px(moment.x[frame.source]), this.py(moment.y[frame.source]));
+        pen.lineTo(this.px(moment.x[to]), this.py(moment.y[to]));
+      }
+    }
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.globalAlpha = 1;
+  }
+
+  drones(moment, many, selected) {
+    const pen = this.pen, state = moment.sample.state;
+    const size = Math.min(Math.max(3.5 * this.view.scale, many ? 2.5 : 5), 14);
+    for (const [group, members] of this.byGroup(moment)) {
+      pen.fillStyle = this.colour(group);
+      pen.beginPath();
+      for (const i of members) this.arrow(moment, i, size);
+      pen.fill();
+    }
+    pen.lineWidth = 2;
+    pen.strokeStyle = this.ink.ink;
+    pen.beginPath();
+    for (let i = 0; i < moment.x.length; i++) {
+      if (!state.leads[i] || !state.alive[i]) continue;
+      const x = this.px(moment.x[i]), y = this.py(moment.y[i]);
+      pen.moveTo(x + size * 1.5, y);
+      pen.arc(x, y, size * 1.5, 0, 7);
+    }
+    pen.stroke();
+    if (selected !== null && selected < moment.x.length) {
+      pen.strokeStyle = this.ink.focus;
+      pen.lineWidth = 3;
+      pen.beginPath();
+      pen.arc(this.px(moment.x[selected]), this.py(moment.y[selected]), size * 2, 0, 7);
+      pen.stroke();
+    }
+    if (this.shows.names && (!many || this.view.scale > 3)) this.names(moment, size);
+  }
+
+  arrow(moment, i, size) {
+    const pen = this.pen, x = this.px(moment.x[i]), y = this.py(moment.y[i]);
+    const v = Math.hypot(moment.vx[i], moment.vy[i]);
+    if (!moment.sample.state.alive[i]) {
+      pen.rect(x - size, y - size / 4, 2 * size, size / 2);
+      pen.rect(x - size / 4, y - size, size / 2, 2 * size);
+      return;
+    }
+    const c = v > 0.05 ? moment.vx[i] / v : 1, s = v > 0.05 ? -moment.vy[i] / v : 0;
+    pen.moveTo(x + 1.3 * size * c, y + 1.3 * size * s);
+    pen.lineTo(x - size * c - 0.8 * size * s, y - size * s + 0.8 * size * c);
+    pen.lineTo(x - 0.5 * size * c, y - 0.5 * size * s);
+    pen.lineTo(x - size * c + 0.8 * size * s, y - size * s - 0.8 * size * c);
+    pen.closePath();
+  }
+
+  names(moment, size) {
+    const pen = this.pen;
+    pen.fillStyle = this.ink.ink;
+    pen.font = "12px system-ui,sans-serif";
+    pen.textAlign = "left";
+    for (let i = 0; i < moment.x.length; i++) {
+      pen.fillText(i, this.px(moment.x[i]) + size * 1.3 + 2, this.py(moment.y[i]) - size);
+    }
+  }
+
+  // The drone under a point of the canvas, or null.
+  pick(moment, px, py) {
+    let best = null, least = 18 * 18;
+    for (let i = 0; i < moment.x.length; i++) {
+      const d = (this.px(moment.x[i]) - px) ** 2 + (this.py(moment.y[i]) - py) ** 2;
+      if (d < least) { least = d; best = i; }
+    }
+    return best;
+  }
+}

@@ -1,0 +1,30 @@
+//! Several quantities of one unit over time.
+
+use super::style::{Axes, Heading, PALETTE, Sign, plot, px, words};
+use plotters::prelude::*;
+
+const HEIGHT: u32 = px(320);
+
+/// A line and its name; points are times in s and values.
+pub(super) struct Line {
+    pub label: String,
+    pub points: Vec<(f64, f64)>,
+}
+
+/// The SVG.
+pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String, String> {
+    let colours = || PALETTE.iter().cycle();
+    let signs = lines.iter().zip(colours()).map(|(line, &colour)| (Sign::Line(colour), line.label.clone()));
+    let heading = Heading::new(title, signs.collect());
+    let all = || lines.iter().flat_map(|line| line.points.iter());
+    let end = all().map(|point| point.0).fold(1e-3, f64::max);
+    let top = all().map(|point| point.1).fold(1e-3, f64::max) * 1.08;
+    let axes = Axes { x: ("time (s)", 0.0..end), y: (y_label, 0.0..top), height: HEIGHT };
+    plot(&heading, axes, |_, chart| {
+        for (line, colour) in lines.iter().zip(colours()) {
+            let points = line.points.iter().copied();
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(px(2)))).map_err(words)?;
+        }
+        Ok(())
+    })
+}

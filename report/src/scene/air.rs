@@ -1,0 +1,125 @@
+//! Who hears a frame: the receivers' own rule, asked again.
+
+use crate::scene::facts::SceneFacts;
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::payload::{LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE};
+use skein_protocol::radio::{DropReason, Verdict};
+use skein_protocol::record::DroneRow;
+use skein_protocol::{DroneId, Message, Vec2};
+
+/// The letter of a receiver that has nothing to do with a frame.
+const ABSENT: char = '-';
+
+/// What becomes of a frame at one receiver, as a letter.
+pub(super) fn fate(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows: &[DroneRow], dt_ns: i64) -> char {
+    let Some(row) = rows.get(receiver.index()).filter(|row| row.alive() && receiver != frame.source) else {
+        return ABSENT;
+    };
+    if Message::decode(&frame.frame).is_err() {
+        return letter(DropReason::Malformed);
+    }
+    if let Some(reason) = row.cuts.cut_off(frame.cuts) {
+        return letter(reason);
+    }
+    match scene.radio.fate(frame, receiver, Vec2::from(row.position_m), dt_ns) {
+        Verdict::Deliver { .. } => 'h',
+        Verdict::Drop(reason) => letter(reason),
+    }
+}
+
+/// A reason's name.
+pub(super) fn reason(reason: DropReason) -> String {
+    serde_json::to_value(reason).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+fn letter(why: DropReason) -> char {
+    reason(why).chars().next().unwrap_or('?')
+}
+
+/// The name of a frame's kind.
+pub(super) fn kind(frame: &AirFrame) -> String {
+    let topic = Topic::from_wire(frame.frame.kind).and_then(|topic| serde_json::to_value(topic).ok());
+    topic.as_ref().and_then(|name| name.as_str()).unwrap_or("unknown").to_owned()
+}
+
+/// What a frame says, in a few words.
+pub(super) fn says(frame: &AirFrame) -> String {
+    match Message::decode(&frame.frame) {
+        Ok(Message::Pose(_)) => String::new(),
+        Ok(Message::Obstacle(obstacle)) => format!("obstacle {}, seen by {}", obstacle.id.0, obstacle.witness),
+        Ok(Message::Leadership(said)) => {
+            let what = match said.kind {
+                LEADERSHIP_CLAIM => "claims",
+                LEADERSHIP_HEARTBEAT => "leads",
+                LEADERSHIP_PROBE => "misses the leader of",
+                LEADERSHIP_OBJECTION => "heard of the leader of",
+                _ => "hands over",
+            };
+            format!("{what} {}, round {}", said.group, said.ballot.round)
+        }
+        Ok(Message::Plan(plan)) => {
+            let phase = ["cruise", "avoid", "reform"].get(plan.phase as usize).copied().unwrap_or("plan");
+            let set: Vec<String> = plan.set.iter().take(plan.set_count as usize).map(|id| id.0.to_string()).collect();
+            let past = if set.is_empty() { String::new() } else { format!(", obstacles {}", set.join(", ")) };
+            format!("{phase} {}, round {} epoch {}{past}", plan.group, plan.id.ballot.round, plan.id.epoch)
+        }
+        Ok(Message::Assignment(part)) => format!("drone {}: {}, place {}", part.drone, part.group, part.rank),
+        Ok(Message::Arrivals(row)) => format!("drone {}: ways past {} routes", row.drone, row.routes),
+        Ok(Message::Passed(passed)) => format!("past {} obstacles", passed.set_count),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::row;
+    use skein_protocol::SimTime;
+    use skein_protocol::payload::Passed;
+    use skein_protocol::radio::{Air, Radio, Range};
+
+    fn frame(sequence: u32) -> AirFrame {
+        let said = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), reserved: 0 };
+        AirFrame {
+            tick: 3,
+            source: DroneId(0),
+            sequence,
+            position_m: [0.0; 2],
+            queue_ns: 0,
+            cuts: Default::default(),
+            frame: Message::Passed(said).encode(),
+        }
+    }
+
+    fn scene(radio: Radio) -> SceneFacts {
+        SceneFacts { radio, ..SceneFacts::default() }
+    }
+
+    #[test]
+    fn a_frame_has_a_fate_at_each_receiver() {
+        let rows = [row(0.0, 0.0), row(10.0, 0.0), row(50.0, 0.0), DroneRow::default()];
+        let near = scene(Radio {
+            air: Air { range: Some(Range { half_m: 20.0, shadowing_db: 0.0, exponent: 2.0 }), ..Air::default() },
+            ..Radio::default()
+        });
+        let fates = |scene: &SceneFacts, frame: &AirFrame| -> String {
+            (0..4).map(|drone| fate(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
+        };
+        assert_eq!(fates(&near, &frame(0)), "-hr-");
+        let lossy = scene(Radio { air: Air { loss: 1.0, ..Air::default() }, ..Radio::default() });
+        assert_eq!(fates(&lossy, &frame(0)), "-ll-");
+        let mut broken = frame(0);
+        broken.frame.len = 1;
+        assert_eq!(fates(&near, &broken), "-mm-");
+    }
+
+    #[test]
+    fn frames_are_named_and_told() {
+        assert_eq!((kind(&frame(0)).as_str(), says(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
+        let mut strange = frame(0);
+        strange.frame.kind = 99;
+        assert_eq!(kind(&strange), "unknown");
+        assert!(says(&strange).contains("99"));
+    }
+}

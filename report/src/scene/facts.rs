@@ -1,0 +1,50 @@
+//! What a picture shows beside the drones.
+
+use serde::{Deserialize, Serialize};
+use skein_protocol::radio::Radio;
+
+/// What a picture of the run needs to know, and no figure of the summary depends on. World frame, SI units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SceneFacts {
+    /// What the air does to frames: who hears what follows from it.
+    pub radio: Radio,
+    /// Distance at which obstacles are sensed, m.
+    pub detection_range_m: f64,
+    /// Radius of a drone's danger zone at v m/s: `[0] + [1]·v + [2]·v²`, m.
+    pub danger_m: [f64; 3],
+    /// The obstacle sets as a leader that knows all would see them, in flight order.
+    pub sets: Vec<SetOutline>,
+}
+
+impl SceneFacts {
+    /// Radius of the danger zone at this speed, m.
+    #[must_use]
+    pub fn danger_zone_m(&self, speed_mps: f64) -> f64 {
+        self.danger_m[0] + speed_mps * (self.danger_m[1] + speed_mps * self.danger_m[2])
+    }
+}
+
+/// An obstacle set: where no path may lead, and where paths may.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetOutline {
+    /// Its obstacles.
+    pub obstacles: Vec<u32>,
+    /// Abscissa of its gate, m.
+    pub gate_x_m: f64,
+    /// Inflated obstacles; those too close for a way between them are one.
+    pub hulls_m: Vec<Vec<[f64; 2]>>,
+    /// The corners that each route passes, from the rightmost route on.
+    pub routes_m: Vec<Vec<[f64; 2]>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_danger_zone_grows_with_the_square_of_speed() {
+        let scene = SceneFacts { danger_m: [15.0, 1.0, 0.2], ..SceneFacts::default() };
+        assert_eq!((scene.danger_zone_m(0.0), scene.danger_zone_m(10.0)), (15.0, 45.0));
+    }
+}

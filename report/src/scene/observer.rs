@@ -1,0 +1,184 @@
+//! Makes samples of a run's records.
+
+use crate::accumulate::seconds;
+use crate::facts::RunFacts;
+use crate::scene::air;
+use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State};
+use crate::scene::slots::Slots;
+use skein_protocol::payload::NO_ROUTE;
+use skein_protocol::radio::DropReason;
+use skein_protocol::record::{DroneRow, ROW_LATE, ROW_LEADS, RecordView};
+use skein_protocol::{DroneId, SimTime};
+
+/// Up to this many drones every frame is listed, with its fate at every receiver.
+pub const FATES_MAX: usize = 64;
+/// Most frames in a sample: beyond, the oldest are left out.
+const FRAMES_MAX: usize = 4096;
+
+/// Watches a run's records and makes samples of them.
+pub struct Observer {
+    facts: RunFacts,
+    dt_ns: i64,
+    slots: Slots,
+    radio: RadioSample,
+    receiver: Option<DroneId>,
+    last_tick: Option<u64>,
+}
+
+impl Observer {
+    /// Of a run that was ordered so.
+    #[must_use]
+    pub fn new(facts: RunFacts) -> Self {
+        let dt_ns = (facts.dt_s * 1e9).round() as i64;
+        Self { facts, dt_ns, slots: Slots::default(), radio: RadioSample::default(), receiver: None, last_tick: None }
+    }
+
+    /// In a swarm of more than [`FATES_MAX`] drones, lists what this one hears from now on, or nothing.
+    pub fn listen(&mut self, receiver: Option<DroneId>) {
+        self.receiver = receiver.filter(|_| self.facts.drones as usize > FATES_MAX);
+        self.radio.frames.clear();
+    }
+
+    /// Takes the record of a tick, and makes a sample of it if one is wanted. The last record of a run, which repeats a
+    /// tick, gives none.
+    pub fn take(&mut self, record: RecordView<'_>, wanted: bool) -> Option<Sample> {
+        let head = record.head;
+        if record.rows.is_empty() || self.last_tick.is_some_and(|last| head.tick <= last) {
+            return None;
+        }
+        self.last_tick = Some(head.tick);
+        self.slots.hear(record.frames, record.rows);
+        self.count(record);
+        wanted.then(|| Sample {
+            state: self.state(record),
+            energy: energy(record.rows),
+            radio: RadioSample {
+                receiver: self.receiver.map(|receiver| receiver.0),
+                ..std::mem::take(&mut self.radio)
+            },
+        })
+    }
+
+    fn count(&mut self, record: RecordView<'_>) {
+        let radio = &mut self.radio;
+        radio.heard.resize(record.rows.len(), 0);
+        radio.dropped_by.resize(record.rows.len(), 0);
+        for (drone, row) in record.rows.iter().enumerate() {
+            radio.heard[drone] += row.heard;
+            for (reason, &count) in DropReason::ALL.into_iter().zip(&row.dropped).filter(|(_, count)| **count > 0) {
+                *radio.dropped.entry(air::reason(reason)).or_default() += count;
+                radio.dropped_by[drone] += count;
+            }
+        }
+        let listed = self.facts.drones as usize <= FATES_MAX || self.receiver.is_some();
+        for frame in record.frames {
+            let kind = air::kind(frame);
+            if listed {
+                let fate = self.fates(frame, record.rows);
+                let (source, sequence) = (frame.source.0, frame.sequence);
+                let t_s = seconds(SimTime(frame.tick as i64 * self.dt_ns));
+                let says = air::says(frame);
+                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: kind.clone(), says, fate });
+            }
+            *self.radio.sent.entry(kind).or_default() += 1;
+        }
+        let surplus = self.radio.frames.len().saturating_sub(FRAMES_MAX);
+        self.radio.frames.drain(..surplus);
+    }
+
+    fn fates(&self, frame: &skein_protocol::frame::AirFrame, rows: &[DroneRow]) -> String {
+        let fate = |drone| air::fate(&self.facts.scene, frame, drone, rows, self.dt_ns);
+        match self.receiver {
+            Some(receiver) => fate(receiver).to_string(),
+            None => (0..rows.len() as u32).map(|drone| fate(DroneId(drone))).collect(),
+        }
+    }
+
+    fn state(&self, record: RecordView<'_>) -> State {
+        let (now, rows) = (record.head.now, record.rows);
+        let mut state = State { tick: record.head.tick, t_s: seconds(now), ..State::default() };
+        for (drone, row) in rows.iter().enumerate() {
+            state.x_m.push(fine(row.position_m[0]));
+            state.y_m.push(fine(row.position_m[1]));
+            state.vx_mps.push(fine(row.velocity_mps[0]));
+            state.vy_mps.push(fine(row.velocity_mps[1]));
+            state.alive.push(u8::from(row.alive()));
+            state.group.push(row.group.to_string());
+            state.leader.push(row.leader().map(|leader| leader.0));
+            state.leads.push((row.flags & ROW_LEADS != 0).then(|| row.led.to_string()));
+            state.phase.push(row.phase);
+            state.route.push((row.route != NO_ROUTE && row.obeyed.ballot.is_some()).then_some(row.route));
+            state.rank.push(row.rank);
+            state.plan.push([row.obeyed.ballot.round, row.obeyed.epoch]);
+            let slot = self.slots.of(drone, row, now).filter(|_| row.alive());
+            state.slot_m.push(slot.map(|slot| [fine(slot.x), fine(slot.y)]));
+            state.late.push(u8::from(row.flags & ROW_LATE != 0));
+        }
+        state
+    }
+}
+
+fn energy(rows: &[DroneRow]) -> EnergySample {
+    let total_j: f64 = rows.iter().filter(|row| row.alive()).map(|row| row.energy_j).sum();
+    EnergySample { total_j: fine(total_j), drone_j: rows.iter().map(|row| fine(row.energy_j)).collect() }
+}
+
+/// To a thousandth: a picture needs no more, and the text stays short.
+pub(crate) fn fine(value: f64) -> f64 {
+    // Adding zero turns -0 into 0.
+    (value * 1e3).round() / 1e3 + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{facts, row};
+    use skein_protocol::Message;
+    use skein_protocol::frame::AirFrame;
+    use skein_protocol::payload::Passed;
+    use skein_protocol::record::RecordHead;
+
+    fn frame(tick: u64) -> AirFrame {
+        let said = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), reserved: 0 };
+        AirFrame {
+            tick,
+            source: DroneId(1),
+            sequence: tick as u32,
+            position_m: [0.0; 2],
+            queue_ns: 0,
+            cuts: Default::default(),
+            frame: Message::Passed(said).encode(),
+        }
+    }
+
+    fn take(observer: &mut Observer, tick: u64, drones: usize, wanted: bool) -> Option<Sample> {
+        let rows: Vec<DroneRow> = (0..drones)
+            .map(|drone| DroneRow { heard: 2, dropped: [0, 0, 1, 0, 0, 0, 0], ..row(1.00049, drone as f64) })
+            .collect();
+        let head = RecordHead { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHead::default() };
+        observer.take(RecordView { head: &head, rows: &rows, frames: &[frame(tick)], events: &[] }, wanted)
+    }
+
+    #[test]
+    fn what_was_said_between_two_samples_is_in_the_second() {
+        let mut observer = Observer::new(facts(3));
+        assert!(take(&mut observer, 0, 3, false).is_none());
+        let sample = take(&mut observer, 1, 3, true).unwrap();
+        assert_eq!((sample.state.tick, sample.state.t_s, sample.state.x_m[2]), (1, 0.04, 1.0));
+        assert_eq!((sample.radio.sent["passed"], sample.radio.dropped["range"]), (2, 6));
+        assert_eq!((sample.radio.heard, sample.radio.dropped_by), (vec![4; 3], vec![2; 3]));
+        assert_eq!((sample.radio.frames.len(), sample.radio.frames[1].fate.as_str()), (2, "h-h"));
+        assert_eq!(sample.radio.frames[1].t_s, 0.02);
+        assert!(take(&mut observer, 1, 3, true).is_none(), "the last record repeats a tick");
+        assert_eq!(take(&mut observer, 2, 3, true).unwrap().radio.frames.len(), 1);
+    }
+
+    #[test]
+    fn in_a_large_swarm_one_receiver_is_listened_to() {
+        let mut observer = Observer::new(facts(65));
+        assert!(take(&mut observer, 0, 65, true).unwrap().radio.frames.is_empty());
+        observer.listen(Some(DroneId(4)));
+        let sample = take(&mut observer, 1, 65, true).unwrap();
+        assert_eq!((sample.radio.receiver, sample.radio.frames[0].fate.as_str()), (Some(4), "h"));
+    }
+}

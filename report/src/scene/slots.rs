@@ -1,0 +1,113 @@
+//! Where the slots are that drones were given, from what leaders say.
+
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan};
+use skein_protocol::record::DroneRow;
+use skein_protocol::{Message, PlanStamp, SimTime, Vec2};
+use std::collections::BTreeMap;
+
+/// Plans on the air, and each drone's part in the latest of them.
+#[derive(Debug, Default)]
+pub(super) struct Slots {
+    plans: BTreeMap<PlanStamp, Plan>,
+    parts: Vec<Option<Assignment>>,
+}
+
+impl Slots {
+    /// Hears what is on the air; forgets plans that nobody obeys any more and a later one has followed.
+    pub fn hear(&mut self, frames: &[AirFrame], rows: &[DroneRow]) {
+        self.parts.resize(rows.len(), None);
+        let mut planned = false;
+        let told = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
+        for frame in frames.iter().filter(told) {
+            match Message::decode(&frame.frame) {
+                Ok(Message::Plan(plan)) => planned |= self.plans.insert(plan.id, plan).is_none(),
+                Ok(Message::Assignment(part)) => {
+                    if let Some(place) = self.parts.get_mut(part.drone.index())
+                        && place.is_none_or(|known| known.id <= part.id)
+                    {
+                        *place = Some(part);
+                    }
+                }
+                _ => {} // Malformed: its receivers count it.
+            }
+        }
+        if planned {
+            let newest = self.plans.last_key_value().map(|(id, _)| *id);
+            self.plans.retain(|id, _| Some(*id) >= newest || rows.iter().any(|row| row.obeyed == *id));
+        }
+    }
+
+    /// Where a drone's slot is, world frame, m; `None` while it goes around something, or if it is not known.
+    pub fn of(&self, drone: usize, row: &DroneRow, now: SimTime) -> Option<Vec2> {
+        let part = self.parts.get(drone).copied().flatten().filter(|part| part.id == row.obeyed)?;
+        let plan = self.plans.get(&part.id).filter(|plan| plan.phase != PHASE_AVOID)?;
+        let since_s = (now.0 - plan.stamp.0) as f64 / 1e9;
+        let mut anchor = Vec2::from(plan.anchor_m) + Vec2::from(plan.anchor_mps) * since_s;
+        anchor.x = anchor.x.min(plan.anchor_stop_x_m.max(plan.anchor_m[0]));
+        Some(anchor + Vec2::from(part.slot_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::row;
+    use skein_protocol::payload::{MAX_SET, NO_ROUTE, PHASE_CRUISE};
+    use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId};
+
+    fn said(message: Message) -> AirFrame {
+        AirFrame {
+            tick: 0,
+            source: DroneId(0),
+            sequence: 0,
+            position_m: [0.0; 2],
+            queue_ns: 0,
+            cuts: Default::default(),
+            frame: message.encode(),
+        }
+    }
+
+    #[test]
+    fn a_slot_moves_with_its_anchor_until_that_stops() {
+        let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
+        let id = PlanStamp { ballot, epoch: 1 };
+        let plan = Plan {
+            stamp: SimTime::ZERO,
+            id,
+            group: GroupId::ALL,
+            phase: PHASE_CRUISE,
+            members: 1,
+            anchor_m: [0.0, 5.0],
+            anchor_mps: [10.0, 0.0],
+            anchor_stop_x_m: 15.0,
+            predicted_s: f64::NAN,
+            candidates: 0,
+            routes: 0,
+            set_count: 0,
+            set: [ObstacleId(0); MAX_SET],
+            reserved: 0,
+        };
+        let part = Assignment {
+            id,
+            scope: GroupId::ALL,
+            group: GroupId::ALL,
+            drone: DroneId(1),
+            leader: DroneId(0),
+            slot_m: [-3.0, 1.0],
+            arrival_s: 0.0,
+            route: NO_ROUTE,
+            rank: 0,
+            reserved: 0,
+        };
+        let rows = [row(0.0, 0.0), DroneRow { obeyed: id, ..row(0.0, 0.0) }];
+        let mut slots = Slots::default();
+        slots.hear(&[said(Message::Plan(plan)), said(Message::Assignment(part))], &rows);
+        let at = |s: f64| slots.of(1, &rows[1], SimTime::from_secs(s));
+        assert_eq!(at(1.0), Some(Vec2::new(7.0, 6.0)));
+        assert_eq!(at(9.0), Some(Vec2::new(12.0, 6.0)));
+        assert_eq!(slots.of(1, &rows[0], SimTime::ZERO), None);
+        assert_eq!(slots.of(0, &rows[0], SimTime::ZERO), None);
+    }
+}

@@ -1,0 +1,117 @@
+//! `skein replay`: flies a recorded run again from its manifest, and compares the digests.
+
+use crate::cli::{PinChoice, RuntimeChoice, WaitChoice};
+use crate::exit::{Exit, Failure};
+use crate::facts::facts;
+use crate::interrupt::Interrupt;
+use clap::Args;
+use serde_json::json;
+use skein_protocol::record::Outcome;
+use skein_report::{Ending, Recorder, RunFolder, Summary};
+use skein_runtime::supervisor::{self, Launch, ProcessInfo};
+use skein_runtime::{Clock, RunEnd, RuntimeError, inline};
+use skein_scenario::Scenario;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  skein replay runs/s2-right-1
+  skein replay runs/s2-right-1 --runtime inline --json
+
+Exit codes: 0 the digests are equal, 1 they differ, 2 not a recorded run, 3 the environment failed.")]
+pub struct ReplayArgs {
+    /// Folder of a recorded run
+    pub run_dir: PathBuf,
+    /// Fly it in this runtime [default: the recorded run's]; the digest is the same in both
+    #[arg(long, value_enum)]
+    pub runtime: Option<RuntimeChoice>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Flies the run again, in lockstep, and writes nothing.
+pub fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
+    let folder = RunFolder::open(&args.run_dir).map_err(Failure::usage)?;
+    let manifest = folder.read_manifest().map_err(Failure::usage)?;
+    let recorded = folder.read_summary().map_err(Failure::usage)?;
+    let scenario: Scenario = serde_json::from_value(manifest.scenario).map_err(|error| {
+        let path = args.run_dir.join("manifest.json");
+        Failure::usage(format!("{}: expected the scenario of a run by this version of Skein: {error}", path.display()))
+    })?;
+    let runtime = args.runtime.unwrap_or(match manifest.facts.runtime.as_str() {
+        "inline" => RuntimeChoice::Inline,
+        _ => RuntimeChoice::Processes,
+    });
+    let interrupt = Interrupt::watch()?;
+    let name = if runtime == RuntimeChoice::Inline { "inline" } else { "processes" };
+    let mut recorder = Recorder::in_memory(facts(&scenario, name, "lockstep")?);
+    let end = fly(runtime, &scenario, &interrupt, &mut recorder).map_err(Failure::environment)?;
+    let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+    let (flown, _) = recorder.finish(&ending);
+    if let Some(signal) = end.signal {
+        return Ok(Exit::Interrupted(signal));
+    }
+    if let Some(trouble) = end.failure.or(end.sink_error) {
+        return Err(Failure::environment(trouble));
+    }
+    let equal = recorded.digest.is_some() && recorded.digest == flown.digest;
+    print(args, &recorded, &flown, equal);
+    Ok(if equal { Exit::Reached } else { Exit::NotReached })
+}
+
+fn fly(
+    runtime: RuntimeChoice,
+    scenario: &Scenario,
+    interrupt: &Interrupt,
+    recorder: &mut Recorder,
+) -> Result<RunEnd, RuntimeError> {
+    if runtime == RuntimeChoice::Inline {
+        return inline::run(scenario, recorder, || interrupt.signal());
+    }
+    skein_bus::clean()?;
+    let launch = Launch {
+        scenario,
+        clock: Clock::Lockstep,
+        pin: PinChoice::Auto.into(),
+        wait: WaitChoice::Block.into(),
+        executable: std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?,
+        on_ready: &mut |_: &[ProcessInfo]| Ok(()),
+        interrupted: &mut || interrupt.signal(),
+    };
+    supervisor::run(launch, recorder)
+}
+
+/// What made the recorded run one that its scenario alone does not give again.
+fn reasons(recorded: &Summary) -> Vec<String> {
+    let unasked = recorded.faults.iter().filter(|fault| !fault.scheduled).count();
+    let reasons = [
+        (unasked > 0).then(|| format!("{unasked} faults of it were not in its scenario")),
+        (recorded.deadline_misses > 0).then(|| format!("{} deadlines were missed", recorded.deadline_misses)),
+        (recorded.outcome == Outcome::Aborted).then(|| "it was aborted".to_owned()),
+    ];
+    reasons.into_iter().flatten().collect()
+}
+
+fn print(args: &ReplayArgs, recorded: &Summary, flown: &Summary, equal: bool) {
+    let reasons = if equal { Vec::new() } else { reasons(recorded) };
+    let (was, is) = (recorded.digest.as_deref(), flown.digest.as_deref());
+    let mut out = std::io::stdout().lock();
+    // A closed pipe is the reader's choice.
+    let _ = if args.json {
+        let ticks = [recorded.ticks, flown.ticks];
+        writeln!(
+            out,
+            "{}",
+            json!({ "equal": equal, "recorded": was, "replayed": is, "ticks": ticks, "reasons": reasons })
+        )
+    } else {
+        let verdict = if equal { "equal" } else { "different" };
+        let why = if reasons.is_empty() { String::new() } else { format!("\nbecause   {}", reasons.join("; ")) };
+        let (was, is) = (was.unwrap_or("none"), is.unwrap_or("none"));
+        let (before, after) = (recorded.ticks, flown.ticks);
+        writeln!(out, "{verdict}\nrecorded  {was} after {before} ticks\nreplayed  {is} after {after} ticks{why}")
+    };
+}

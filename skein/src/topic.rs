@@ -1,0 +1,265 @@
+//! `skein topic`: taps what a running swarm says.
+
+use crate::exit::{Exit, Failure};
+use crate::interrupt::Interrupt;
+use crate::tap::{Running, Tap, nobody, running};
+use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+use skein_bus::BusError;
+use skein_protocol::downlink::DownlinkView;
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::record::RecordView;
+use skein_protocol::{Message, SimTime};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(1);
+/// Between two looks whether the swarm still lives.
+const ALIVE: Duration = Duration::from_millis(500);
+/// Wall time over which `hz` counts.
+const WINDOW: Duration = Duration::from_secs(1);
+
+/// Arguments of `topic`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  skein topic list
+  skein topic echo air --kind plan
+  skein topic echo senses --drone 3 --count 1
+  skein topic hz air")]
+pub struct TopicArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: Action,
+    /// The swarm whose name begins so, as `skein top` shows it; without it, the first one
+    #[arg(long, global = true, value_name = "NAME")]
+    pub run: Option<String>,
+}
+
+/// What to do with a topic.
+#[derive(Debug, Subcommand)]
+pub enum Action {
+    /// Print the topics of the running swarms
+    List,
+    /// Print what is said, a JSON object a line, until the swarm or the count ends
+    Echo(Filter),
+    /// Print once a second how often something is said, a JSON object a line
+    Hz(Filter),
+}
+
+/// Which messages.
+#[derive(Debug, Args)]
+pub struct Filter {
+    /// senses, air (as the drones get it), uplink (as the drones send it) or record
+    #[arg(value_enum)]
+    pub topic: Name,
+    /// Only of this drone
+    #[arg(long, value_name = "ID")]
+    pub drone: Option<u32>,
+    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed
+    #[arg(long, value_parser = kind)]
+    pub kind: Option<String>,
+    /// End after so many lines
+    #[arg(long, value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// The topics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Name {
+    /// What each drone senses of itself and around it.
+    Senses,
+    /// Frames on the air.
+    Air,
+    /// Frames that drones hand to their radios.
+    Uplink,
+    /// The truth, a row a drone.
+    Record,
+}
+
+impl Name {
+    const ALL: [(Self, &'static str, &'static str); 4] = [
+        (Self::Senses, "senses", "skein/downlink"),
+        (Self::Air, "air", "skein/downlink"),
+        (Self::Uplink, "uplink", "skein/uplink, as the world took it"),
+        (Self::Record, "record", "skein/watch"),
+    ];
+}
+
+fn kind(text: &str) -> Result<String, String> {
+    let known: Vec<String> = Topic::ALL.iter().map(|topic| name(*topic as u16)).collect();
+    if known.iter().any(|name| name == text) {
+        Ok(text.to_owned())
+    } else {
+        Err(format!("one of {}", known.join(", ")))
+    }
+}
+
+fn name(kind: u16) -> String {
+    let topic = Topic::from_wire(kind).and_then(|topic| serde_json::to_value(topic).ok());
+    topic.and_then(|topic| topic.as_str().map(str::to_owned)).unwrap_or_else(|| "unknown".to_owned())
+}
+
+/// Lists or listens.
+pub fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
+    let found = running(args.run.as_deref())?;
+    let first = found.first().ok_or_else(|| nobody(args.run.as_deref()))?;
+    match &args.action {
+        Action::List => list(&found),
+        Action::Echo(filter) => {
+            let mut left = filter.count.unwrap_or(u64::MAX);
+            listen(first, filter, |line| {
+                let Some(line) = line else { return true };
+                left -= 1;
+                // A closed pipe ends it.
+                writeln!(std::io::stdout().lock(), "{line}").is_ok() && left > 0
+            })
+        }
+        Action::Hz(filter) => hz(first, filter),
+    }
+}
+
+fn list(found: &[Running]) -> Result<Exit, Failure> {
+    for run in found {
+        let drones = Tap::attach(&run.path)?.facts.drones;
+        for (_, name, service) in Name::ALL {
+            println!("{}", json!({ "run": run.name(), "topic": name, "service": service, "drones": drones }));
+        }
+    }
+    Ok(Exit::Reached)
+}
+
+fn hz(run: &Running, filter: &Filter) -> Result<Exit, Failure> {
+    let (mut counts, mut since): (BTreeMap<String, u64>, Instant) = (BTreeMap::new(), Instant::now());
+    let mut left = filter.count.unwrap_or(u64::MAX);
+    listen(run, filter, |line| {
+        if let Some(line) = line {
+            let key = line.get("kind").and_then(Value::as_str).unwrap_or("messages").to_owned();
+            *counts.entry(key).or_default() += 1;
+        }
+        let passed = since.elapsed();
+        if passed < WINDOW {
+            return true;
+        }
+        let rate = |count: &u64| (*count as f64 / passed.as_secs_f64() * 10.0).round() / 10.0;
+        let rates: BTreeMap<&String, f64> = counts.iter().map(|(kind, count)| (kind, rate(count))).collect();
+        let told = writeln!(std::io::stdout().lock(), "{}", json!({ "hz": rates })).is_ok();
+        (counts, since) = (BTreeMap::new(), Instant::now());
+        left -= 1;
+        told && left > 0
+    })
+}
+
+/// Hands on every line that passes the filter, and `None` now and then when nothing is said; until the swarm has ended
+/// or `take` says no.
+fn listen(run: &Running, filter: &Filter, mut take: impl FnMut(Option<Value>) -> bool) -> Result<Exit, Failure> {
+    let interrupt = Interrupt::watch()?;
+    let tap = Tap::attach(&run.path)?;
+    let dt_s = tap.facts.dt_s;
+    let downlink = match filter.topic {
+        Name::Senses | Name::Air => Some(tap.downlink()?),
+        Name::Uplink | Name::Record => None,
+    };
+    let mut looked = Instant::now();
+    loop {
+        let lines = match &downlink {
+            Some(port) => heard(port.receive(), |sample| {
+                DownlinkView::parse(sample.bytes()).map(|down| of_downlink(&down, filter, dt_s)).unwrap_or_default()
+            })?,
+            None => heard(tap.records.receive(), |sample| {
+                RecordView::parse(sample.bytes()).map(|record| of_record(record, filter, dt_s)).unwrap_or_default()
+            })?,
+        };
+        if let Some(signal) = interrupt.signal() {
+            return Ok(Exit::Interrupted(signal));
+        }
+        let idle = lines.is_none();
+        for line in lines.into_iter().flatten().map(Some).chain(idle.then_some(None)) {
+            if !take(line) {
+                return Ok(Exit::Reached);
+            }
+        }
+        if idle {
+            std::thread::sleep(LOOK);
+            if looked.elapsed() > ALIVE {
+                looked = Instant::now();
+                if !tap.alive() {
+                    return Ok(Exit::Reached);
+                }
+            }
+        }
+    }
+}
+
+fn heard<S>(
+    sample: Result<Option<S>, BusError>,
+    lines: impl FnOnce(S) -> Vec<Value>,
+) -> Result<Option<Vec<Value>>, Failure> {
+    Ok(sample.map_err(Failure::environment)?.map(lines))
+}
+
+fn of_downlink(down: &DownlinkView<'_>, filter: &Filter, dt_s: f64) -> Vec<Value> {
+    if filter.topic == Name::Air {
+        return frames(down.frames, filter, dt_s);
+    }
+    let wanted = |drone: &u32| filter.drone.is_none_or(|only| only == *drone);
+    let sensed = |drone: u32| {
+        let senses = down.senses(skein_protocol::DroneId(drone))?;
+        let obstacles: Vec<Value> = (senses.obstacles.iter())
+            .map(|seen| {
+                let id = senses.shape(seen).map(|shape| shape.id.0);
+                json!({ "obstacle": id, "nearest_m": seen.nearest_m, "distance_m": seen.distance_m })
+            })
+            .collect();
+        let neighbours: Vec<Value> = (senses.neighbours.iter())
+            .map(
+                |near| json!({ "drone": near.drone, "position_m": near.position_m, "velocity_mps": near.velocity_mps }),
+            )
+            .collect();
+        let (position, velocity) = ([senses.position.x, senses.position.y], [senses.velocity.x, senses.velocity.y]);
+        Some(json!({
+            "topic": "senses", "tick": senses.tick, "t_s": senses.now.secs(), "drone": drone,
+            "position_m": position, "velocity_mps": velocity, "obstacles": obstacles, "neighbours": neighbours,
+        }))
+    };
+    (0..down.drones.len() as u32).filter(wanted).filter_map(sensed).collect()
+}
+
+fn of_record(record: RecordView<'_>, filter: &Filter, dt_s: f64) -> Vec<Value> {
+    if filter.topic == Name::Uplink {
+        return frames(record.frames, filter, dt_s);
+    }
+    let rows = record.rows.iter().enumerate();
+    let wanted = rows.filter(|(drone, _)| filter.drone.is_none_or(|only| only as usize == *drone));
+    wanted
+        .map(|(drone, row)| {
+            json!({
+                "topic": "record", "tick": record.head.tick, "t_s": record.head.now.secs(), "drone": drone,
+                "alive": row.alive(), "position_m": row.position_m, "velocity_mps": row.velocity_mps,
+                "energy_j": row.energy_j, "group": row.group.to_string(), "leader": row.leader(),
+                "heard": row.heard, "dropped": row.dropped.iter().sum::<u32>(),
+            })
+        })
+        .collect()
+}
+
+fn frames(frames: &[AirFrame], filter: &Filter, dt_s: f64) -> Vec<Value> {
+    let of_drone = |frame: &&AirFrame| filter.drone.is_none_or(|only| only == frame.source.0);
+    let mut lines = Vec::new();
+    for frame in frames.iter().filter(of_drone) {
+        let kind = name(frame.frame.kind);
+        if filter.kind.as_ref().is_some_and(|only| *only != kind) {
+            continue;
+        }
+        let says = Message::decode(&frame.frame).map_or_else(|error| error.to_string(), |said| format!("{said:?}"));
+        let sent_s = SimTime((frame.tick as f64 * dt_s * 1e9).round() as i64).secs();
+        let topic = if filter.topic == Name::Air { "air" } else { "uplink" };
+        lines.push(json!({
+            "topic": topic, "kind": kind, "tick": frame.tick, "t_s": sent_s, "drone": frame.source,
+            "sequence": frame.sequence, "bytes": frame.frame.len, "says": says,
+        }));
+    }
+    lines
+}

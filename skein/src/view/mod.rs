@@ -1,0 +1,73 @@
+//! `skein view`: a running swarm, or a recorded run, in the browser of this machine.
+
+mod gate;
+mod hub;
+mod server;
+
+use crate::exit::{Exit, Failure};
+use crate::interrupt::Interrupt;
+use clap::Args;
+use hub::Hub;
+use server::Content;
+use skein_report::{RunFolder, page};
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  skein view                      the swarm that runs now, or the next one
+  skein view runs/s2-right-1      a recorded run
+  skein view --port 8080 --open
+
+The page is served to this machine alone, on 127.0.0.1. Ctrl-C ends it; the swarm flies on.")]
+pub struct ViewArgs {
+    /// Folder of a recorded run; without it, a running swarm
+    pub run_dir: Option<PathBuf>,
+    /// Port on 127.0.0.1; 0 takes a free one
+    #[arg(long, default_value_t = 0, value_name = "PORT")]
+    pub port: u16,
+    /// Open the page in the browser
+    #[arg(long)]
+    pub open: bool,
+    /// Watch swarms whose name begins so, as `skein top` shows it
+    #[arg(long, value_name = "NAME", conflicts_with = "run_dir")]
+    pub run: Option<String>,
+}
+
+/// Serves the page until it is interrupted.
+pub fn view(args: &ViewArgs) -> Result<Exit, Failure> {
+    let interrupt = Interrupt::watch()?;
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, args.port))
+        .map_err(|error| Failure::environment(format!("127.0.0.1:{}: {error}; another --port?", args.port)))?;
+    let port = listener.local_addr().map_err(Failure::environment)?.port();
+    let content = match &args.run_dir {
+        Some(path) => Content::Page(recorded(path)?),
+        None => Content::Live { page: page::live(port), hub: Arc::new(Hub::start(args.run.clone())) },
+    };
+    let url = format!("http://127.0.0.1:{port}/");
+    println!("{url}");
+    if args.open {
+        open(&url);
+    }
+    server::serve(&listener, port, &content, &interrupt).map_err(Failure::environment)?;
+    Ok(Exit::Reached)
+}
+
+fn recorded(path: &std::path::Path) -> Result<String, Failure> {
+    let folder = RunFolder::open(path).map_err(Failure::usage)?;
+    let manifest = folder.read_manifest().map_err(Failure::usage)?;
+    let summary = folder.read_summary().map_err(Failure::usage)?;
+    page::report(&folder, &manifest, &summary).map_err(Failure::usage)
+}
+
+/// Asks the desktop; where there is none, the address stands on stdout.
+fn open(url: &str) {
+    let mut command = Command::new("xdg-open");
+    command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if let Err(error) = command.spawn() {
+        eprintln!("skein: xdg-open: {error}; open {url} yourself");
+    }
+}
