@@ -99,7 +99,8 @@ impl Leading {
     pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
-            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && pose.term <= plan.ballot;
+            let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
+            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && hears(plan.ballot);
             let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
             let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);

@@ -1,6 +1,6 @@
 //! Leadership in simulated time, over a lossy and slow air: nobody healthy is deposed, the dead are replaced, and what
 //! was apart becomes one.
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::disallowed_macros, reason = "helpers of tests, which print what they found")]
 
 mod swarm;
 

@@ -3,20 +3,23 @@
 use crate::summary::{LeaderEntry, Term};
 use skein_protocol::record::{DroneRow, ROW_LEADS};
 use skein_protocol::{Ballot, DroneId, GroupId, Vec2};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Leadership over a mission.
 #[derive(Default)]
 pub(crate) struct Leading {
     /// Who took up leading.
     pub entries: Vec<LeaderEntry>,
-    /// Time with two leaders of one group in radio range of each other, s.
+    /// Time with two leaders in radio range of each other of whom one should follow the other, s: they lead the same
+    /// group, or the later term is for a group that holds the other leader's own.
     pub split_brain_s: f64,
     /// For each death of a leader, the time until another one led its group, s.
     pub failover_s: Vec<Option<f64>>,
     ballots: BTreeSet<Term>,
     orphans: Vec<Orphan>,
     leaders: Vec<(GroupId, usize)>,
+    /// The last term that each drone took up.
+    terms: BTreeMap<DroneId, Ballot>,
 }
 
 /// A group whose leader died.
@@ -35,6 +38,7 @@ impl Leading {
     /// A drone took up leading.
     pub fn elected(&mut self, t_s: f64, group: String, ballot: Ballot, leader: DroneId) {
         self.ballots.insert(ballot.into());
+        self.terms.insert(leader, ballot);
         self.entries.push(LeaderEntry { t_s, group, ballot: ballot.into(), leader: leader.0 });
     }
 
@@ -61,10 +65,11 @@ impl Leading {
         });
         let place = |drone: usize| Vec2::from(rows[drone].position_m);
         let hear = |a: usize, b: usize| range_m.is_none_or(|range| (place(a) - place(b)).norm() <= range);
-        let rivals = |group: &[(GroupId, usize)]| {
-            group.iter().enumerate().any(|(i, &(_, a))| group[..i].iter().any(|&(_, b)| hear(a, b)))
-        };
-        if leaders.chunk_by(|a, b| a.0 == b.0).any(rivals) {
+        let term = |drone: usize| self.terms.get(&DroneId(drone as u32));
+        let over = |(led, a): (GroupId, usize), b: usize| term(a) > term(b) && led.contains(rows[b].group);
+        let rivals = |a: (GroupId, usize), b: (GroupId, usize)| a.0 == b.0 || over(a, b.1) || over(b, a.1);
+        let mut pairs = leaders.iter().enumerate().flat_map(|(i, &a)| leaders[..i].iter().map(move |&b| (a, b)));
+        if pairs.any(|(a, b)| rivals(a, b) && hear(a.1, b.1)) {
             self.split_brain_s += dt_s;
         }
     }
@@ -97,6 +102,20 @@ mod tests {
         assert_eq!(split(Some(60.0), &rivals), 0.5);
         assert_eq!(split(Some(50.0), &rivals), 0.0);
         assert_eq!(split(None, &[leader(0.0, one), leader(60.0, GroupId::ALL)]), 0.0);
+        let nested = |later: u32, group| {
+            let mut leading = Leading::default();
+            for (round, leader) in [(1, 1 - later), (2, later)] {
+                let ballot = Ballot { round, incarnation: 1, claimant: DroneId(leader) };
+                leading.elected(0.5, "N".to_owned(), ballot, DroneId(leader));
+            }
+            let whole = DroneRow { group, ..leader(0.0, GroupId::ALL) };
+            leading.take(1.0, 0.5, &[whole, DroneRow { group: one, ..leader(60.0, one) }], None);
+            leading.split_brain_s
+        };
+        let two = GroupId::ALL.child(2);
+        assert_eq!(nested(1, two), 0.0, "a part has a leader of its own, the former one leads the rest");
+        assert_eq!(nested(0, two), 0.5, "the whole was claimed, and the leader of a part goes on");
+        assert_eq!(nested(1, one), 0.5, "the part of the former leader has another one now");
         let dead = DroneRow { flags: ROW_LEADS, ..leader(60.0, one) };
         assert_eq!(split(None, &[leader(0.0, one), dead]), 0.0);
     }

@@ -221,17 +221,17 @@ impl Mission {
     /// Whether all become one when nothing goes wrong any more: each side for itself, then, healed, the whole swarm.
     fn becomes_one(&self, state: &State) -> bool {
         let mut state = state.clone();
-        let apart = !state.cut.is_some() || self.settles(&mut state);
+        let apart = state.cut.is_none() || self.settles(&mut state);
         state.cut = None;
         apart && self.settles(&mut state)
     }
 
     fn settles(&self, state: &mut State) -> bool {
-        let past = Self::own(self.drones - 1, 0).position.x;
+        let exit_m = wall_at(self.walls - 1).1.bounds().1.x + 25.0;
         (0..PATIENCE).any(|_| {
+            let past = Self::own(self.drones - 1, state.step).position.x > exit_m;
             self.step(state);
-            let ahead = past + SPEED_MPS * PERIODS.dt_s * f64::from(state.step) < 250.0;
-            !ahead && state.breach.is_none() && state.sides().iter().all(|side| disunion(side).is_none())
+            past && state.breach.is_none() && state.sides().iter().all(|side| disunion(side).is_none())
         })
     }
 }
