@@ -14,7 +14,7 @@ if [ -z "$skein" ]; then
     cargo build --release --quiet
     skein=target/release/skein
 fi
-"$skein" run scenarios/paper/forest.toml --runtime inline --quiet --out "$scratch/forest"
+"$skein" run scenarios/paper/forest.toml --strategy congestion-aware-paper --runtime inline --quiet --out "$scratch/forest"
 cp "$scratch/forest/plots/flight.svg" docs/images/forest-flight.svg
 
 # shot NAME WIDTH HEIGHT COLOURS: the report, 55 s into the flight.
