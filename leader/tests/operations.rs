@@ -142,7 +142,7 @@ fn becomes_one(drones: usize, seed: u64, operations: &[Operation]) -> Result<(),
 fn what_went_wrong_once() {
     use Operation::*;
     let storm = |loss, delay, jitter| Weather { loss, delay, jitter };
-    let courses: [(usize, u64, Vec<Operation>); 9] = [
+    let courses: [(usize, u64, Vec<Operation>); 10] = [
         (6, 1_310_268_213_066_250_311, vec![Wall(67), storm(2, 8, 5), Run(24), Move(74, 12, 0), Kill(0), Run(7)]),
         (8, 17_864_427_315_851_311, {
             let start = vec![Move(232, 71, -76), Kill(166), storm(1, 1, 1), Wall(74), Run(131)];
@@ -162,6 +162,10 @@ fn what_went_wrong_once() {
         (3, 0, {
             let start = vec![Kill(107), Run(15), Freeze(43), Run(74), Double(9569, 53), Run(47)];
             [start, vec![Restart(8), Double(385, 39), Kill(136), Kill(81)]].concat()
+        }),
+        (8, 2_211_509_183_443_130, {
+            let start = vec![Run(6), Cut(182), Run(8), Move(205, 0, -11), Run(23), Cut(145), Wall(40), Kill(27)];
+            [start, vec![Run(32), Cut(85), storm(3, 12, 0), Run(55)]].concat()
         }),
         (3, 0, vec![Wall(40), Run(5), Kill(91), Kill(42), Restart(24), Wall(95)]),
     ];
