@@ -149,7 +149,7 @@ impl Leading {
         for peer in self.living(now) {
             if scope.contains(peer.group) {
                 members.push(peer);
-            } else if peer.group.contains(scope) && self.term_of(peer.id) < self.election.obeyed() {
+            } else if peer.group.contains(scope) && self.term_of(peer.id) <= self.election.obeyed() {
                 orphans.push(peer);
             } else {
                 others.push(peer);
@@ -159,7 +159,8 @@ impl Leading {
         orphans.retain(|orphan| {
             let later = |m: &Member| self.term_of(m.id) > self.term_of(orphan.id);
             let kin = others.iter().filter(|m| orphan.group.contains(m.group) && later(m));
-            nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
+            let mine = self.term_of(orphan.id) == self.election.obeyed();
+            mine || nearest_m2(orphan, members.iter()) <= nearest_m2(orphan, kin)
         });
         members.append(&mut orphans);
         (self.members, self.others) = (members, others);

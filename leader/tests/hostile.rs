@@ -224,6 +224,12 @@ proptest! {
                 swarm.step().unwrap();
             }
         }
+        for (_, leading) in swarm.side(0) {
+            let orders = [leading.ledger.obeyed(), leading.ledger.origin()];
+            prop_assert!(orders.into_iter().flatten().all(|orders| orders.parts.len() <= HONEST + 1));
+            prop_assert!(leading.obstacles.iter().count() <= noise.len() + 1);
+            prop_assert!(leading.ledger.sets().len() <= noise.len() + 1);
+        }
         let regained = swarm.until(20.0, |s| discord(&s.side(0)).or_else(|| belied(s)));
         prop_assert!(regained.is_ok(), "{regained:?}");
     }
