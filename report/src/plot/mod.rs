@@ -189,7 +189,7 @@ mod tests {
         assert!(text(1).contains("safe distance, 25 m") && text(3).contains("safe distance, 25 m"));
         assert!(text(2).contains("speed (m/s)") && !text(2).contains("safe distance"));
         assert!(text(1).contains("time (s)"));
-        assert!(text(4).contains("target shape (m)") && text(5).contains("bending energy (1)"));
+        assert!(text(7).contains("target shape (m)") && text(8).contains("bending energy (1)"));
     }
 
     #[test]
