@@ -1,5 +1,4 @@
 //! A small mission made by hand: four drones fly straight past a disc, the leader of one group dies, another leads on.
-
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use skein_protocol::formation::Shape;
