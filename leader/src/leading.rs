@@ -126,7 +126,7 @@ impl Leading {
             Message::Pose(pose) => self.hear_pose(now, source, pose),
             Message::Obstacle(o) => {
                 if self.obstacles.learn(now, o.id, o.shape, o.witness) {
-                    self.settle();
+                    self.settle(now);
                 }
             }
             Message::Leadership(l) => self.hear_leadership(now, source, l, say),
@@ -195,15 +195,14 @@ impl Leading {
         let new = self.obstacles.learn(now, id, shape, self.me);
         if new {
             self.talk.hurry();
-            self.settle();
+            self.settle(now);
         }
         new
     }
 
-    fn settle(&mut self) {
+    fn settle(&mut self, now: SimTime) {
         self.ledger.settle(&self.obstacles);
-        let group = self.ledger.group();
-        self.election.handle(SimTime::ZERO, 0, Input::Joined(group));
+        self.join(now);
     }
 
     fn join(&mut self, now: SimTime) {
