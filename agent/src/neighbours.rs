@@ -42,11 +42,8 @@ impl SwarmPilot {
     /// Less than half of an evasion falls to this drone only while the other shows that it obeys the same plan and is
     /// behind; more if this drone is behind; all of it if the other is silent.
     fn share(&self, now: SimTime, other: DroneId, places: &[QueuePlace; MAX_PLACES]) -> f64 {
-        let Some(pose) = self.leading.peers.last(other) else { return 1.0 };
+        let Some(pose) = self.leading.peers.last_of_living(other, now) else { return 1.0 };
         let age_s = now.since(pose.stamp);
-        if !self.leading.peers.is_living(other, now) {
-            return 1.0;
-        }
         let open = |place: &&QueuePlace| place.set != 0 && self.way.is_open_set(place.set);
         for mine in places.iter().filter(open) {
             let same = |place: &&QueuePlace| place.set == mine.set && place.route == mine.route;

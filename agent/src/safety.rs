@@ -128,7 +128,7 @@ impl Safety {
             let barrier = params.neighbour_barrier(&neighbour);
             let theirs = velocity + neighbour.velocity_mps;
             let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
-                trusts?.iter().find(|trust| trust.id == neighbour.id && neighbour.sensed).copied()
+                trusts.filter(|_| neighbour.sensed)?.iter().find(|trust| trust.id == neighbour.id).copied()
             };
             let braking = of(last).map_or_else(Vec2::zeros, |trust| (theirs - trust.velocity) / params.dt_s);
             let missing = of(due).map_or(0.0, |trust| trust.missing(braking));

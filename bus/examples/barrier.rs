@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let wait = if args.get(2).is_some_and(|mode| mode == "yield") { WaitMode::Yield } else { WaitMode::Block };
     let (drones, ticks) = (number(0, 8)?, number(1, 5000)? as u64);
     let cores = if pin == PinMode::Auto { allowed_cores()? } else { 1 };
-    let world = Control::create(ControlSpec { drones, cores, wait })?;
+    let world = Control::create(ControlSpec { drones, cores, per_process: 1, wait })?;
     let mut flock = (0..drones).map(|id| start(&world, id, pin)).collect::<Result<Vec<_>, _>>()?;
     while (0..drones).any(|id| world.ready(id).is_none()) {
         std::thread::sleep(Duration::from_millis(1));

@@ -215,6 +215,14 @@ impl DroneEnd {
         }
     }
 
+    /// Takes up the tick that another drone of the same process was given: they wait as one. False if this drone may not
+    /// answer it.
+    pub fn join_tick(&mut self, tick: Tick) -> bool {
+        let joined = word_of(tick).ok().filter(|&seen| seen > self.last && self.may_answer(seen));
+        self.last = joined.unwrap_or(self.last);
+        joined.is_some()
+    }
+
     /// Waits for another value than `seen`; false if there was none for a while.
     fn pause(&self, seen: u32) -> bool {
         let word = self.control.tick_word(self.control.core_of(self.drone));

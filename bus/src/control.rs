@@ -17,7 +17,7 @@ use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
 /// Raised with every change of the layout, and of `Slot` or `LinkStats`.
-const LAYOUT: u32 = 3;
+const LAYOUT: u32 = 4;
 /// Bound on drones and cores that an attached segment may announce.
 const MAX_COUNT: usize = 1 << 16;
 /// Looks before sleeping, if every process has a core of its own.
@@ -47,6 +47,8 @@ pub struct ControlSpec {
     pub drones: usize,
     /// Number of tick words, from 1: the cores that drones are pinned to, 1 if they are not pinned.
     pub cores: usize,
+    /// Drones in a process, from 1: those with ids from a multiple of it on. They share a tick word.
+    pub per_process: usize,
     /// How processes wait.
     pub wait: WaitMode,
 }
@@ -59,6 +61,7 @@ struct Header {
     cores: u32,
     wait: u32,
     spin: u32,
+    per_process: u32,
 }
 
 #[repr(C, align(128))]
@@ -139,7 +142,7 @@ impl Control {
     /// # Errors
     /// [`BusError::Control`] for a number of drones or cores out of range, [`BusError::System`].
     pub fn create(spec: ControlSpec) -> Result<Self, BusError> {
-        check_counts(spec.drones, spec.cores)?;
+        check_counts(&spec)?;
         let system = BusError::system;
         let memfd = memfd_create("skein-control", MemfdFlags::empty()).map_err(system("make the control segment"))?;
         let layout = Layout::new(spec.drones, spec.cores);
@@ -151,7 +154,8 @@ impl Control {
             drones: spec.drones as u32,
             cores: spec.cores as u32,
             wait: spec.wait as u32,
-            spin: spin_for(spec.drones),
+            spin: spin_for(spec.drones.div_ceil(spec.per_process)),
+            per_process: spec.per_process as u32,
         };
         let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd) };
         // SAFETY: `base` is the start of a fresh, page-aligned mapping that holds a header, and nobody else has it yet.
@@ -182,8 +186,13 @@ impl Control {
             ));
         }
         let wait = if header.wait == WaitMode::Yield as u32 { WaitMode::Yield } else { WaitMode::Block };
-        let spec = ControlSpec { drones: header.drones as usize, cores: header.cores as usize, wait };
-        check_counts(spec.drones, spec.cores)?;
+        let spec = ControlSpec {
+            drones: header.drones as usize,
+            cores: header.cores as usize,
+            per_process: header.per_process as usize,
+            wait,
+        };
+        check_counts(&spec)?;
         let layout = Layout::new(spec.drones, spec.cores);
         if size != layout.end {
             return wrong(format!("holds {size} bytes, expected {} for {} drones", layout.end, spec.drones));
@@ -222,7 +231,7 @@ impl Control {
     /// The tick word's number that a drone waits on; it should be pinned to that core.
     #[must_use]
     pub fn core_of(&self, drone: usize) -> usize {
-        drone % self.spec.cores
+        drone / self.spec.per_process % self.spec.cores
     }
 
     pub(crate) fn slot_at(&self, drone: usize) -> NonNull<Slot> {
@@ -280,11 +289,13 @@ impl Drop for Control {
     }
 }
 
-fn check_counts(drones: usize, cores: usize) -> Result<(), BusError> {
-    if (1..=MAX_COUNT).contains(&drones) && (1..=MAX_COUNT).contains(&cores) {
+fn check_counts(spec: &ControlSpec) -> Result<(), BusError> {
+    let ControlSpec { drones, cores, per_process, .. } = *spec;
+    if [drones, cores, per_process].iter().all(|count| (1..=MAX_COUNT).contains(count)) {
         return Ok(());
     }
-    Err(BusError::Control(format!("expected 1 to {MAX_COUNT} drones and cores, not {drones} and {cores}")))
+    let counts = format!("{drones}, {cores} and {per_process}");
+    Err(BusError::Control(format!("expected 1 to {MAX_COUNT} drones, cores and drones a process, not {counts}")))
 }
 
 /// Spinning pays only while the world and all drones have a core of their own. Asked by the launcher, before anybody is

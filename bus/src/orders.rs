@@ -98,7 +98,7 @@ mod tests {
     use crate::control::{ControlSpec, WaitMode};
 
     fn control() -> Control {
-        Control::create(ControlSpec { drones: 2, cores: 1, wait: WaitMode::Block }).unwrap()
+        Control::create(ControlSpec { drones: 2, cores: 1, per_process: 1, wait: WaitMode::Block }).unwrap()
     }
 
     #[test]

@@ -84,16 +84,17 @@ pub fn shards(drones: usize) -> usize {
 }
 
 impl Services {
-    /// Makes all services of a run: the launcher's part. `name` is the node's, for people.
+    /// Makes all services of a run: the launcher's part. Of `drones` drones `per_process` share a process, and its
+    /// uplink. `name` is the node's, for people.
     ///
     /// # Errors
     /// [`BusError::Service`].
-    pub fn create(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
+    pub fn create(domain: &Domain, drones: usize, per_process: usize, name: &str) -> Result<Self, BusError> {
         let node = node(domain, name)?;
         let kept = Kept {
             _downlink: create(&node, DOWNLINK, downlink_limits(drones))?,
             _uplinks: (0..shards(drones))
-                .map(|shard| create(&node, &uplink_name(shard), uplink_limits()))
+                .map(|shard| create(&node, &uplink_name(shard), uplink_limits(per_process)))
                 .collect::<Result<_, _>>()?,
             _record: create(&node, RECORD, record_limits())?,
             _watch: create(&node, WATCH, watch_limits())?,
@@ -257,9 +258,10 @@ fn downlink_limits(drones: usize) -> Limits {
 }
 
 /// A second subscriber is for a second world; observers have no business here.
-fn uplink_limits() -> Limits {
+fn uplink_limits(per_process: usize) -> Limits {
     let publishers = SHARD_DRONES + SPARE;
-    Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer: BUFFER, overflow: false }
+    let buffer = BUFFER * per_process.clamp(1, SHARD_DRONES);
+    Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer, overflow: false }
 }
 
 /// A second subscriber is for a second launcher.
@@ -375,7 +377,7 @@ mod tests {
         let mode = std::fs::Permissions::from_mode(0o700);
         let root = tempfile::Builder::new().permissions(mode).tempdir().unwrap();
         let domain = Domain::create_in(root.path(), "types").unwrap();
-        let services = Services::create(&domain, 1, "launcher").unwrap();
+        let services = Services::create(&domain, 1, 1, "launcher").unwrap();
         let payload = open::<RecordWord, StreamHeader>(&services.node, DOWNLINK).unwrap_err();
         let header = open::<DownWord, UplinkHeader>(&services.node, DOWNLINK).unwrap_err();
         for error in [payload.to_string(), header.to_string()] {

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const LONG: Patience = Patience::For(Duration::from_secs(5));
 
 fn segment(drones: usize, cores: usize, wait: WaitMode) -> Control {
-    Control::create(ControlSpec { drones, cores, wait }).unwrap()
+    Control::create(ControlSpec { drones, cores, per_process: 1, wait }).unwrap()
 }
 
 fn end_of(launcher: &Control, drone: usize) -> DroneEnd {
@@ -192,7 +192,7 @@ fn what_is_no_control_segment_is_refused() {
     assert!(matches!(&error, BusError::Control(why) if why.contains("not a control segment")), "{error}");
     assert!(matches!(Control::attach(-1), Err(BusError::Io { .. })));
     for (drones, cores) in [(0, 1), (1, 0), (1 << 17, 1)] {
-        assert!(Control::create(ControlSpec { drones, cores, wait: WaitMode::Block }).is_err());
+        assert!(Control::create(ControlSpec { drones, cores, per_process: 1, wait: WaitMode::Block }).is_err());
     }
     let good = segment(3, 1, WaitMode::Yield);
     let attached = Control::attach(good.fd().unwrap()).unwrap();

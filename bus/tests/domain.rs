@@ -26,7 +26,7 @@ fn shared_files(prefix: &str) -> Vec<PathBuf> {
 fn child_launcher() {
     let Some(root) = std::env::var_os(CHILD_ROOT) else { return };
     let domain = Domain::create_in(Path::new(&root), "child").unwrap();
-    let _services = Services::create(&domain, 2, "launcher").unwrap();
+    let _services = Services::create(&domain, 2, 1, "launcher").unwrap();
     fs::write(domain.path().join("up"), "").unwrap();
     thread::sleep(Duration::from_secs(60));
 }
@@ -58,7 +58,7 @@ fn a_killed_run_is_cleaned_and_a_living_one_is_not() {
     assert!(!shared_files(&prefix).is_empty());
 
     let alive = Domain::create_in(root.path(), "alive").unwrap();
-    let _services = Services::create(&alive, 2, "launcher").unwrap();
+    let _services = Services::create(&alive, 2, 1, "launcher").unwrap();
     let foreign = [root.path().join("notes.txt"), root.path().join("1_2_3")];
     fs::write(&foreign[0], "mine").unwrap();
     fs::create_dir(&foreign[1]).unwrap();
@@ -93,7 +93,7 @@ fn an_ended_run_leaves_nothing() {
     assert_eq!(fs::metadata(domain.path()).unwrap().permissions().mode() & 0o777, 0o700);
     let prefix = domain.prefix().to_owned();
     assert!(prefix.starts_with("skein"));
-    let services = Services::create(&domain, 40, "launcher").unwrap();
+    let services = Services::create(&domain, 40, 1, "launcher").unwrap();
     assert!(!shared_files(&prefix).is_empty());
     let joined = Domain::join(domain.path()).unwrap();
     assert_eq!(joined.prefix(), prefix);

@@ -57,7 +57,7 @@ fn wait_for_line() {
 #[test]
 fn a_downlink_is_written_and_read_in_place() {
     let run = run();
-    let _launcher = Services::create(&run.domain, 3, "launcher").unwrap();
+    let _launcher = Services::create(&run.domain, 3, 1, "launcher").unwrap();
     let domain = Domain::join(run.domain.path()).unwrap();
     let world = Services::open(&domain, 3, "world").unwrap().downlink_publisher().unwrap();
     let drone = Services::open(&domain, 3, "drone-0").unwrap().downlink_subscriber().unwrap();
@@ -78,7 +78,7 @@ fn a_downlink_is_written_and_read_in_place() {
 #[test]
 fn a_slow_drone_loses_the_oldest_downlinks_and_holds_up_nobody() {
     let run = run();
-    let services = Services::create(&run.domain, 2, "launcher").unwrap();
+    let services = Services::create(&run.domain, 2, 1, "launcher").unwrap();
     let world = services.downlink_publisher().unwrap();
     let slow = services.downlink_subscriber().unwrap();
     let held = {
@@ -102,7 +102,7 @@ fn a_slow_drone_loses_the_oldest_downlinks_and_holds_up_nobody() {
 #[test]
 fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
     let run = run();
-    let services = Services::create(&run.domain, 34, "launcher").unwrap();
+    let services = Services::create(&run.domain, 34, 1, "launcher").unwrap();
     assert_eq!(shards(34), 2);
     let worlds: Vec<_> = (0..2).map(|shard| services.uplink_subscriber(shard).unwrap()).collect();
     let drones: Vec<_> = [0, 31, 33].map(|id| (id, services.uplink_publisher(id as usize).unwrap())).into();
@@ -138,7 +138,7 @@ fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
 #[test]
 fn in_lockstep_the_record_waits_for_the_recorder() {
     let run = run();
-    let services = Services::create(&run.domain, 1, "launcher").unwrap();
+    let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let alive = Arc::new(AtomicBool::new(true));
     let asked = Arc::clone(&alive);
     let policy = RecordPolicy::Wait(Box::new(move || asked.load(Ordering::Relaxed)));
@@ -185,7 +185,7 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
 #[test]
 fn by_the_wall_clock_a_full_recorder_drops_and_says_so() {
     let run = run();
-    let services = Services::create(&run.domain, 1, "launcher").unwrap();
+    let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.record_publisher(RecordPolicy::Drop).unwrap();
     let recorder = services.record_subscriber().unwrap();
     recorder.connect().unwrap();
@@ -199,7 +199,7 @@ fn by_the_wall_clock_a_full_recorder_drops_and_says_so() {
 #[test]
 fn observers_come_and_go_and_lose_the_oldest() {
     let run = run();
-    let services = Services::create(&run.domain, 1, "launcher").unwrap();
+    let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.watch_publisher().unwrap();
     assert!(!world.watched());
     for round in 0..10u64 {
@@ -217,13 +217,13 @@ fn observers_come_and_go_and_lose_the_oldest() {
 #[test]
 fn two_runs_do_not_hear_each_other() {
     let (one, two) = (run(), run());
-    let first = Services::create(&one.domain, 1, "launcher").unwrap();
-    let second = Services::create(&two.domain, 1, "launcher").unwrap();
+    let first = Services::create(&one.domain, 1, 1, "launcher").unwrap();
+    let second = Services::create(&two.domain, 1, 1, "launcher").unwrap();
     let heard = [first.downlink_subscriber().unwrap(), second.downlink_subscriber().unwrap()];
     let worlds = [first.downlink_publisher().unwrap(), second.downlink_publisher().unwrap()];
     assert_eq!(worlds[0].send(1, 1, |_| ()).unwrap(), 1);
     assert!(heard[0].receive().unwrap().is_some() && heard[1].receive().unwrap().is_none());
-    let again = Services::create(&one.domain, 1, "launcher").unwrap_err();
+    let again = Services::create(&one.domain, 1, 1, "launcher").unwrap_err();
     assert!(again.to_string().contains("belongs to a running swarm"), "{again}");
 }
 
@@ -247,7 +247,7 @@ fn child_drone() {
 #[test]
 fn killed_drones_keep_their_places_until_they_are_cleaned() {
     let run = run();
-    let services = Services::create(&run.domain, 1, "launcher").unwrap();
+    let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.downlink_publisher().unwrap();
     let uplink = services.uplink_subscriber(0).unwrap();
     for tick in 0..5 {
@@ -296,7 +296,7 @@ fn child_world() {
 fn at_the_descriptor_limit_nothing_is_lost_in_silence() {
     raise_file_limit().unwrap();
     let run = run();
-    let services = Services::create(&run.domain, 40, "launcher").unwrap();
+    let services = Services::create(&run.domain, 40, 1, "launcher").unwrap();
     let mut world = child("child_world", &run.domain);
     hear(&mut world, "joined");
     let drones: Vec<_> = (0..30).map(|_| services.downlink_subscriber().unwrap()).collect();

@@ -47,6 +47,8 @@ pub struct Ledger {
     /// The plan that split the group whose leader made the plan it obeys, if that one came from another leader.
     origin: Option<Orders>,
     sets: Vec<PlannedSet>,
+    /// Of this drone's part under what it obeys.
+    part_hash: u64,
 }
 
 impl Ledger {
@@ -63,13 +65,16 @@ impl Ledger {
             obeyed: None,
             origin: None,
             sets: Vec::new(),
+            part_hash: 0,
         }
     }
 
     /// The ledger that another drone would have, had it heard the same.
     #[must_use]
     pub fn of_member(&self, me: DroneId) -> Self {
-        Self { me, ..self.clone() }
+        let mut ledger = Self { me, ..self.clone() };
+        ledger.part_hash = ledger.hash_part();
+        ledger
     }
 
     /// The plan this drone obeys, with the parts it has heard of.
@@ -112,6 +117,10 @@ impl Ledger {
     /// Hash of this drone's part under what it obeys: equal stamps must mean equal hashes. 0 before the first.
     #[must_use]
     pub fn part_hash(&self) -> u64 {
+        self.part_hash
+    }
+
+    fn hash_part(&self) -> u64 {
         let (Some(orders), Some(part)) = (&self.obeyed, self.part()) else { return 0 };
         let mut digest = Digest::default();
         digest.bytes(bytemuck::bytes_of(part)).word(u64::from(orders.plan.phase));
@@ -193,5 +202,6 @@ impl Ledger {
             }
             _ => {}
         }
+        self.part_hash = self.hash_part();
     }
 }

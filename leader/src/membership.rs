@@ -3,8 +3,6 @@
 use crate::rhythm::Rhythm;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, SimTime, Vec2};
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 /// Weight of a new delay in the running mean.
 const NOVELTY: f64 = 0.1;
@@ -14,9 +12,18 @@ const MOST_DELAY_S: f64 = 60.0;
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
-    pose: Pose,
+    id: DroneId,
+    /// How long it may be silent, s: what its rhythm says.
+    patience_s: f64,
     /// Of its beacons, by when they came in, however long they were on the air.
     rhythm: Rhythm,
+    pose: Pose,
+}
+
+impl Peer {
+    fn lives(&self, now: SimTime) -> bool {
+        now.since(self.rhythm.last()) <= self.patience_s
+    }
 }
 
 /// The last beacon heard of each peer.
@@ -26,14 +33,15 @@ pub struct Peers {
     timeout_s: f64,
     /// Running mean of the time that beacons were on the air, s.
     delay_s: f64,
-    last: BTreeMap<DroneId, Peer>,
+    /// By id: looked through in every tick, and seldom added to.
+    last: Vec<Peer>,
 }
 
 impl Peers {
     /// Peers among `drones` drones; one that is silent for `timeout_s`, or much longer than usual, counts as gone.
     #[must_use]
     pub fn new(drones: u32, timeout_s: f64) -> Self {
-        Self { drones, timeout_s, delay_s: 0.0, last: BTreeMap::new() }
+        Self { drones, timeout_s, delay_s: 0.0, last: Vec::new() }
     }
 
     /// Takes a beacon. One that is older than what is known, from the future, or of nobody in the swarm is ignored.
@@ -43,18 +51,29 @@ impl Peers {
         if source.0 >= self.drones || !(0.0..=MOST_DELAY_S).contains(&delay_s) {
             return;
         }
-        match self.last.entry(source) {
-            Entry::Vacant(place) => {
-                place.insert(Peer { pose, rhythm: Rhythm::new(now) });
+        match self.place(source) {
+            Err(place) => {
+                let rhythm = Rhythm::new(now);
+                let patience_s = rhythm.patience_s(self.timeout_s);
+                self.last.insert(place, Peer { id: source, patience_s, rhythm, pose });
             }
-            Entry::Occupied(mut place) if pose.stamp > place.get().pose.stamp => {
-                let longest_s = place.get().rhythm.patience_s(self.timeout_s);
-                place.get_mut().pose = pose;
-                place.get_mut().rhythm.hear(now, longest_s);
+            Ok(place) if pose.stamp > self.last[place].pose.stamp => {
+                let peer = &mut self.last[place];
+                peer.pose = pose;
+                peer.rhythm.hear(now, peer.patience_s);
+                peer.patience_s = peer.rhythm.patience_s(self.timeout_s);
                 self.delay_s += NOVELTY * (delay_s - self.delay_s);
             }
-            Entry::Occupied(_) => {}
+            Ok(_) => {}
         }
+    }
+
+    fn place(&self, peer: DroneId) -> Result<usize, usize> {
+        self.last.binary_search_by_key(&peer, |known| known.id)
+    }
+
+    fn get(&self, peer: DroneId) -> Option<&Peer> {
+        self.place(peer).ok().map(|place| &self.last[place])
     }
 
     /// How long a beacon is on the air, s: a running mean.
@@ -65,33 +84,37 @@ impl Peers {
 
     /// Forgets a peer.
     pub fn forget(&mut self, peer: DroneId) {
-        self.last.remove(&peer);
+        if let Ok(place) = self.place(peer) {
+            self.last.remove(place);
+        }
     }
 
     /// Whether a beacon of the peer came in lately.
     #[must_use]
     pub fn is_living(&self, peer: DroneId, now: SimTime) -> bool {
-        self.last.get(&peer).is_some_and(|known| self.lives(known, now))
-    }
-
-    fn lives(&self, peer: &Peer, now: SimTime) -> bool {
-        now.since(peer.rhythm.last()) <= peer.rhythm.patience_s(self.timeout_s)
+        self.get(peer).is_some_and(|known| known.lives(now))
     }
 
     /// The last beacon of a peer, however old.
     #[must_use]
     pub fn last(&self, peer: DroneId) -> Option<&Pose> {
-        self.last.get(&peer).map(|known| &known.pose)
+        self.get(peer).map(|known| &known.pose)
+    }
+
+    /// The last beacon of a peer that is not silent for too long.
+    #[must_use]
+    pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {
+        self.get(peer).filter(|known| known.lives(now)).map(|known| &known.pose)
     }
 
     /// Peers that are not silent for too long, by id.
-    pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
-        self.last.iter().filter(move |(_, known)| self.lives(known, now)).map(|(&id, known)| (id, &known.pose))
+    pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
+        self.last.iter().filter(move |known| known.lives(now)).map(|known| (known.id, &known.pose))
     }
 
     /// Peers that were heard once and are silent now, by id: they may still hang in the air.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
-        self.last.iter().filter(move |(_, known)| !self.lives(known, now)).map(|(&id, known)| (id, &known.pose))
+        self.last.iter().filter(move |known| !known.lives(now)).map(|known| (known.id, &known.pose))
     }
 }
 

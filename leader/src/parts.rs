@@ -55,15 +55,17 @@ impl Leading {
         let (mine_m, spacing_m) = (distance_m(own.position), self.planner.params.spacing_m);
         let slot_m = distance_m(anchor + Vec2::from(part.slot_m));
         let scope = self.election.scope();
-        let members: Vec<Member> = self.living(now).filter(|m| scope.contains(m.group)).collect();
-        let last = members.iter().all(|m| distance_m(m.position) < mine_m);
-        if !self.ledger.sets().is_empty() || !last || mine_m - slot_m <= spacing_m {
+        let members = self.living(now).filter(|m| scope.contains(m.group));
+        if !self.ledger.sets().is_empty()
+            || mine_m - slot_m <= spacing_m
+            || !members.clone().all(|m| distance_m(m.position) < mine_m)
+        {
             return None;
         }
-        let follower = |m: &&Member| self.term_of(m.id) == self.election.obeyed();
+        let follower = |m: &Member| self.term_of(m.id) == self.election.obeyed();
         let nearer =
-            |a: &&Member, b: &&Member| distance_m(a.position).total_cmp(&distance_m(b.position)).then(a.id.cmp(&b.id));
-        let first = members.iter().filter(follower).min_by(nearer)?;
+            |a: &Member, b: &Member| distance_m(a.position).total_cmp(&distance_m(b.position)).then(a.id.cmp(&b.id));
+        let first = members.filter(follower).min_by(nearer)?;
         (mine_m - distance_m(first.position) > spacing_m).then_some(first.id)
     }
 
@@ -96,7 +98,7 @@ impl Leading {
 
     /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
     /// its beacon shows that it is on already or will not obey it.
-    pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
+    pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
             let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
@@ -110,7 +112,7 @@ impl Leading {
     }
 
     /// Living peers in this drone's part.
-    fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> {
+    fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> + Clone {
         let group = me.group;
         self.living(now).filter(move |m| group.contains(m.group))
     }
@@ -118,13 +120,12 @@ impl Leading {
     /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
     fn part_has_ahead(&self, now: SimTime, me: &Member) -> bool {
         let named = self.ledger.part().is_some_and(|part| part.leader == self.me);
-        let kin: Vec<Member> = self.kin(now, me).filter(|_| named).collect();
-        self.planner.has_ahead(&self.obstacles, kin.iter().chain([me]))
+        let kin = self.kin(now, me).filter(|_| named);
+        self.planner.has_ahead(&self.obstacles, kin.chain([*me]))
     }
 
     fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let all: Vec<Member> = self.living(now).collect();
-        self.planner.has_ahead(&self.obstacles, all.iter().chain([me]))
+        self.planner.has_ahead(&self.obstacles, self.living(now).chain([*me]))
     }
 
     /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
@@ -145,7 +146,11 @@ impl Leading {
     /// Takes stock of who is there, before a leader decides. A drone of no part joins the one of the nearest drone.
     pub fn muster(&mut self, now: SimTime, own: &Own) {
         let scope = self.election.scope();
-        let (mut members, mut others, mut orphans) = (vec![self.myself(own)], Vec::new(), Vec::new());
+        let (mut members, mut others) = (std::mem::take(&mut self.members), std::mem::take(&mut self.others));
+        let mut orphans = Vec::new();
+        members.clear();
+        others.clear();
+        members.push(self.myself(own));
         for peer in self.living(now) {
             if scope.contains(peer.group) {
                 members.push(peer);

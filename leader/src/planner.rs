@@ -188,9 +188,11 @@ impl Planner {
     }
 
     /// Whether some of these drones still have an obstacle set to pass.
-    pub fn has_ahead<'m>(&self, obstacles: &Obstacles, mut drones: impl Iterator<Item = &'m Member>) -> bool {
-        let sets: Vec<_> = obstacles.sets().iter().map(|set| (set, self.exit_x_m(obstacles, set))).collect();
-        drones.any(|m| sets.iter().any(|(set, exit_x_m)| !obstacles.is_past(m.id, m.position.x, set, *exit_x_m)))
+    pub fn has_ahead(&self, obstacles: &Obstacles, drones: impl Iterator<Item = Member> + Clone) -> bool {
+        obstacles.sets().iter().any(|set| {
+            let exit_x_m = self.exit_x_m(obstacles, set);
+            drones.clone().any(|m| !obstacles.is_past(m.id, m.position.x, set, exit_x_m))
+        })
     }
 
     /// The first set, in flight order, that somebody still has to pass and that is not planned for in this term. A group

@@ -13,6 +13,12 @@ impl Default for Digest {
 }
 
 impl Digest {
+    /// The hash of these bytes alone: the same as folding them in one by one.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> u64 {
+        xxhash_rust::xxh3::xxh3_64(bytes)
+    }
+
     /// Folds bytes in.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.0.update(bytes);

@@ -1,11 +1,12 @@
 //! What the world tells the drones in a tick: senses and the air, in one sample.
 //!
 //! Laid out as a [`DownHead`], then a [`SenseHead`] for each drone, then the flat slices those point into, then the
-//! shapes of the obstacles somebody senses, then every frame sent in the tick before.
+//! shapes of the obstacles somebody senses, then every frame sent in the tick before, and where each was sent.
 
 use crate::Vec2;
 use crate::frame::AirFrame;
 use crate::ids::{DroneId, ObstacleId};
+use crate::nearby::{FrameCell, FrameIndex, Locality, NearbyFrames};
 use crate::radio::DropReason;
 use crate::shape::ConvexShape;
 use crate::sides::Cuts;
@@ -31,8 +32,14 @@ pub struct DownHead {
     pub shapes: u32,
     /// Number of [`AirFrame`]s.
     pub frames: u32,
+    /// Number of [`FrameCell`]s; 0 if the frames are not sorted.
+    pub cells: u32,
+    /// By what they are sorted.
+    pub locality: Locality,
+    /// Number of places in the order of frames.
+    pub ordered: u32,
     /// Always 0.
-    pub reserved: [u32; 7],
+    pub reserved: u32,
 }
 
 /// One drone's senses: its own state, and where its entries stand in the flat slices.
@@ -124,6 +131,8 @@ pub struct Downlink {
     pub shapes: Vec<SensedShape>,
     /// Every frame sent in the tick before, by source and sequence.
     pub frames: Vec<AirFrame>,
+    /// Where they were sent.
+    pub index: FrameIndex,
 }
 
 /// Why a sample is not a downlink.
@@ -145,7 +154,10 @@ impl Downlink {
             neighbours: self.neighbours.len() as u32,
             shapes: self.shapes.len() as u32,
             frames: self.frames.len() as u32,
-            reserved: [0; 7],
+            cells: self.index.cells.len() as u32,
+            locality: self.index.locality,
+            ordered: self.index.order.len() as u32,
+            reserved: 0,
         };
     }
 
@@ -159,6 +171,7 @@ impl Downlink {
             neighbours: &self.neighbours,
             shapes: &self.shapes,
             frames: &self.frames,
+            nearby: self.index.view(),
         }
     }
 
@@ -177,7 +190,7 @@ impl Downlink {
         }
     }
 
-    fn parts(&self) -> [&[u8]; 6] {
+    fn parts(&self) -> [&[u8]; 8] {
         [
             bytemuck::bytes_of(&self.head),
             bytemuck::cast_slice(&self.drones),
@@ -185,6 +198,8 @@ impl Downlink {
             bytemuck::cast_slice(&self.neighbours),
             bytemuck::cast_slice(&self.shapes),
             bytemuck::cast_slice(&self.frames),
+            bytemuck::cast_slice(&self.index.cells),
+            bytemuck::cast_slice(&self.index.order),
         ]
     }
 }
@@ -204,6 +219,8 @@ pub struct DownlinkView<'a> {
     pub shapes: &'a [SensedShape],
     /// Every frame sent in the tick before, by source and sequence.
     pub frames: &'a [AirFrame],
+    /// Where they were sent.
+    pub nearby: NearbyFrames<'a>,
 }
 
 impl<'a> DownlinkView<'a> {
@@ -221,6 +238,11 @@ impl<'a> DownlinkView<'a> {
             neighbours: take(&mut rest, head.neighbours, error)?,
             shapes: take(&mut rest, head.shapes, error)?,
             frames: take(&mut rest, head.frames, error)?,
+            nearby: NearbyFrames {
+                locality: head.locality,
+                cells: take::<FrameCell>(&mut rest, head.cells, error)?,
+                order: take(&mut rest, head.ordered, error)?,
+            },
             head,
         })
     }

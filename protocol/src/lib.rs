@@ -10,6 +10,7 @@
 //! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
 //! | [`sides`] | who is cut off from whom by script |
 //! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
+//! | [`nearby`] | the frames of a tick by where they were sent |
 //! | [`record`] | what the world tells the recorder |
 //! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
 //! | [`thin_plate`] | the spline between two point sets and its bending energy |
@@ -21,6 +22,7 @@ pub mod formation;
 pub mod frame;
 pub mod ids;
 pub mod message;
+pub mod nearby;
 pub mod payload;
 pub mod radio;
 pub mod record;

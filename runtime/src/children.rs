@@ -1,12 +1,13 @@
 //! The processes a launcher has started. All are gone when this is dropped.
 
+use crate::drone_process::Crew;
 use crate::supervisor::{Launch, ProcessInfo};
 use crate::{Clock, RuntimeError};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::event::{Timespec, epoll};
 use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
 use skein_bus::{Control, Domain, PinMode};
-use skein_protocol::{DroneId, Tick};
+use skein_protocol::DroneId;
 use std::fmt;
 use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
@@ -18,14 +19,17 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     World,
-    Drone { id: DroneId, incarnation: u32, first_tick: Tick },
+    Drones(Crew),
 }
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::World => f.write_str("the world"),
-            Self::Drone { id, .. } => write!(f, "drone {id}"),
+            Self::Drones(Crew { first, count: 1, .. }) => write!(f, "drone {first}"),
+            Self::Drones(Crew { first, count, .. }) => {
+                write!(f, "the process of drones {first} to {}", first.0 + count - 1)
+            }
         }
     }
 }
@@ -33,12 +37,13 @@ impl fmt::Display for Role {
 struct Running {
     role: Role,
     child: Child,
-    pidfd: OwnedFd,
+    /// Closed with it: then nobody watches it any more.
+    _pidfd: OwnedFd,
 }
 
 impl Running {
     fn is_of(&self, drone: DroneId) -> bool {
-        matches!(self.role, Role::Drone { id, .. } if id == drone)
+        matches!(self.role, Role::Drones(crew) if crew.ids().any(|id| id == drone))
     }
 }
 
@@ -49,18 +54,22 @@ pub(crate) struct Children {
     control: i32,
     pin: PinMode,
     running: Vec<Running>,
+    /// Tells of ends; what it costs does not depend on how many there are.
+    ends: OwnedFd,
 }
 
 impl Children {
-    pub(crate) fn new(launch: &Launch<'_>, domain: &Domain, control: &Control) -> Self {
-        Self {
+    pub(crate) fn new(launch: &Launch<'_>, domain: &Domain, control: &Control) -> Result<Self, RuntimeError> {
+        let ends = epoll::create(epoll::CreateFlags::CLOEXEC);
+        Ok(Self {
             executable: launch.executable.clone(),
             domain: domain.path().to_owned(),
             // The segment that the launcher made has a descriptor.
             control: control.fd().unwrap_or(-1),
             pin: launch.pin,
             running: Vec::new(),
-        }
+            ends: ends.map_err(|error| RuntimeError::system("watching processes")(error.into()))?,
+        })
     }
 
     /// Starts a process. To be called from one thread that lives as long as the run: children die with the thread that
@@ -69,10 +78,12 @@ impl Children {
         let mut command = Command::new(&self.executable);
         match role {
             Role::World => command.args(["world", "--clock", &clock.to_string()]),
-            Role::Drone { id, incarnation, first_tick } => command.args([
+            Role::Drones(Crew { first, count, incarnation, first_tick }) => command.args([
                 "drone",
                 "--id",
-                &id.to_string(),
+                &first.to_string(),
+                "--count",
+                &count.to_string(),
                 "--incarnation",
                 &incarnation.to_string(),
                 "--first-tick",
@@ -88,7 +99,11 @@ impl Children {
             .spawn()
             .map_err(RuntimeError::system(format!("starting {role} as {}", self.executable.display())))?;
         let pid = Pid::from_child(&child);
-        let pidfd = pidfd_open(pid, PidfdFlags::empty());
+        let watch = |pidfd: OwnedFd| {
+            let none = epoll::EventData::new_u64(0);
+            epoll::add(&self.ends, &pidfd, none, epoll::EventFlags::IN).map(|()| pidfd)
+        };
+        let pidfd = pidfd_open(pid, PidfdFlags::empty()).and_then(watch);
         // Owned by `running` even if watching fails, so that it is killed and reaped.
         let pidfd = match pidfd {
             Ok(pidfd) => pidfd,
@@ -98,15 +113,15 @@ impl Children {
                 return Err(RuntimeError::system(format!("watching {role}"))(error.into()));
             }
         };
-        self.running.push(Running { role, child, pidfd });
+        self.running.push(Running { role, child, _pidfd: pidfd });
         Ok(())
     }
 
     /// Waits, at most `limit`, until a process has ended; reaps all that have, and tells how they ended.
     pub(crate) fn wait_any(&mut self, limit: Duration) -> Vec<(Role, ExitStatus)> {
-        let mut fds: Vec<PollFd<'_>> = self.running.iter().map(|r| PollFd::new(&r.pidfd, PollFlags::IN)).collect();
         let timeout = Timespec { tv_sec: limit.as_secs() as _, tv_nsec: limit.subsec_nanos().into() };
-        if !matches!(poll(&mut fds, Some(&timeout)), Ok(1..)) {
+        let mut one = [epoll::Event { flags: epoll::EventFlags::empty(), data: epoll::EventData::new_u64(0) }];
+        if !matches!(epoll::wait(&self.ends, &mut one[..], Some(&timeout)), Ok(1..)) {
             return Vec::new();
         }
         let mut ended = Vec::new();
@@ -120,13 +135,14 @@ impl Children {
         ended
     }
 
-    /// Kills a drone's process and reaps it; false if there is none.
-    pub(crate) fn kill_drone(&mut self, drone: DroneId) -> bool {
-        let Some(place) = self.running.iter().position(|running| running.is_of(drone)) else { return false };
+    /// Kills a drone's process and reaps it; all drones that were in it, `None` if there is none.
+    pub(crate) fn kill_drone(&mut self, drone: DroneId) -> Option<Crew> {
+        let place = self.running.iter().position(|running| running.is_of(drone))?;
         let mut running = self.running.remove(place);
         // It may have ended by itself just now: the wait tells either way.
         let _ = running.child.kill();
-        running.child.wait().is_ok()
+        let Role::Drones(crew) = running.role else { return None };
+        running.child.wait().is_ok().then_some(crew)
     }
 
     /// Stops a drone's process; true once it is stopped, false if there is none.
@@ -170,9 +186,13 @@ impl Children {
     }
 
     pub(crate) fn list(&self) -> impl Iterator<Item = ProcessInfo> + '_ {
-        self.running.iter().map(|running| match running.role {
-            Role::World => ProcessInfo { role: "world", id: None, pid: running.child.id() },
-            Role::Drone { id, .. } => ProcessInfo { role: "drone", id: Some(id.0), pid: running.child.id() },
+        self.running.iter().flat_map(|running| {
+            let (role, ids) = match running.role {
+                Role::World => ("world", vec![None]),
+                Role::Drones(crew) => ("drone", crew.ids().map(|id| Some(id.0)).collect()),
+            };
+            let pid = running.child.id();
+            ids.into_iter().map(move |id| ProcessInfo { role, id, pid })
         })
     }
 }

@@ -2,57 +2,54 @@
 
 use skein_agent::{Heard, Pilot};
 use skein_protocol::digest::Digest;
-use skein_protocol::downlink::{DownlinkView, Senses};
+use skein_protocol::downlink::{DownlinkView, SenseHead, Senses};
 use skein_protocol::frame::{AirFrame, Frame};
+use skein_protocol::message::Topic;
+use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DropReason, Radio, Verdict};
+use skein_protocol::sides::Cuts;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message, SimTime, Tick, Vec2};
-use std::cmp::Ordering;
+use skein_protocol::{DroneId, Message, SimTime};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A frame on its way to this drone; the one due first is the greatest.
-#[derive(Clone, Copy, Debug)]
+/// A frame on its way to this drone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Pending {
     due: SimTime,
+    source: DroneId,
+    sequence: u32,
     /// Whether it was delivered before.
     again: bool,
-    frame: AirFrame,
+    place: Place,
 }
 
-impl Pending {
-    fn key(&self) -> (SimTime, DroneId, u32, bool) {
-        (self.due, self.frame.source, self.frame.sequence, self.again)
-    }
+/// Where a frame on its way is: most are heard in the tick in which they come in, and read where they lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    /// In the downlink at hand.
+    Here(u32),
+    /// In [`Cockpit::kept`].
+    Kept(u32),
 }
-
-impl Ord for Pending {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.key().cmp(&self.key())
-    }
-}
-
-impl PartialOrd for Pending {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Pending {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl Eq for Pending {}
 
 /// One drone: its pilot and its radio.
 pub struct Cockpit {
     me: DroneId,
     dt_s: f64,
+    dt_ns: i64,
     radio: Radio,
+    /// How far it hears each topic, m.
+    reach_m: [f64; Topic::ALL.len()],
     pilot: Box<dyn Pilot>,
-    pending: BinaryHeap<Pending>,
+    /// The one due first is the first.
+    pending: BinaryHeap<Reverse<Pending>>,
+    /// Frames that are heard in a later tick than they come in, and the places among them that are free.
+    kept: Vec<AirFrame>,
+    free: Vec<u32>,
     heard: Vec<Heard>,
+    /// What the tick's hash is over.
+    folded: Vec<u8>,
     said: Vec<Message>,
     frames: Vec<Frame>,
     ages: Vec<f64>,
@@ -68,10 +65,15 @@ impl Cockpit {
         Self {
             me,
             dt_s,
+            dt_ns: (dt_s * 1e9).round() as i64,
+            reach_m: Topic::ALL.map(|topic| radio.reach_m(topic, me)),
             radio,
             pilot,
             pending: BinaryHeap::new(),
+            kept: Vec::new(),
+            free: Vec::new(),
             heard: Vec::new(),
+            folded: Vec::new(),
             said: Vec::new(),
             frames: Vec::new(),
             ages: Vec::new(),
@@ -81,34 +83,19 @@ impl Cockpit {
         }
     }
 
-    /// Puts the frames of a downlink through the radio, which counts in `stats`. Call it for each downlink, also for one
-    /// that comes too late to be answered.
-    pub fn receive(&mut self, down: &DownlinkView<'_>, stats: &mut LinkStats) {
-        let Some(own) = down.drones.get(self.me.index()) else { return };
-        let here = Vec2::from(own.position_m);
-        let tick_ns = (self.dt_s * 1e9).round() as i64;
-        let me = self.me;
-        for frame in down.frames.iter().filter(|frame| frame.source != me) {
-            if let Some(reason) = own.cut_off(frame) {
-                self.drop_frame(reason, stats);
-                continue;
-            }
-            match self.radio.fate(frame, me, here, tick_ns) {
-                Verdict::Drop(reason) => self.drop_frame(reason, stats),
-                Verdict::Deliver { due, again } => {
-                    self.pending.push(Pending { due, again: false, frame: *frame });
-                    self.pending.extend(again.map(|due| Pending { due, again: true, frame: *frame }));
-                }
-            }
-        }
+    /// Puts the frames of a downlink that comes too late to be answered through the radio, which counts in `stats`.
+    pub fn overhear(&mut self, down: &DownlinkView<'_>, stats: &mut LinkStats) {
+        self.receive(down, SimTime(i64::MIN), stats);
     }
 
-    /// Steps the pilot on the newest downlink: fills its actuator slot and returns the frames it sends.
+    /// Puts the frames of the newest downlink through the radio, and steps the pilot on it: fills its actuator slot and
+    /// returns the frames it sends.
     pub fn step(&mut self, down: &DownlinkView<'_>, slot: &mut Slot, stats: &mut LinkStats) -> &[Frame] {
         self.frames.clear();
         self.said.clear();
         let Some(senses) = down.senses(self.me) else { return &self.frames };
-        let heard_hash = self.deliver(senses.tick, senses.now, stats);
+        self.receive(down, senses.now, stats);
+        let heard_hash = self.deliver(&senses, down.frames, stats);
         let command = self.pilot.step(&senses, &self.heard, &mut self.said);
         self.frames.extend(self.said.iter().map(Message::encode));
         self.frames_total += self.frames.len() as u64;
@@ -125,37 +112,105 @@ impl Cockpit {
         &self.frames
     }
 
-    /// Takes what is due, in the order (due, source, sequence), a second copy after the first.
-    fn deliver(&mut self, tick: Tick, now: SimTime, stats: &mut LinkStats) -> u64 {
+    /// Takes up what will be heard; frames that are not due by `now` are kept.
+    fn receive(&mut self, down: &DownlinkView<'_>, now: SimTime, stats: &mut LinkStats) {
+        let Some(own) = down.drones.get(self.me.index()) else { return };
+        if own.cuts != Cuts::default() || !self.hears_nearby(&down.nearby.locality) {
+            (0..down.frames.len()).for_each(|place| _ = self.take_up(own, down.frames, place, now, stats));
+            return;
+        }
+        let mut looked = 0;
+        down.nearby.each(own.position_m.into(), |place| looked += self.take_up(own, down.frames, place, now, stats));
+        let from = |id| down.frames.partition_point(|frame| frame.source.0 < id);
+        let others = down.frames.len() - (from(self.me.0 + 1) - from(self.me.0));
+        self.drop_frames(DropReason::Range, (others - looked) as u32, stats);
+    }
+
+    /// Whether what is sorted by place is all this drone hears of these topics.
+    fn hears_nearby(&self, locality: &Locality) -> bool {
+        let within = |(topic, reach_m): (Topic, f64)| !locality.holds(topic as u16) || reach_m <= locality.cell_m;
+        locality.topics != 0 && Topic::ALL.into_iter().zip(self.reach_m).all(within)
+    }
+
+    /// Takes up one frame of somebody else; the number of those that there were, 1 or 0.
+    fn take_up(
+        &mut self,
+        own: &SenseHead,
+        frames: &[AirFrame],
+        place: usize,
+        now: SimTime,
+        stats: &mut LinkStats,
+    ) -> usize {
+        let Some(frame) = frames.get(place).filter(|frame| frame.source != self.me) else { return 0 };
+        if let Some(reason) = own.cut_off(frame) {
+            self.drop_frames(reason, 1, stats);
+            return 1;
+        }
+        match self.radio.fate(frame, self.me, own.position_m.into(), self.dt_ns) {
+            Verdict::Drop(reason) => self.drop_frames(reason, 1, stats),
+            Verdict::Deliver { due, again } => {
+                self.expect(frame, place as u32, (due, false), now);
+                again.into_iter().for_each(|due| self.expect(frame, place as u32, (due, true), now));
+            }
+        }
+        1
+    }
+
+    fn expect(&mut self, frame: &AirFrame, index: u32, (due, again): (SimTime, bool), now: SimTime) {
+        let place = if due <= now { Place::Here(index) } else { Place::Kept(self.keep(frame)) };
+        let pending = Pending { due, source: frame.source, sequence: frame.sequence, again, place };
+        self.pending.push(Reverse(pending));
+    }
+
+    fn keep(&mut self, frame: &AirFrame) -> u32 {
+        if let Some(place) = self.free.pop() {
+            self.kept[place as usize] = *frame;
+            return place;
+        }
+        self.kept.push(*frame);
+        self.kept.len() as u32 - 1
+    }
+
+    /// Takes what is due, in the order (due, source, sequence), a second copy after the first; `here`: the frames of the
+    /// downlink at hand.
+    fn deliver(&mut self, senses: &Senses<'_>, here: &[AirFrame], stats: &mut LinkStats) -> u64 {
         self.heard.clear();
-        let mut digest = Digest::default();
-        while self.pending.peek().is_some_and(|next| next.due <= now) {
-            let Some(Pending { frame, again, .. }) = self.pending.pop() else { break };
-            match Message::decode(&frame.frame) {
+        self.folded.clear();
+        while self.pending.peek().is_some_and(|Reverse(next)| next.due <= senses.now) {
+            let Some(Reverse(Pending { source, sequence, again, place, .. })) = self.pending.pop() else { break };
+            let AirFrame { tick, frame, .. } = match place {
+                Place::Here(index) => &here[index as usize],
+                Place::Kept(index) => {
+                    self.free.push(index);
+                    &self.kept[index as usize]
+                }
+            };
+            match Message::decode(frame) {
                 Ok(message) => {
-                    digest.word(u64::from(frame.source.0)).word(u64::from(frame.sequence));
-                    digest.bytes(&frame.frame.payload[..frame.frame.len as usize]);
+                    self.folded.extend_from_slice(&u64::from(source.0).to_le_bytes());
+                    self.folded.extend_from_slice(&u64::from(sequence).to_le_bytes());
+                    self.folded.extend_from_slice(&frame.payload[..frame.len as usize]);
                     if again {
                         self.duplicates += 1;
                         stats.duplicates += 1;
                     } else {
-                        stats.delay(tick.saturating_sub(frame.tick));
+                        stats.delay(senses.tick.saturating_sub(*tick));
                     }
-                    self.heard.push(Heard { source: frame.source, message });
+                    self.heard.push(Heard { source, message });
                 }
                 Err(_) if again => {}
                 Err(_) => {
                     stats.malformed += 1;
-                    self.drop_frame(DropReason::Malformed, stats);
+                    self.drop_frames(DropReason::Malformed, 1, stats);
                 }
             }
         }
-        digest.value()
+        Digest::of(&self.folded)
     }
 
-    fn drop_frame(&mut self, reason: DropReason, stats: &mut LinkStats) {
-        self.dropped[reason as usize] += 1;
-        stats.dropped[reason as usize] += 1;
+    fn drop_frames(&mut self, reason: DropReason, count: u32, stats: &mut LinkStats) {
+        self.dropped[reason as usize] += count;
+        stats.dropped[reason as usize] += u64::from(count);
     }
 
     /// How old its knowledge of its peers is whenever it beacons.

@@ -1,9 +1,9 @@
-//! A drone's process: it waits for a tick, hears, steps its pilot, speaks, answers.
+//! A drone's process, or that of several: it waits for a tick, hears, steps its pilots, speaks, answers.
 
 use crate::cockpit::Cockpit;
 use crate::{RuntimeError, mission};
 use skein_bus::{
-    BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, Services, TickSignal, UplinkHeader,
+    BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, SHARD_DRONES, Services, TickSignal, UplinkHeader,
     UplinkPublisher, pin_to_core, raise_file_limit,
 };
 use skein_protocol::downlink::DownlinkView;
@@ -62,90 +62,142 @@ pub fn scenario_path(domain: &Path) -> PathBuf {
     domain.join("scenario.json")
 }
 
-/// Runs drone `id` of a swarm until its mission ends, with the paper's pilot.
+/// The drones of one process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crew {
+    /// The first of them.
+    pub first: DroneId,
+    /// How many, by id.
+    pub count: u32,
+    /// Which start of this process it is, from 1.
+    pub incarnation: u32,
+    /// The first tick it answers.
+    pub first_tick: Tick,
+}
+
+impl Crew {
+    /// Their ids.
+    pub fn ids(&self) -> impl Iterator<Item = DroneId> + use<> {
+        (self.first.0..self.first.0 + self.count).map(DroneId)
+    }
+}
+
+/// Runs drones of a swarm until their mission ends, with the paper's pilot.
 ///
 /// # Errors
 /// [`RuntimeError`]; the launcher sees the process end.
-pub fn run(args: &ChildArgs, id: DroneId, incarnation: u32, first_tick: Tick) -> Result<(), RuntimeError> {
-    fly(args, id, incarnation, |scenario| {
-        let start = SimTime(first_tick as i64 * mission::dt_ns(scenario));
-        mission::cockpit(scenario, id, incarnation, start)
+pub fn run(args: &ChildArgs, crew: Crew) -> Result<(), RuntimeError> {
+    fly(args, crew, |scenario, id| {
+        let start = SimTime(crew.first_tick as i64 * mission::dt_ns(scenario));
+        mission::cockpit(scenario, id, crew.incarnation, start)
     })
 }
 
-/// Runs drone `id` with a pilot of one's own.
+/// Runs drones with a pilot of one's own.
 ///
 /// # Errors
 /// [`RuntimeError`].
 pub fn fly(
     args: &ChildArgs,
-    id: DroneId,
-    incarnation: u32,
-    make: impl FnOnce(&Scenario) -> Cockpit,
+    crew: Crew,
+    mut make: impl FnMut(&Scenario, DroneId) -> Cockpit,
 ) -> Result<(), RuntimeError> {
     args.bind_to_parent()?;
     raise_file_limit()?;
     let scenario = args.scenario()?;
     let control = Arc::new(Control::attach(args.control)?);
-    pin_to_core(control.core_of(id.index()), args.pin)?;
+    pin_to_core(control.core_of(crew.first.index()), args.pin)?;
     let domain = Domain::join(&args.domain)?;
-    let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{id}"))?;
-    let mut drone = Drone {
-        id,
-        incarnation,
-        cockpit: make(&scenario),
-        hears: services.downlink_subscriber()?,
-        speaks: services.uplink_publisher(id.index())?,
-        barrier: DroneEnd::new(control, id.index())?,
-        slot: Slot::default(),
+    let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", crew.first))?;
+    let seat = |id: DroneId| -> Result<Seat, RuntimeError> {
+        let barrier = DroneEnd::new(Arc::clone(&control), id.index())?;
+        Ok(Seat { id, cockpit: make(&scenario, id), barrier, slot: Slot::default() })
     };
-    drone.barrier.announce(incarnation);
-    loop {
-        match drone.barrier.wait_tick(|| true) {
-            TickSignal::Tick(tick) => drone.answer(tick)?,
-            TickSignal::Stop | TickSignal::Orphaned => return Ok(()),
-        }
-    }
+    let seats: Vec<Seat> = crew.ids().map(seat).collect::<Result<_, _>>()?;
+    let shard = |id: DroneId| id.index() / SHARD_DRONES;
+    let shards = shard(crew.first)..=seats.last().map_or(0, |seat| shard(seat.id));
+    let mut process = DroneProcess {
+        first_shard: *shards.start(),
+        speaks: shards.map(|shard| services.uplink_publisher(shard * SHARD_DRONES)).collect::<Result<_, _>>()?,
+        hears: services.downlink_subscriber()?,
+        incarnation: crew.incarnation,
+        seats,
+    };
+    process.seats.iter().for_each(|seat| seat.barrier.announce(crew.incarnation));
+    process.fly()
 }
 
-struct Drone {
+/// One drone of the process.
+struct Seat {
     id: DroneId,
-    incarnation: u32,
     cockpit: Cockpit,
-    hears: DownlinkSubscriber,
-    speaks: UplinkPublisher,
     barrier: DroneEnd,
     slot: Slot,
 }
 
-impl Drone {
+/// The drones of this process, and the ports that they share.
+struct DroneProcess {
+    incarnation: u32,
+    hears: DownlinkSubscriber,
+    /// One a shard, from the first one's on.
+    speaks: Vec<UplinkPublisher>,
+    first_shard: usize,
+    seats: Vec<Seat>,
+}
+
+impl DroneProcess {
+    fn fly(&mut self) -> Result<(), RuntimeError> {
+        loop {
+            let Some((first, others)) = self.seats.split_first_mut() else { return Ok(()) };
+            let TickSignal::Tick(tick) = first.barrier.wait_tick(|| true) else { return Ok(()) };
+            others.iter_mut().for_each(|seat| _ = seat.barrier.join_tick(tick));
+            self.answer(tick)?;
+        }
+    }
+
     /// Reads the downlinks up to the newest, and answers that one.
     fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
-        let started = Instant::now();
+        let resume_from = self.seats.first().map_or(0, |seat| seat.barrier.resume_from());
         while let Some(sample) = self.hears.receive()? {
-            if sample.tick() < self.barrier.resume_from() {
+            if sample.tick() < resume_from {
                 // Sent while this process was stopped: nobody heard it.
                 continue;
             }
             let down = DownlinkView::parse(sample.bytes())
-                .map_err(|error| RuntimeError::Process(format!("drone {}: {error}", self.id)))?;
-            self.cockpit.receive(&down, self.barrier.stats_mut());
+                .map_err(|error| RuntimeError::Process(format!("drone process: {error}")))?;
             if sample.tick() < tick {
+                self.seats.iter_mut().for_each(|seat| seat.cockpit.overhear(&down, seat.barrier.stats_mut()));
                 continue;
             }
-            let frames = self.cockpit.step(&down, &mut self.slot, self.barrier.stats_mut());
-            if !frames.is_empty() {
-                let header = UplinkHeader { tick, source: self.id.0, incarnation: self.incarnation };
-                match self.speaks.send(header, frames.len(), |out| out.copy_from_slice(frames)) {
-                    // By the wall clock only: the world is far behind, what is said is lost.
-                    Err(BusError::Full { .. }) => {}
-                    sent => sent?,
-                }
+            for seat in &mut self.seats {
+                let header = UplinkHeader { tick, source: seat.id.0, incarnation: self.incarnation };
+                seat.step(&down, header, &self.speaks[seat.id.index() / SHARD_DRONES - self.first_shard])?;
             }
-            self.slot.step_ns = u32::try_from(started.elapsed().as_nanos()).unwrap_or(u32::MAX);
-            self.barrier.finish(tick, &self.slot);
+            // The world waits for them in turn: when the first has answered, all have.
+            self.seats.iter_mut().rev().for_each(|seat| _ = seat.barrier.finish(tick, &seat.slot));
             break;
         }
+        Ok(())
+    }
+}
+
+impl Seat {
+    fn step(
+        &mut self,
+        down: &DownlinkView<'_>,
+        header: UplinkHeader,
+        speaks: &UplinkPublisher,
+    ) -> Result<(), RuntimeError> {
+        let started = Instant::now();
+        let frames = self.cockpit.step(down, &mut self.slot, self.barrier.stats_mut());
+        if !frames.is_empty() {
+            match speaks.send(header, frames.len(), |out| out.copy_from_slice(frames)) {
+                // By the wall clock only: the world is far behind, what is said is lost.
+                Err(BusError::Full { .. }) => {}
+                sent => sent?,
+            }
+        }
+        self.slot.step_ns = u32::try_from(started.elapsed().as_nanos()).unwrap_or(u32::MAX);
         Ok(())
     }
 }

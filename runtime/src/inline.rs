@@ -75,7 +75,6 @@ impl Seat {
 
     fn answer(&mut self, down: &DownlinkView<'_>) {
         let Some(cockpit) = self.cockpit.as_mut().filter(|_| !self.frozen) else { return };
-        cockpit.receive(down, &mut self.stats);
         let frames = cockpit.step(down, &mut self.slot, &mut self.stats);
         self.frames.clear();
         self.frames.extend_from_slice(frames);

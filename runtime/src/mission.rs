@@ -46,6 +46,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         detection_range_m: scenario.sensors.detection_range_m,
         ranging_m: scenario.sensors.ranging.then_some(RANGING * drone.safe_distance_m),
         channel: scenario.channel(),
+        locality: scenario.radio().locality(),
         failsafe: match scenario.faults.failsafe {
             Failsafe::Hover => skein_world::Failsafe::Hover,
             Failsafe::Land => skein_world::Failsafe::Land,

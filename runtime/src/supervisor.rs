@@ -2,7 +2,7 @@
 //! after them until the last one has ended.
 
 use crate::children::{Children, Role};
-use crate::drone_process::scenario_path;
+use crate::drone_process::{Crew, scenario_path};
 use crate::world_process::DISMISSED;
 use crate::{Clock, RunEnd, RuntimeError, mission};
 use skein_bus::{
@@ -26,6 +26,8 @@ pub struct Launch<'a> {
     pub pin: PinMode,
     /// How they wait for each other.
     pub wait: WaitMode,
+    /// Drones in a process, from 1. With more than one no fault of the scenario may end or stop a process.
+    pub per_process: u32,
     /// The executable that knows the roles `world` and `drone`.
     pub executable: PathBuf,
     /// Told who is there: once all are ready and before the first tick, and again, with those that are gone, when a
@@ -63,18 +65,19 @@ pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, Runt
     raise_file_limit()?;
     let drones = mission::drones(launch.scenario);
     let domain = Domain::create(&launch.scenario.name)?;
+    let per_process = launch.per_process.max(1) as usize;
     let cores = match launch.pin {
-        PinMode::Auto => allowed_cores()?.min(drones + 1),
+        PinMode::Auto => allowed_cores()?.min(drones.div_ceil(per_process) + 1),
         PinMode::Off => 1,
     };
-    let control = Control::create(ControlSpec { drones, cores, wait: launch.wait })?;
-    let services = Services::create(&domain, drones, "launcher")?;
+    let control = Control::create(ControlSpec { drones, cores, per_process, wait: launch.wait })?;
+    let services = Services::create(&domain, drones, per_process, "launcher")?;
     let record = services.record_subscriber()?;
     let path = scenario_path(domain.path());
     let json = serde_json::to_vec(launch.scenario).map_err(|error| RuntimeError::Process(error.to_string()))?;
     std::fs::write(&path, json).map_err(RuntimeError::system(format!("writing {}", path.display())))?;
     let mut supervisor = Supervisor {
-        children: Children::new(&launch, &domain, &control),
+        children: Children::new(&launch, &domain, &control)?,
         end: RunEnd::default(),
         domain: &domain,
         processes: Vec::new(),
@@ -111,8 +114,11 @@ impl Supervisor<'_, '_, '_> {
     /// Starts everybody, waits until all are ready, tells who is there, and lets the world begin.
     fn start(&mut self, drones: usize) -> Result<(), RuntimeError> {
         self.children.spawn(Role::World, self.launch.clock)?;
-        for id in 0..drones as u32 {
-            self.children.spawn(Role::Drone { id: DroneId(id), incarnation: 1, first_tick: 0 }, self.launch.clock)?;
+        let (drones_u32, step) = (drones as u32, self.launch.per_process.max(1));
+        for first in (0..drones_u32).step_by(step as usize) {
+            let count = step.min(drones_u32 - first);
+            let crew = Crew { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
+            self.children.spawn(Role::Drones(crew), self.launch.clock)?;
         }
         let limit = Instant::now() + START_LIMIT + START_LIMIT_PER_DRONE * drones as u32;
         let mut ready = 0;
@@ -193,7 +199,7 @@ impl Supervisor<'_, '_, '_> {
     fn reap(&mut self) {
         for (role, how) in self.children.wait_any(LOOK) {
             match role {
-                Role::Drone { id, .. } => self.control.mark_dead(id.index()),
+                Role::Drones(crew) => crew.ids().for_each(|id| self.control.mark_dead(id.index())),
                 Role::World => self.world_ended = Some(how),
             }
         }
@@ -223,10 +229,8 @@ impl Supervisor<'_, '_, '_> {
 
     fn kill(&mut self, drone: DroneId) -> bool {
         let killed = self.children.kill_drone(drone);
-        if killed {
-            self.control.mark_dead(drone.index());
-        }
-        killed
+        killed.into_iter().flat_map(|crew| crew.ids()).for_each(|id| self.control.mark_dead(id.index()));
+        killed.is_some()
     }
 
     /// Starts a new process for a dead drone and waits until it is ready to answer `tick`; gives its incarnation.
@@ -237,7 +241,8 @@ impl Supervisor<'_, '_, '_> {
         // Its predecessor still has its places in the services.
         clean_dead_nodes(self.domain)?;
         self.control.revive(drone, first_tick);
-        self.children.spawn(Role::Drone { id, incarnation, first_tick }, self.launch.clock)?;
+        let crew = Crew { first: id, count: 1, incarnation, first_tick };
+        self.children.spawn(Role::Drones(crew), self.launch.clock)?;
         let limit = Instant::now() + START_LIMIT;
         while self.control.ready(drone) != Some(incarnation) {
             self.reap();

@@ -27,7 +27,6 @@ fn fly(scenario: &Scenario, dead: DroneId, at: u64) -> World {
         let mut answers: Vec<(DroneId, Slot, Vec<Frame>)> = Vec::new();
         for (cockpit, id) in cockpits.iter_mut().zip(0..).filter(|(_, id)| tick < at || DroneId(*id) != dead) {
             let mut slot = Slot::default();
-            cockpit.receive(&down, &mut stats);
             let frames = cockpit.step(&down, &mut slot, &mut stats).to_vec();
             answers.push((DroneId(id), slot, frames));
         }

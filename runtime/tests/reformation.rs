@@ -34,7 +34,6 @@ fn to_the_end(scenario: &Scenario) -> World {
         let mut answers: Vec<(Slot, Vec<Frame>)> = Vec::new();
         for cockpit in &mut cockpits {
             let mut slot = Slot::default();
-            cockpit.receive(&down, &mut stats);
             let frames = cockpit.step(&down, &mut slot, &mut stats).to_vec();
             answers.push((slot, frames));
         }

@@ -48,6 +48,12 @@ pub enum Command {
     Top(crate::top::TopArgs),
     /// Tap what a running swarm says: list, echo, hz
     Topic(crate::topic::TopicArgs),
+    /// Measure what the swarm does by itself: failover
+    Bench {
+        /// What is measured.
+        #[command(subcommand)]
+        of: crate::bench::BenchCommand,
+    },
     /// Say what of this machine limits a swarm
     Doctor(crate::doctor::DoctorArgs),
     /// Remove what dead runs left behind
@@ -156,6 +162,9 @@ pub struct RunArgs {
     /// How processes wait for each other: block sleeps; yield is faster on a quiet machine, ruinous on a busy one
     #[arg(long, value_enum, default_value_t)]
     pub wait: WaitChoice,
+    /// Drones that share a process; the digest stays the same
+    #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub drones_per_process: u32,
 }
 
 /// Which runtime.
@@ -240,9 +249,12 @@ pub struct DroneArgs {
     /// As for every child.
     #[command(flatten)]
     pub child: ChildArgs,
-    /// Its number.
+    /// Its number, or that of the first one in this process.
     #[arg(long)]
     pub id: u32,
+    /// Drones in this process.
+    #[arg(long)]
+    pub count: u32,
     /// Which start of this drone it is, from 1.
     #[arg(long)]
     pub incarnation: u32,

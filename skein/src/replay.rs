@@ -77,6 +77,7 @@ fn fly(
         clock: Clock::Lockstep,
         pin: PinChoice::Auto.into(),
         wait: WaitChoice::Block.into(),
+        per_process: 1,
         executable: std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?,
         on_ready: &mut |_: &[ProcessInfo]| Ok(()),
         interrupted: &mut || interrupt.signal(),

@@ -3,7 +3,7 @@
 use crate::cli::{self, DroneArgs, WorldArgs};
 use crate::exit::{Exit, Failure};
 use skein_protocol::DroneId;
-use skein_runtime::drone_process::{self, ChildArgs};
+use skein_runtime::drone_process::{self, ChildArgs, Crew};
 use skein_runtime::world_process;
 
 /// Runs the world.
@@ -14,7 +14,8 @@ pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
 
 /// Runs one drone.
 pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
-    let run = drone_process::run(&child(&args.child), DroneId(args.id), args.incarnation, args.first_tick);
+    let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
+    let run = drone_process::run(&child(&args.child), Crew { first: DroneId(id), count, incarnation, first_tick });
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
 }
 

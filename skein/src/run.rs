@@ -19,6 +19,7 @@ use std::time::Instant;
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let started = Instant::now();
     let scenario = input::scenario(&args.scenario)?;
+    check_packing(args, &scenario)?;
     let runtime = match args.runtime {
         RuntimeChoice::Processes => "processes",
         RuntimeChoice::Inline => "inline",
@@ -52,6 +53,17 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         eprintln!("skein: {trouble}");
     }
     Ok(exit(&end, trouble.is_some(), &summary))
+}
+
+/// A fault that ends or stops one drone's process would take along whoever is in it.
+fn check_packing(args: &RunArgs, scenario: &Scenario) -> Result<(), Failure> {
+    use skein_scenario::FaultKind::{Freeze, Kill, Restart};
+    let of_process = |fault: &skein_scenario::Fault| [Kill, Freeze, Restart].contains(&fault.kind);
+    if args.drones_per_process > 1 && scenario.fault_plan.iter().any(of_process) {
+        let why = "the scenario kills, freezes or restarts processes, and each drone must have one of its own for that";
+        return Err(Failure::usage(format!("--drones-per-process {}: {why}", args.drones_per_process)));
+    }
+    Ok(())
 }
 
 fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure> {
@@ -100,6 +112,7 @@ fn fly(
                 clock: args.clock,
                 pin: args.pin.into(),
                 wait: args.wait.into(),
+                per_process: args.drones_per_process,
                 executable,
                 on_ready: &mut on_ready,
                 interrupted: &mut || interrupt.signal(),

@@ -3,6 +3,7 @@
 use crate::faults::FaultPlan;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::nearby::Locality;
 use skein_protocol::radio::Channel;
 use skein_protocol::shape::ShapeError;
 use thiserror::Error;
@@ -60,6 +61,8 @@ pub struct WorldParams {
     pub ranging_m: Option<f64>,
     /// The channel that all drones share; `None`: its bandwidth is no limit.
     pub channel: Option<Channel>,
+    /// Which frames are heard in a neighbourhood alone: they are sorted for their receivers.
+    pub locality: Locality,
     /// What a drone does whose process is gone.
     pub failsafe: Failsafe,
     /// When the mission is over.

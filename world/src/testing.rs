@@ -5,6 +5,7 @@ use crate::faults::FaultPlan;
 use crate::params::{End, Failsafe, WorldParams};
 use crate::world::World;
 use skein_protocol::formation::Shape;
+use skein_protocol::nearby::Locality;
 use skein_protocol::record::{Happening, RunEvent};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::Slot;
@@ -23,6 +24,7 @@ pub(crate) fn params() -> WorldParams {
         detection_range_m: 115.0,
         ranging_m: Some(66.0),
         channel: None,
+        locality: Locality::default(),
         failsafe: Failsafe::Hover,
         end: End::Hold { stop_x_m: 1e9 },
         arrival_error_m: 0.8,

@@ -20,6 +20,7 @@ use crate::totals;
 use skein_protocol::digest::Digest;
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
+use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DropReason, Queue};
 use skein_protocol::record::{DroneRow, FaultKind, Happening, Outcome, RecordHead, RecordView, Totals};
 use skein_protocol::shape::ConvexShape;
@@ -124,6 +125,9 @@ impl World {
         let told = |(process, id): (&Process, u32)| (process.incarnation, faults.hindrance(DroneId(id), tick));
         let drones = self.processes.iter().zip(0..).map(told);
         self.teller.tell(&self.bodies, drones, &self.around, self.params.ranging_m, &mut self.down);
+        // In a queue for the channel frames lose their order, by which a drone counts its own.
+        let locality = if self.queue.is_none() { self.params.locality } else { Locality::default() };
+        self.down.index.build(locality, &self.down.frames);
         self.down.seal(tick, self.now());
         &self.down
     }

@@ -20,6 +20,14 @@ pub struct Air {
     pub duplicate: f64,
 }
 
+impl Air {
+    /// No frame is heard from farther away, m; infinite unless the range is a hard limit.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        self.range.filter(|range| range.shadowing_db <= 0.0).map_or(f64::INFINITY, |range| range.half_m)
+    }
+}
+
 /// How a delay is distributed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DelayModel {

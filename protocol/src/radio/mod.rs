@@ -17,6 +17,7 @@ use crate::Vec2;
 use crate::frame::AirFrame;
 use crate::ids::DroneId;
 use crate::message::Topic;
+use crate::nearby::Locality;
 use crate::record::RecordView;
 use crate::time::SimTime;
 use key::Draws;
@@ -161,6 +162,31 @@ impl Radio {
             let others = record.frames.iter().filter(move |frame| frame.source != receiver);
             others.map(move |frame| (frame, receiver, self.fate(frame, receiver, row.position_m.into(), dt_ns)))
         })
+    }
+
+    /// Which topics are heard no farther than a hard range by everybody whom no rule names, and how far.
+    #[must_use]
+    pub fn locality(&self) -> Locality {
+        Topic::ALL.into_iter().fold(Locality::default(), |locality, topic| {
+            let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(topic);
+            let air = self.rules.iter().rev().find(general).map_or(&self.air, |rule| &rule.air);
+            let range_m = air.reach_m();
+            if range_m.is_finite() { locality.with(topic, range_m) } else { locality }
+        })
+    }
+
+    /// From how far away a drone hears a topic at most, whoever sends, m; infinite without a hard range.
+    #[must_use]
+    pub fn reach_m(&self, topic: Topic, receiver: DroneId) -> f64 {
+        let mut reach_m = 0f64;
+        let at = |rule: &&Rule| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
+        for rule in self.rules.iter().rev().filter(at) {
+            reach_m = reach_m.max(rule.air.reach_m());
+            if rule.from.is_none() {
+                return reach_m;
+            }
+        }
+        reach_m.max(self.air.reach_m())
     }
 
     fn air_of(&self, link: Link) -> &Air {

@@ -20,6 +20,12 @@ pub struct Rule {
 }
 
 impl Rule {
+    /// Whether it is about this topic, whoever sends and hears it.
+    #[must_use]
+    pub fn is_about(&self, topic: Topic) -> bool {
+        self.topics.as_ref().is_none_or(|set| set.contains(&topic))
+    }
+
     /// Whether it is about this frame. A frame of an unknown kind has no topic.
     #[must_use]
     pub fn covers(&self, link: Link) -> bool {

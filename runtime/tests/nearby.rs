@@ -1,0 +1,83 @@
+//! What is sorted by place is what would have been heard otherwise, and counted the same.
+
+use proptest::prelude::*;
+use skein_agent::{Command, Heard, Pilot};
+use skein_protocol::downlink::{Downlink, SenseHead, Senses};
+use skein_protocol::frame::AirFrame;
+use skein_protocol::message::Topic;
+use skein_protocol::payload::Leadership;
+use skein_protocol::radio::{Air, Radio, Range, Rule};
+use skein_protocol::slot::{LinkStats, Slot};
+use skein_protocol::{DroneId, Message, SimTime};
+use skein_runtime::cockpit::Cockpit;
+
+/// Does nothing.
+struct Idle;
+
+impl Pilot for Idle {
+    fn step(&mut self, _: &Senses<'_>, _: &[Heard], _: &mut Vec<Message>) -> Command {
+        Command::default()
+    }
+
+    fn pose_ages_s(&self, _: SimTime, ages: &mut Vec<f64>) {
+        ages.clear();
+    }
+}
+
+fn said(leads: bool) -> Message {
+    match leads {
+        true => Message::Leadership(Leadership { kind: 1, ..bytemuck::Zeroable::zeroed() }),
+        false => Message::Pose(bytemuck::Zeroable::zeroed()),
+    }
+}
+
+fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
+    let mut down = Downlink::default();
+    down.drones =
+        points.iter().map(|&(position_m, _)| SenseHead { position_m, alive: 1, ..SenseHead::default() }).collect();
+    down.frames = points
+        .iter()
+        .zip(0..)
+        .map(|(&(position_m, leads), id)| AirFrame {
+            source: DroneId(id),
+            position_m,
+            frame: said(leads).encode(),
+            ..bytemuck::Zeroable::zeroed()
+        })
+        .collect();
+    down.seal(1, SimTime(20_000_000));
+    down
+}
+
+fn hear(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
+    let mut cockpit = Cockpit::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
+    let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
+    cockpit.step(&down.view(), &mut slot, &mut stats);
+    (slot, stats)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn sorted_or_not_a_drone_hears_and_drops_the_same(
+        points in prop::collection::vec(([-300f64..300.0, -300f64..300.0], any::<bool>()), 40..120),
+        far in 0u32..40,
+        loss in 0.0..0.5,
+    ) {
+        let short = Range { half_m: 80.0, shadowing_db: 0.0, exponent: 2.0 };
+        let air = Air { loss, range: Some(short), ..Air::default() };
+        let leading = Rule { topics: Some([Topic::Leadership].into()), air: Air { range: None, ..air }, ..Rule::default() };
+        let base = Rule { to: Some([DroneId(far)].into()), air: Air { range: None, ..air }, ..Rule::default() };
+        let radio = Radio { seed: 7, air, rules: vec![leading, base], ..Radio::default() };
+        let plain = downlink(&points);
+        let mut sorted = plain.clone();
+        sorted.index.build(radio.locality(), &sorted.frames);
+        sorted.seal(1, SimTime(20_000_000));
+        prop_assert!(sorted.index.locality.topics != 0);
+        for me in 0..points.len() as u32 {
+            let (expected, found) = (hear(me, &radio, &plain), hear(me, &radio, &sorted));
+            prop_assert_eq!(expected.0, found.0);
+            prop_assert!(expected.1 == found.1);
+        }
+    }
+}
