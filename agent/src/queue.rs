@@ -24,7 +24,7 @@ pub fn ahead_of(mine: QueuePlace, peers: &Peers, now: SimTime, queue: &mut Vec<A
             pose.queue.iter().filter(same).map(|p| Ahead { rank: p.rank, remaining_m: p.remaining_m - flown_m }),
         );
     }
-    queue.sort_by(|a, b| a.rank.cmp(&b.rank).then(a.remaining_m.total_cmp(&b.remaining_m)));
+    queue.sort_unstable_by(|a, b| a.rank.cmp(&b.rank).then(a.remaining_m.total_cmp(&b.remaining_m)));
 }
 
 /// The speed at which a drone with `remaining_m` to the gate reaches it `headway_s` after the one before:

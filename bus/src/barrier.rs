@@ -76,6 +76,7 @@ impl Control {
         (0..cores).for_each(|core| self.tick_word(core).store(value, Ordering::SeqCst));
         if self.spec().wait == WaitMode::Block {
             (0..cores).rev().for_each(|core| futex::wake_all(self.tick_word(core)));
+            self.shared().calls.fetch_add(cores as u64, Ordering::Relaxed);
         }
     }
 
@@ -133,6 +134,7 @@ impl Control {
         self.waiting().store(drone as u32 + 1, Ordering::SeqCst);
         let seen = word.load(Ordering::SeqCst);
         if judge(seen, target).is_none() {
+            self.shared().calls.fetch_add(1, Ordering::Relaxed);
             futex::wait(word, seen, limit);
         }
         self.waiting().store(0, Ordering::Relaxed);
@@ -144,6 +146,7 @@ impl Control {
             if judge(word.load(Ordering::Acquire), target).is_some() {
                 return;
             }
+            self.shared().calls.fetch_add(1, Ordering::Relaxed);
             rustix::thread::sched_yield();
         }
     }
@@ -171,6 +174,7 @@ pub struct DroneEnd {
     control: Arc<Control>,
     drone: usize,
     last: u32,
+    bound: bool,
 }
 
 impl DroneEnd {
@@ -183,7 +187,14 @@ impl DroneEnd {
         if drone >= drones {
             return Err(BusError::Control(format!("drone {drone} is not below {drones}")));
         }
-        Ok(Self { control, drone, last: 0 })
+        Ok(Self { control, drone, last: 0, bound: false })
+    }
+
+    /// This process dies with its launcher, which closes the barrier should the world die: it need not look whether they
+    /// live, and sleeps without a limit.
+    #[must_use]
+    pub fn bound(self) -> Self {
+        Self { bound: true, ..self }
     }
 
     /// Tells that this process, of an incarnation from 1, has its ports open and will answer ticks.
@@ -192,7 +203,7 @@ impl DroneEnd {
     }
 
     /// Waits for a tick that this drone has not seen yet, and gives the newest. `alive` is asked every 100 ms or so
-    /// whether the world is still there.
+    /// whether the world is still there, unless the process is [`DroneEnd::bound`].
     pub fn wait_tick(&mut self, mut alive: impl FnMut() -> bool) -> TickSignal {
         let control = &self.control;
         let word = control.tick_word(control.core_of(self.drone));
@@ -226,11 +237,16 @@ impl DroneEnd {
     /// Waits for another value than `seen`; false if there was none for a while.
     fn pause(&self, seen: u32) -> bool {
         let word = self.control.tick_word(self.control.core_of(self.drone));
+        let calls = &self.control.drone(self.drone).calls;
         match self.control.spec().wait {
-            WaitMode::Block => futex::wait(word, seen, SLICE),
+            WaitMode::Block => {
+                calls.fetch_add(1, Ordering::Relaxed);
+                if self.bound { futex::wait_on(word, seen) } else { futex::wait(word, seen, SLICE) }
+            }
             WaitMode::Yield => {
                 let mut looks = 0..YIELDS * 16;
                 while word.load(Ordering::Acquire) == seen && looks.next().is_some() {
+                    calls.fetch_add(1, Ordering::Relaxed);
                     rustix::thread::sched_yield();
                 }
             }
@@ -252,6 +268,7 @@ impl DroneEnd {
         // See `sleep_on` for why both are sequentially consistent.
         words.done.store(done, Ordering::SeqCst);
         if self.control.waiting().load(Ordering::SeqCst) == self.drone as u32 + 1 {
+            words.calls.fetch_add(1, Ordering::Relaxed);
             futex::wake_all(&words.done);
         }
         true

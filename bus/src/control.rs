@@ -12,7 +12,7 @@ use std::fs::OpenOptions;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
 use std::path::PathBuf;
 use std::ptr::NonNull;
-use std::sync::atomic::AtomicU32;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
@@ -69,6 +69,8 @@ pub(crate) struct SharedWords {
     pub(crate) go: AtomicU32,
     pub(crate) stop: AtomicU32,
     pub(crate) world_state: AtomicU32,
+    /// System calls of the barrier that the world has made.
+    pub(crate) calls: AtomicU64,
 }
 
 #[repr(C, align(128))]
@@ -93,6 +95,8 @@ pub(crate) struct DroneWords {
     pub(crate) resume_from: AtomicU32,
     /// Incarnation of the process that is ready; 0 if none is.
     pub(crate) ready: AtomicU32,
+    /// System calls of the barrier that it has made.
+    pub(crate) calls: AtomicU64,
 }
 
 /// Where the parts begin, bytes.
@@ -228,6 +232,13 @@ impl Control {
         unsafe { self.stats_at(drone).read_volatile() }
     }
 
+    /// System calls that the barrier has cost so far: the world's, and those of all drones.
+    #[must_use]
+    pub fn calls(&self) -> [u64; 2] {
+        let drones = (0..self.spec.drones).map(|drone| self.drone(drone).calls.load(Ordering::Relaxed)).sum();
+        [self.shared().calls.load(Ordering::Relaxed), drones]
+    }
+
     /// The tick word's number that a drone waits on; it should be pinned to that core.
     #[must_use]
     pub fn core_of(&self, drone: usize) -> usize {
@@ -305,14 +316,14 @@ fn spin_for(drones: usize) -> u32 {
     if drones < cores { SPIN } else { 0 }
 }
 
-fn map(fd: BorrowedFd<'_>, len: usize) -> Result<NonNull<u8>, BusError> {
+pub(crate) fn map(fd: BorrowedFd<'_>, len: usize) -> Result<NonNull<u8>, BusError> {
     // SAFETY: a fresh mapping at an address of the kernel's choice touches no other memory.
     let base = unsafe { mmap(std::ptr::null_mut(), len, ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED, fd, 0) };
     let base = base.map_err(BusError::system("map the control segment"))?;
     NonNull::new(base.cast()).ok_or_else(|| BusError::Control("was mapped at address 0".to_owned()))
 }
 
-fn unmap(base: NonNull<u8>, len: usize) {
+pub(crate) fn unmap(base: NonNull<u8>, len: usize) {
     // SAFETY: the callers made this mapping with this length, and drop every pointer into it. It cannot fail for that.
     let _ = unsafe { munmap(base.as_ptr().cast(), len) };
 }

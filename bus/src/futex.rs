@@ -12,6 +12,11 @@ pub(crate) fn wait(word: &AtomicU32, expected: u32, limit: Duration) {
     let _ = futex::wait(word, Flags::empty(), expected, Some(&limit));
 }
 
+/// The same without a limit, which spares the kernel a timer.
+pub(crate) fn wait_on(word: &AtomicU32, expected: u32) {
+    let _ = futex::wait(word, Flags::empty(), expected, None);
+}
+
 /// Wakes everybody who sleeps on `word`.
 pub(crate) fn wake_all(word: &AtomicU32) {
     // It fails only for an address that is not mapped, and this is a reference.

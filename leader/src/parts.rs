@@ -169,7 +169,7 @@ impl Leading {
         });
         members.append(&mut orphans);
         (self.members, self.others) = (members, others);
-        self.members.sort_by_key(|member| member.id);
+        self.members.sort_unstable_by_key(|member| member.id);
         for set in self.ledger.sets() {
             let past = self.members.iter().filter(|member| member.position.x >= set.routes.exit_x_m());
             past.for_each(|member| self.obstacles.note_passed(member.id, &set.ids));

@@ -2,7 +2,7 @@
 
 use crate::drone_process::Crew;
 use crate::supervisor::{Launch, ProcessInfo};
-use crate::{Clock, RuntimeError};
+use crate::{Clock, PilotKind, RuntimeError};
 use rustix::event::{Timespec, epoll};
 use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
@@ -53,6 +53,7 @@ pub(crate) struct Children {
     domain: PathBuf,
     control: i32,
     pin: PinMode,
+    pilot: PilotKind,
     running: Vec<Running>,
     /// Tells of ends; what it costs does not depend on how many there are.
     ends: OwnedFd,
@@ -67,6 +68,7 @@ impl Children {
             // The segment that the launcher made has a descriptor.
             control: control.fd().unwrap_or(-1),
             pin: launch.pin,
+            pilot: launch.pilot,
             running: Vec::new(),
             ends: ends.map_err(|error| RuntimeError::system("watching processes")(error.into()))?,
         })
@@ -80,6 +82,8 @@ impl Children {
             Role::World => command.args(["world", "--clock", &clock.to_string()]),
             Role::Drones(Crew { first, count, incarnation, first_tick }) => command.args([
                 "drone",
+                "--pilot",
+                self.pilot.name(),
                 "--id",
                 &first.to_string(),
                 "--count",

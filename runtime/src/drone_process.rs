@@ -1,7 +1,7 @@
 //! A drone's process, or that of several: it waits for a tick, hears, steps its pilots, speaks, answers.
 
 use crate::cockpit::Cockpit;
-use crate::{RuntimeError, mission};
+use crate::{PilotKind, RuntimeError, mission};
 use skein_bus::{
     BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, SHARD_DRONES, Services, TickSignal, UplinkHeader,
     UplinkPublisher, pin_to_core, raise_file_limit,
@@ -82,14 +82,14 @@ impl Crew {
     }
 }
 
-/// Runs drones of a swarm until their mission ends, with the paper's pilot.
+/// Runs drones of a swarm until their mission ends, with pilots of this kind.
 ///
 /// # Errors
 /// [`RuntimeError`]; the launcher sees the process end.
-pub fn run(args: &ChildArgs, crew: Crew) -> Result<(), RuntimeError> {
+pub fn run(args: &ChildArgs, crew: Crew, pilot: PilotKind) -> Result<(), RuntimeError> {
     fly(args, crew, |scenario, id| {
         let start = SimTime(crew.first_tick as i64 * mission::dt_ns(scenario));
-        mission::cockpit(scenario, id, crew.incarnation, start)
+        mission::cockpit_with(pilot, scenario, id, crew.incarnation, start)
     })
 }
 
@@ -110,7 +110,7 @@ pub fn fly(
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", crew.first))?;
     let seat = |id: DroneId| -> Result<Seat, RuntimeError> {
-        let barrier = DroneEnd::new(Arc::clone(&control), id.index())?;
+        let barrier = DroneEnd::new(Arc::clone(&control), id.index())?.bound();
         Ok(Seat { id, cockpit: make(&scenario, id), barrier, slot: Slot::default() })
     };
     let seats: Vec<Seat> = crew.ids().map(seat).collect::<Result<_, _>>()?;

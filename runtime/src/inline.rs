@@ -2,7 +2,7 @@
 //! determinism, and the engine for large sweeps.
 
 use crate::cockpit::Cockpit;
-use crate::{RunEnd, RuntimeError, mission};
+use crate::{PilotKind, RunEnd, RuntimeError, mission};
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::RecordSink;
@@ -29,12 +29,26 @@ struct Seat {
 pub fn run(
     scenario: &Scenario,
     sink: &mut dyn RecordSink,
+    interrupted: impl FnMut() -> Option<i32>,
+) -> Result<RunEnd, RuntimeError> {
+    run_with(scenario, PilotKind::Swarm, sink, interrupted)
+}
+
+/// The same with pilots of another kind.
+///
+/// # Errors
+/// [`RuntimeError::Scenario`] if no world can be made of the scenario.
+pub fn run_with(
+    scenario: &Scenario,
+    pilot: PilotKind,
+    sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
+    let cockpit = |id, incarnation, start| mission::cockpit_with(pilot, scenario, id, incarnation, start);
     let started = Instant::now();
     let mut world = mission::world(scenario)?;
     let seat = |id| Seat {
-        cockpit: Some(mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)),
+        cockpit: Some(cockpit(DroneId(id), 1, SimTime::ZERO)),
         frozen: false,
         slot: Slot::default(),
         frames: Vec::new(),
@@ -45,7 +59,10 @@ pub fn run(
     let (opened, mut signal, mut sink_error) = (Instant::now(), None, None);
     while world.ended().is_none() {
         let start = world.now();
-        world.orders().iter().for_each(|&order| carry_out(order, scenario, start, &mut seats));
+        world
+            .orders()
+            .iter()
+            .for_each(|&order| carry_out(order, &mut seats, |id, incarnation| cockpit(id, incarnation, start)));
         let down = world.downlink().view();
         seats.iter_mut().for_each(|seat| seat.answer(&down));
         for (seat, id) in seats.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
@@ -64,7 +81,7 @@ pub fn run(
     seats.iter().for_each(|seat| stats.merge(&seat.stats));
     world.finish(&stats, wall_s);
     keep(sink, &world, &mut sink_error);
-    Ok(RunEnd { startup_s, signal, sink_error, failure: None })
+    Ok(RunEnd { startup_s, signal, sink_error, ..RunEnd::default() })
 }
 
 impl Seat {
@@ -81,8 +98,8 @@ impl Seat {
     }
 }
 
-/// Does to a pilot what the process runtime does to a process; `start` is when the tick opens.
-fn carry_out(order: ProcessOrder, scenario: &Scenario, start: SimTime, seats: &mut [Seat]) {
+/// Does to a pilot what the process runtime does to a process; `make` makes a new one.
+fn carry_out(order: ProcessOrder, seats: &mut [Seat], make: impl Fn(DroneId, u32) -> Cockpit) {
     match order {
         ProcessOrder::Kill(id) => {
             let seat = &mut seats[id.index()];
@@ -91,7 +108,7 @@ fn carry_out(order: ProcessOrder, scenario: &Scenario, start: SimTime, seats: &m
         ProcessOrder::Freeze(id) => seats[id.index()].frozen = true,
         ProcessOrder::Resume(id) => seats[id.index()].frozen = false,
         ProcessOrder::Restart(id, incarnation) => {
-            seats[id.index()].cockpit = Some(mission::cockpit(scenario, id, incarnation, start));
+            seats[id.index()].cockpit = Some(make(id, incarnation));
         }
     }
 }

@@ -4,11 +4,13 @@
 //! |---|---|
 //! | [`mission`] | from a scenario to world, pilots and radios |
 //! | [`cockpit`] | what both runtimes put around a pilot: radio, queue, tally |
+//! | [`beacon`] | the trivial pilot, to measure the runtime with |
 //! | [`inline`] | all in one thread |
 //! | [`supervisor`] | starts a process for the world and one for each drone, and looks after them |
 //! | [`world_process`], [`drone_process`] | what those processes do |
 //! | [`clock`] | lockstep and wall clock |
 
+pub mod beacon;
 mod children;
 pub mod clock;
 pub mod cockpit;
@@ -22,12 +24,15 @@ pub mod world_process;
 
 pub use clock::Clock;
 pub use error::RuntimeError;
+pub use mission::PilotKind;
 
 /// How a run ended, beside what its record tells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunEnd {
     /// From the call to the first tick opened, s of wall time.
     pub startup_s: f64,
+    /// System calls of the barrier: the world's, and those of all drones.
+    pub calls: [u64; 2],
     /// The signal that interrupted it.
     pub signal: Option<i32>,
     /// Why the recording stopped early.

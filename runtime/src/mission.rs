@@ -1,5 +1,6 @@
 //! From a scenario to what flies it: the world, the drones' parameters, their cockpits. Both runtimes start here.
 
+use crate::beacon::BeaconPilot;
 use crate::cockpit::Cockpit;
 use crate::{RuntimeError, plan};
 use skein_agent::danger::Braking;
@@ -145,6 +146,38 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         destination: destination(scenario),
         debounce_s: scenario.protocol.debounce_s,
     }
+}
+
+/// What flies a drone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PilotKind {
+    /// The paper's pilot.
+    #[default]
+    Swarm,
+    /// The trivial one, [`BeaconPilot`].
+    Beacon,
+}
+
+impl PilotKind {
+    /// Its name in a child's arguments.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Swarm => "swarm",
+            Self::Beacon => "beacon",
+        }
+    }
+}
+
+/// One drone with a pilot of this kind, ready for the tick that begins at `start`.
+#[must_use]
+pub fn cockpit_with(kind: PilotKind, scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
+    if kind == PilotKind::Swarm {
+        return cockpit(scenario, me, incarnation, start);
+    }
+    let beacon_ticks = (scenario.protocol.beacon_period_s / scenario.time.dt_s).round() as u64;
+    let pilot = BeaconPilot::new(me, incarnation, beacon_ticks);
+    Cockpit::new(me, scenario.time.dt_s, scenario.radio(), Box::new(pilot))
 }
 
 /// One drone with the paper's pilot, ready for the tick that begins at `start`.

@@ -4,7 +4,7 @@
 use crate::children::{Children, Role};
 use crate::drone_process::{Crew, scenario_path};
 use crate::world_process::DISMISSED;
-use crate::{Clock, RunEnd, RuntimeError, mission};
+use crate::{Clock, PilotKind, RunEnd, RuntimeError, mission};
 use skein_bus::{
     Control, ControlSpec, Domain, Order, OrderKind, PinMode, RecordSubscriber, Services, WaitMode, WorldState,
     allowed_cores, clean_dead_nodes, raise_file_limit,
@@ -26,6 +26,8 @@ pub struct Launch<'a> {
     pub pin: PinMode,
     /// How they wait for each other.
     pub wait: WaitMode,
+    /// What flies the drones.
+    pub pilot: PilotKind,
     /// Drones in a process, from 1. With more than one no fault of the scenario may end or stop a process.
     pub per_process: u32,
     /// The executable that knows the roles `world` and `drone`.
@@ -269,5 +271,6 @@ impl Supervisor<'_, '_, '_> {
         }
         self.children.kill_all();
         self.take_records();
+        self.end.calls = self.control.calls();
     }
 }

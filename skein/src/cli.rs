@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skein_bus::{PinMode, WaitMode};
-use skein_runtime::Clock;
+use skein_runtime::{Clock, PilotKind};
 use std::path::PathBuf;
 
 /// Skein: a swarm runtime in which every drone is a process of its own.
@@ -48,11 +48,11 @@ pub enum Command {
     Top(crate::top::TopArgs),
     /// Tap what a running swarm says: list, echo, hz
     Topic(crate::topic::TopicArgs),
-    /// Measure what the swarm does by itself: failover
+    /// Measure: the runtime against its floors, its parts, failover
     Bench {
         /// What is measured.
         #[command(subcommand)]
-        of: crate::bench::BenchCommand,
+        of: Option<crate::bench::BenchCommand>,
     },
     /// Say what of this machine limits a swarm
     Doctor(crate::doctor::DoctorArgs),
@@ -76,6 +76,9 @@ pub enum Command {
     /// A drone's process; started by `run`
     #[command(hide = true)]
     Drone(DroneArgs),
+    /// A peer of the bench's floors
+    #[command(hide = true)]
+    FloorPeer(crate::bench::FloorArgs),
 }
 
 /// What schemas there are.
@@ -249,6 +252,9 @@ pub struct DroneArgs {
     /// As for every child.
     #[command(flatten)]
     pub child: ChildArgs,
+    /// What flies it.
+    #[arg(long, value_enum, default_value_t)]
+    pub pilot: PilotChoice,
     /// Its number, or that of the first one in this process.
     #[arg(long)]
     pub id: u32,
@@ -261,6 +267,25 @@ pub struct DroneArgs {
     /// The first tick it answers.
     #[arg(long)]
     pub first_tick: u64,
+}
+
+/// What flies a drone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PilotChoice {
+    /// The paper's pilot.
+    #[default]
+    Swarm,
+    /// The trivial one.
+    Beacon,
+}
+
+impl From<PilotChoice> for PilotKind {
+    fn from(choice: PilotChoice) -> Self {
+        match choice {
+            PilotChoice::Swarm => Self::Swarm,
+            PilotChoice::Beacon => Self::Beacon,
+        }
+    }
 }
 
 /// `KEY.PATH=VALUE`, of `--set`.

@@ -58,7 +58,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::View(args) => view::view(&args),
         Command::Top(args) => top::top(&args),
         Command::Topic(args) => topic::topic(&args),
-        Command::Bench { of } => bench::bench(&of),
+        Command::Bench { of } => bench::bench(of.as_ref()),
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Clean => housekeeping::clean(),
         Command::Schema { of } => schema::schema(of),
@@ -66,6 +66,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Man => schema::man(),
         Command::World(args) => roles::world(&args),
         Command::Drone(args) => roles::drone(&args),
+        Command::FloorPeer(args) => bench::peer(&args),
     }
 }
 

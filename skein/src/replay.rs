@@ -9,7 +9,7 @@ use serde_json::json;
 use skein_protocol::record::Outcome;
 use skein_report::{Ending, Recorder, RunFolder, Summary};
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
-use skein_runtime::{Clock, RunEnd, RuntimeError, inline};
+use skein_runtime::{Clock, PilotKind, RunEnd, RuntimeError, inline};
 use skein_scenario::Scenario;
 use std::io::Write;
 use std::path::PathBuf;
@@ -77,6 +77,7 @@ fn fly(
         clock: Clock::Lockstep,
         pin: PinChoice::Auto.into(),
         wait: WaitChoice::Block.into(),
+        pilot: PilotKind::Swarm,
         per_process: 1,
         executable: std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?,
         on_ready: &mut |_: &[ProcessInfo]| Ok(()),

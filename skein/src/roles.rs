@@ -15,7 +15,8 @@ pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
 /// Runs one drone.
 pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
     let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
-    let run = drone_process::run(&child(&args.child), Crew { first: DroneId(id), count, incarnation, first_tick });
+    let crew = Crew { first: DroneId(id), count, incarnation, first_tick };
+    let run = drone_process::run(&child(&args.child), crew, args.pilot.into());
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
 }
 

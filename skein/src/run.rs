@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{Ending, Manifest, ProcessEntry, Recorder, Role, RunFacts, RunFolder, Summary, page, text};
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
-use skein_runtime::{RunEnd, RuntimeError, inline};
+use skein_runtime::{PilotKind, RunEnd, RuntimeError, inline};
 use skein_scenario::Scenario;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -112,6 +112,7 @@ fn fly(
                 clock: args.clock,
                 pin: args.pin.into(),
                 wait: args.wait.into(),
+                pilot: PilotKind::Swarm,
                 per_process: args.drones_per_process,
                 executable,
                 on_ready: &mut on_ready,

@@ -196,7 +196,7 @@ impl World {
     /// Ends the tick: commands, bodies, energy, invariants, stages, end condition, digest, record. A living drone
     /// that has not answered is held. The calls before may come in any order of drones: it makes no difference.
     pub fn advance(&mut self) {
-        self.sent.sort_by_key(|sent| (sent.source, sent.sequence));
+        self.sent.sort_unstable_by_key(|sent| (sent.source, sent.sequence));
         let (opening, end) = (self.now(), self.time_of(self.tick + 1));
         if let Some(queue) = &mut self.queue {
             queue.pass(opening, &mut self.sent);

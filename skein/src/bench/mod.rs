@@ -1,21 +1,41 @@
 //! `skein bench`: what Skein does by itself, measured over and over, in one table and one JSON object.
 
 mod failover;
+mod parts;
+mod runtime;
 
 use crate::exit::{Exit, Failure};
 use clap::Subcommand;
 pub use failover::FailoverArgs;
+use parts::{Part, PartArgs};
+pub use runtime::{FloorArgs, RuntimeArgs, peer};
 
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
+    /// A tick against function calls and a naive floor, by the size of the swarm [default]
+    Runtime(RuntimeArgs),
     /// Kill leaders over and over: how soon everybody follows another one
     Failover(FailoverArgs),
+    /// What the radio costs
+    Radio(PartArgs),
+    /// What the exact split costs
+    Grouping(PartArgs),
+    /// What the world's survey costs
+    Sense(PartArgs),
+    /// What recording costs
+    Record(PartArgs),
 }
 
 /// Runs one of them.
-pub fn bench(command: &BenchCommand) -> Result<Exit, Failure> {
+pub fn bench(command: Option<&BenchCommand>) -> Result<Exit, Failure> {
     match command {
-        BenchCommand::Failover(args) => failover::failover(args),
+        None => runtime::runtime(&RuntimeArgs::default()),
+        Some(BenchCommand::Runtime(args)) => runtime::runtime(args),
+        Some(BenchCommand::Failover(args)) => failover::failover(args),
+        Some(BenchCommand::Radio(args)) => parts::part(Part::Radio, args),
+        Some(BenchCommand::Grouping(args)) => parts::part(Part::Grouping, args),
+        Some(BenchCommand::Sense(args)) => parts::part(Part::Sense, args),
+        Some(BenchCommand::Record(args)) => parts::part(Part::Record, args),
     }
 }
