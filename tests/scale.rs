@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use support::Place;
 
 fn formation(place: &Place, drones: u32, timeout_s: f64) -> String {
-    let path = place.join(format!("formation-{drones}-{timeout_s}.toml"));
+    let path = place.join(&format!("formation-{drones}-{timeout_s}.toml"));
     let text = format!(
         "name = \"formation\"\n[formation]\nshape = \"grid\"\ndrones = {drones}\nspacing_m = 65\n\
          [drone]\nsafe_distance_m = 37\n[mission]\nstop_x_m = 100000\n[time]\ntimeout_s = {timeout_s}\n"
@@ -53,9 +53,23 @@ fn a_fault_of_one_process_needs_a_process_of_one_drone() {
     assert!(done.stderr.contains("--drones-per-process 2"), "{done:?}");
 }
 
+#[test]
+fn a_swarm_that_does_not_fit_is_told_how_many_do() {
+    let place = Place::new();
+    let scenario = formation(&place, 64, 6.0);
+    let skein = env!("CARGO_BIN_EXE_skein");
+    let out = place.join("none");
+    let line = format!("ulimit -n 200 && exec {skein} run {scenario} --out {}", out.display());
+    let done = Command::new("bash").args(["-c", &line]).output().unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(3), "{said}");
+    assert!(said.contains("64 drones do not fit, 27 do: open files"), "{said}");
+    assert!(!out.exists(), "nothing was begun");
+}
+
 /// System calls of a whole run by `strace`; `None` where there is none, or it may not trace.
 fn calls(place: &Place, scenario: &str, wait: &str) -> Option<BTreeMap<String, u64>> {
-    let table = place.join(format!("calls-{wait}"));
+    let table = place.join(&format!("calls-{wait}"));
     let traced = Command::new("strace")
         .args(["-f", "-c", "-U", "name,calls", "-o", table.to_str().unwrap(), env!("CARGO_BIN_EXE_skein")])
         .args(["run", scenario, "--no-record", "--quiet", "--wait", wait, "--force", "--out"])

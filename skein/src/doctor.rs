@@ -66,6 +66,21 @@ pub fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
     Ok(Exit::Reached)
 }
 
+/// Refuses a swarm that the machine has no room for, `per_process` drones a process, before anything is started.
+pub fn check_room(drones: u32, per_process: u32) -> Result<(), Failure> {
+    let pack = u64::from(per_process);
+    for (limit, pack) in [(files(), pack), (processes(), pack), (memory(), 1), (shared_memory()?, 1)] {
+        let fits = limit.drones.unwrap_or(u64::MAX).saturating_mul(pack);
+        if u64::from(drones) > fits {
+            let Limit { name, has, hint, .. } = limit;
+            let share = if pack > 1 { "" } else { ", or put several in a process (--drones-per-process)" };
+            let why = format!("{drones} drones do not fit, {fits} do: {name} ({has}); see {hint}{share}");
+            return Err(Failure::environment(why));
+        }
+    }
+    Ok(())
+}
+
 fn files() -> Limit {
     let limit = getrlimit(Resource::Nofile);
     let most = limit.maximum.unwrap_or(u64::MAX);

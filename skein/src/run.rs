@@ -1,6 +1,7 @@
 //! `skein run`: flies one mission.
 
 use crate::cli::{RunArgs, RuntimeChoice};
+use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
 use crate::facts::facts;
 use crate::input;
@@ -20,6 +21,9 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let started = Instant::now();
     let scenario = input::scenario(&args.scenario)?;
     check_packing(args, &scenario)?;
+    if args.runtime == RuntimeChoice::Processes {
+        check_room(scenario.formation.drones, args.drones_per_process)?;
+    }
     let runtime = match args.runtime {
         RuntimeChoice::Processes => "processes",
         RuntimeChoice::Inline => "inline",

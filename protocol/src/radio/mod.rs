@@ -164,15 +164,17 @@ impl Radio {
         })
     }
 
-    /// Which topics are heard no farther than a hard range by everybody whom no rule names, and how far.
+    /// Which topics are heard no farther than beacons, which are most of what is said, if those have a hard range: by
+    /// everybody whom no rule names.
     #[must_use]
     pub fn locality(&self) -> Locality {
-        Topic::ALL.into_iter().fold(Locality::default(), |locality, topic| {
+        let reach_m = |topic| {
             let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(topic);
-            let air = self.rules.iter().rev().find(general).map_or(&self.air, |rule| &rule.air);
-            let range_m = air.reach_m();
-            if range_m.is_finite() { locality.with(topic, range_m) } else { locality }
-        })
+            self.rules.iter().rev().find(general).map_or(&self.air, |rule| &rule.air).reach_m()
+        };
+        let cell_m = reach_m(Topic::Pose);
+        let local = |topic: &Topic| cell_m.is_finite() && reach_m(*topic) <= cell_m;
+        Topic::ALL.into_iter().filter(local).fold(Locality::default(), |locality, topic| locality.with(topic, cell_m))
     }
 
     /// From how far away a drone hears a topic at most, whoever sends, m; infinite without a hard range.
