@@ -385,4 +385,9 @@ pub trait RecordSink: Send {
     /// # Errors
     /// Whatever keeps the record from being kept, in words.
     fn take(&mut self, record: RecordView<'_>) -> Result<(), String>;
+
+    /// Whether it would take a record now, without waiting for something slow: a disk.
+    fn ready(&self) -> bool {
+        true
+    }
 }

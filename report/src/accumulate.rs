@@ -90,8 +90,8 @@ impl Accumulator {
         }
     }
 
-    /// Takes one record and its events. True if its rows are of a new tick: the last record may repeat them.
-    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<bool, String> {
+    /// Takes one record and its events. The last record may repeat the rows of the one before.
+    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), String> {
         let tick = record.head.tick;
         let fresh = !record.rows.is_empty() && self.counts.tick.is_none_or(|last| tick > last);
         if fresh && record.rows.len() != self.facts.drones as usize {
@@ -111,7 +111,7 @@ impl Accumulator {
             self.counts.tick = self.counts.tick.max(Some(tick));
             self.counts.t_s = self.counts.t_s.max(seconds(record.head.now));
         }
-        Ok(fresh)
+        Ok(())
     }
 
     fn event(&mut self, event: RunEvent, rows: &[DroneRow]) {

@@ -15,8 +15,17 @@ const SUMMARY: &str = "summary.json";
 const PLOTS: &str = "plots";
 const MANIFEST_SCHEMA: &str = "skein-manifest/1";
 /// Files that a run leaves in its folder, beside its plots.
-const OWN_FILES: [&str; 8] =
-    [MANIFEST, PROCESSES, SUMMARY, "events.jsonl", "trace.csv", crate::morph::FILE, "run.mcap", "report.html"];
+const OWN_FILES: [&str; 9] = [
+    MANIFEST,
+    PROCESSES,
+    SUMMARY,
+    "events.jsonl",
+    "trace.csv",
+    crate::morph::FILE,
+    "run.mcap",
+    "report.html",
+    crate::spool::FILE,
+];
 
 /// What a run was: enough to fly it again and to draw it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -18,6 +18,7 @@ pub mod page;
 pub mod plot;
 mod recorder;
 pub mod scene;
+mod spool;
 mod stages;
 mod steps;
 mod summary;

@@ -359,15 +359,19 @@ fn the_runs_folder_holds_trace_and_events() {
 
 #[test]
 fn files_that_cannot_be_written_do_not_cost_the_summary() {
-    let root = tempfile::tempdir().unwrap();
-    let folder = RunFolder::numbered(root.path(), "disc").unwrap();
-    std::os::unix::fs::symlink("/dev/full", folder.path().join("trace.csv")).unwrap();
-    let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
-    fly(&mut recorder, 0..=LAST);
-    let (summary, files) = recorder.finish(&ending());
-    assert_eq!(summary.ticks, 100);
-    let error = files.unwrap_err().to_string();
-    assert!(error.contains("trace.csv"), "{error}");
+    for name in ["trace.csv", "flight.spool"] {
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::numbered(root.path(), "disc").unwrap();
+        std::os::unix::fs::symlink("/dev/full", folder.path().join(name)).unwrap();
+        let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
+        fly(&mut recorder, 0..=LAST);
+        assert!(recorder.ready());
+        let (summary, files) = recorder.finish(&ending());
+        assert_eq!(summary.ticks, 100);
+        let error = files.unwrap_err().to_string();
+        assert!(error.contains(name), "{error}");
+        assert!(!folder.path().join("flight.spool").exists());
+    }
 }
 
 #[test]

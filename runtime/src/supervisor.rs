@@ -156,12 +156,12 @@ impl Supervisor<'_, '_, '_> {
         loop {
             self.reap();
             if let Some(how) = self.world_ended {
-                self.take_records();
+                self.take_records(true);
                 self.end.failure = Some(format!("the world ended in flight: {how}"));
                 return;
             }
             let finished = self.control.world_state() == WorldState::Finished;
-            self.take_records();
+            self.take_records(finished);
             if finished {
                 self.control.request_stop(DISMISSED);
                 return;
@@ -180,8 +180,10 @@ impl Supervisor<'_, '_, '_> {
         }
     }
 
-    fn take_records(&mut self) {
-        loop {
+    /// Takes what the world has recorded: with `all`, however long a slow disk takes. Otherwise that keeps nobody from
+    /// being looked after; in lockstep the world waits then.
+    fn take_records(&mut self, all: bool) {
+        while all || self.sink.ready() {
             let sample = match self.record.receive() {
                 Ok(Some(sample)) => sample,
                 Ok(None) => return,
@@ -270,7 +272,7 @@ impl Supervisor<'_, '_, '_> {
             self.children.wait_any(LOOK);
         }
         self.children.kill_all();
-        self.take_records();
+        self.take_records(true);
         self.end.calls = self.control.calls();
     }
 }

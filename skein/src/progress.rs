@@ -40,4 +40,8 @@ impl<S: RecordSink> RecordSink for Progress<S> {
         }
         self.inner.take(record)
     }
+
+    fn ready(&self) -> bool {
+        self.inner.ready()
+    }
 }

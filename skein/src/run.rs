@@ -41,11 +41,11 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
     let ending = Ending { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
+    let reporting = Instant::now();
     let (mut summary, recorded) = sink.finish().finish(&ending);
     if let (None, Some(signal)) = (&summary.reason, end.signal) {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
-    let reporting = Instant::now();
     // A report that cannot be written does not cost the summary.
     let reported = if args.no_record { Ok(Vec::new()) } else { page::write(&folder, &manifest, &summary) };
     summary.report_s = Some(reporting.elapsed().as_secs_f64());

@@ -138,15 +138,12 @@ impl Flight {
         }
     }
 
-    /// Waits until the trace has come to `t_s`: the writer's buffer makes it late by some ticks.
+    /// Waits until what is recorded has come to `t_s`: the writer's buffer makes it late by some ticks.
     pub fn wait_until(&mut self, t_s: f64) {
-        let file = self.out.join("trace.csv");
+        let (file, done) = (self.out.join("flight.spool"), self.out.join("summary.json"));
         self.wait_for(&file);
         eventually(&format!("`{}` flies to {t_s} s", self.args), || {
-            let text = fs::read_to_string(&file).unwrap();
-            // The last line may be half written.
-            let mut lines = text.lines().rev().skip(1);
-            lines.next().and_then(|line| line.split(',').next()?.parse::<f64>().ok()).is_some_and(|now| now >= t_s)
+            done.exists() || fs::read(&file).is_ok_and(|spool| recorded_s(&spool) >= t_s)
         });
     }
 
@@ -188,6 +185,18 @@ impl Drop for Flight {
     fn drop(&mut self) {
         let _ = (self.child.kill(), self.child.wait());
     }
+}
+
+/// The time of the last whole record in a spool, s. A record is its length, its tick, its time in ns and more; all in
+/// words of eight bytes.
+fn recorded_s(spool: &[u8]) -> f64 {
+    let word = |at: usize| Some(u64::from_ne_bytes(spool.get(at..at + 8)?.try_into().ok()?));
+    let (mut at, mut now_ns) = (0, 0);
+    while let (Some(len), Some(now)) = (word(at), word(at + 16)) {
+        at += 8 + len.next_multiple_of(8) as usize;
+        now_ns = if at <= spool.len() { now } else { now_ns };
+    }
+    now_ns as f64 / 1e9
 }
 
 fn drain(mut from: impl Read + Send + 'static) -> JoinHandle<String> {

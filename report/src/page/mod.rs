@@ -41,13 +41,18 @@ pub fn live(port: u16) -> String {
 /// # Errors
 /// [`ReportError`] if the folder lacks a part of the recording, or a plot cannot be drawn.
 pub fn report(folder: &RunFolder, manifest: &Manifest, summary: &Summary) -> Result<String, ReportError> {
-    let plots = plot::write(folder, &manifest.facts)?;
     let facts = &manifest.facts;
+    // The recording is packed on another core meanwhile.
+    let (plots, data) = std::thread::scope(|scope| {
+        let data = scope.spawn(|| data::packed(folder, facts));
+        (plot::write(folder, facts), data.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    let plots = plots?;
     let title = format!("{}: {} drones, {}, seed {}", facts.scenario, facts.drones, facts.strategy, facts.seed);
     let outcome = tables::outcome(summary);
     let verdict = format!("<span class=\"verdict {outcome}\">{}</span>", escaped(&text::verdict(summary, false)));
     let body = format!("{}{}", tables::all(summary), figures::all(&plots)?);
-    let data = format!("<script id=\"data\" type=\"text/plain\">{}</script>", data::packed(folder, facts)?);
+    let data = format!("<script id=\"data\" type=\"text/plain\">{}</script>", data?);
     Ok(fill(&[
         ("connect", "'none'"),
         ("title", &escaped(&title)),

@@ -5,6 +5,8 @@
 const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#785e3c", "#d55e00"];
 // Beyond so many drones, what is drawn a drone is kept to the least.
 const MANY = 150;
+// Drones nearer to each other than this on the screen go without numbers, pixels.
+const NAME_PX = 12;
 // How far back a way is shown, s.
 const TRAIL_S = 8;
 
@@ -288,7 +290,8 @@ class Scene {
       pen.arc(this.px(moment.x[selected]), this.py(moment.y[selected]), size * 2, 0, 7);
       pen.stroke();
     }
-    if (this.shows.names && (!many || this.view.scale > 3)) this.names(moment, size);
+    // Numbers of drones at the safe distance must not hide each other.
+    if (this.shows.names && this.facts.safe_distance_m * this.view.scale > NAME_PX) this.names(moment, size);
   }
 
   arrow(moment, i, size) {

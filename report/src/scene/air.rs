@@ -1,12 +1,14 @@
 //! Who hears a frame: the receivers' own rule, asked again.
 
 use crate::scene::facts::SceneFacts;
+use serde::Serialize;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE};
 use skein_protocol::radio::{DropReason, Verdict};
 use skein_protocol::record::DroneRow;
 use skein_protocol::{DroneId, Message, Vec2};
+use std::sync::LazyLock;
 
 /// The letter of a receiver that has nothing to do with a frame.
 const ABSENT: char = '-';
@@ -29,8 +31,9 @@ pub(super) fn fate(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows
 }
 
 /// A reason's name.
-pub(super) fn reason(reason: DropReason) -> String {
-    serde_json::to_value(reason).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
+pub(super) fn reason(reason: DropReason) -> &'static str {
+    static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| DropReason::ALL.iter().map(name).collect());
+    &NAMES[reason as usize]
 }
 
 fn letter(why: DropReason) -> char {
@@ -38,9 +41,15 @@ fn letter(why: DropReason) -> char {
 }
 
 /// The name of a frame's kind.
-pub(super) fn kind(frame: &AirFrame) -> String {
-    let topic = Topic::from_wire(frame.frame.kind).and_then(|topic| serde_json::to_value(topic).ok());
-    topic.as_ref().and_then(|name| name.as_str()).unwrap_or("unknown").to_owned()
+pub(super) fn kind(frame: &AirFrame) -> &'static str {
+    static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| Topic::ALL.iter().map(name).collect());
+    let place = Topic::ALL.iter().position(|topic| *topic as u16 == frame.frame.kind);
+    place.map_or("unknown", |place| &NAMES[place])
+}
+
+/// As it stands in every JSON.
+fn name(value: &impl Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// What a frame says, in a few words.
@@ -116,7 +125,7 @@ mod tests {
 
     #[test]
     fn frames_are_named_and_told() {
-        assert_eq!((kind(&frame(0)).as_str(), says(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
+        assert_eq!((kind(&frame(0)), says(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
         let mut strange = frame(0);
         strange.frame.kind = 99;
         assert_eq!(kind(&strange), "unknown");

@@ -9,6 +9,7 @@ use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::radio::DropReason;
 use skein_protocol::record::{DroneRow, ROW_LATE, ROW_LEADS, RecordView};
 use skein_protocol::{DroneId, SimTime};
+use std::collections::BTreeMap;
 
 /// Up to this many drones every frame is listed, with its fate at every receiver.
 pub const FATES_MAX: usize = 64;
@@ -59,6 +60,11 @@ impl Observer {
         })
     }
 
+    /// Takes the record of a tick whose frames are not listed and counted: of a swarm too fast to be looked at closely.
+    pub fn skip(&mut self, record: RecordView<'_>) {
+        self.slots.hear(record.frames, record.rows);
+    }
+
     fn count(&mut self, record: RecordView<'_>) {
         let radio = &mut self.radio;
         radio.heard.resize(record.rows.len(), 0);
@@ -66,7 +72,7 @@ impl Observer {
         for (drone, row) in record.rows.iter().enumerate() {
             radio.heard[drone] += row.heard;
             for (reason, &count) in DropReason::ALL.into_iter().zip(&row.dropped).filter(|(_, count)| **count > 0) {
-                *radio.dropped.entry(air::reason(reason)).or_default() += count;
+                add(&mut radio.dropped, air::reason(reason), count);
                 radio.dropped_by[drone] += count;
             }
         }
@@ -78,9 +84,9 @@ impl Observer {
                 let (source, sequence) = (frame.source.0, frame.sequence);
                 let t_s = seconds(SimTime(frame.tick as i64 * self.dt_ns));
                 let says = air::says(frame);
-                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: kind.clone(), says, fate });
+                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: kind.into(), says, fate });
             }
-            *self.radio.sent.entry(kind).or_default() += 1;
+            add(&mut self.radio.sent, kind, 1);
         }
         let surplus = self.radio.frames.len().saturating_sub(FRAMES_MAX);
         self.radio.frames.drain(..surplus);
@@ -115,6 +121,15 @@ impl Observer {
             state.late.push(u8::from(row.flags & ROW_LATE != 0));
         }
         state
+    }
+}
+
+fn add(counts: &mut BTreeMap<String, u32>, name: &str, count: u32) {
+    // A name is made once, not for every frame.
+    if let Some(known) = counts.get_mut(name) {
+        *known += count;
+    } else {
+        counts.insert(name.to_owned(), count);
     }
 }
 

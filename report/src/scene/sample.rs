@@ -3,6 +3,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The swarm at the end of a tick, and what was said since the sample before.
@@ -89,7 +90,7 @@ pub struct SentFrame {
     /// Running number of the source's frames.
     pub sequence: u32,
     /// A topic's name; `unknown` if it is none.
-    pub kind: String,
+    pub kind: Cow<'static, str>,
     /// What it says, shortly; empty for beacons.
     pub says: String,
     /// A letter for each receiver: `h` heard, `-` not for it (its sender, a dead drone), or why not: `l`oss, `b`urst,

@@ -1,10 +1,11 @@
 //! Watches the running swarm, and the next one when that has ended; tells every page.
 
 use crate::tap::{Tap, running};
+use skein_bus::BusError;
 use skein_protocol::DroneId;
 use skein_protocol::record::{Happening, RecordView, RunEvent};
 use skein_report::page;
-use skein_report::scene::Observer;
+use skein_report::scene::{Observer, Sample};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -14,10 +15,12 @@ use std::time::{Duration, Instant};
 
 /// Between two looks for a swarm, and for one's end.
 const SEARCH: Duration = Duration::from_millis(250);
-/// Between two looks at records.
-const LOOK: Duration = Duration::from_micros(500);
-/// Simulated time between two samples of a fast swarm, s; a slow one is sampled for every picture.
-const SAMPLE_S: f64 = 0.1;
+/// Between two looks at records: shorter, the faster they come, for an observer's buffer holds [`BUFFER`].
+const LOOK: [Duration; 2] = [Duration::from_micros(250), Duration::from_millis(8)];
+const BUFFER: u32 = 64;
+/// A swarm that flies farther than twice this from one picture to the next is too fast to be looked at closely: what is
+/// said is told of so much simulated time before each picture, s.
+const CLOSE_S: f64 = 0.1;
 /// Wall time between two pictures, and in a swarm of more than [`MANY`] drones.
 const PICTURE: [Duration; 2] = [Duration::from_millis(16), Duration::from_millis(50)];
 const MANY: u32 = 200;
@@ -137,12 +140,14 @@ impl Shared {
     fn watch(&self, name: Option<&str>) {
         let mut seen = Vec::new();
         while !self.stopped() {
-            let found = running(name).unwrap_or_default().into_iter().find(|run| !seen.contains(&run.path));
-            let Some(tap) = found.as_ref().and_then(|run| Tap::attach(&run.path).ok()) else {
+            let mut found = running(name).unwrap_or_default().into_iter().filter(|run| !seen.contains(&run.path));
+            // One that another version of Skein flies keeps nobody from being watched.
+            let tap = found.find_map(|run| Some((Tap::attach(&run.path).ok()?, run.path)));
+            let Some((tap, path)) = tap else {
                 std::thread::sleep(SEARCH);
                 continue;
             };
-            seen.extend(found.map(|run| run.path));
+            seen.push(path);
             self.follow(&tap);
         }
     }
@@ -156,17 +161,15 @@ impl Shared {
             board.keep(page::status_line(&page::live_status(&tap.facts)));
         }
         let mut watcher = Watcher::new(tap);
-        let mut looked = Instant::now();
+        let (mut looked, mut pause) = (Instant::now(), LOOK[0]);
         while !self.stopped() {
-            match tap.records.receive() {
-                Ok(Some(sample)) => {
-                    if let Ok(record) = RecordView::parse(sample.bytes()) {
-                        self.take(&mut watcher, record);
-                    }
-                }
-                Ok(None) => std::thread::sleep(LOOK),
+            match self.drain(tap, &mut watcher) {
+                Ok(taken) if taken > BUFFER / 4 => pause = (pause / 2).max(LOOK[0]),
+                Ok(taken) if taken < BUFFER / 16 => pause = (pause * 2).min(LOOK[1]),
+                Ok(_) => {}
                 Err(error) => return self.end(&format!("the swarm cannot be heard any more: {error}")),
             }
+            std::thread::sleep(pause);
             if watcher.ended.is_some() || looked.elapsed() > SEARCH {
                 looked = Instant::now();
                 if watcher.ended.is_some() || !tap.alive() {
@@ -174,6 +177,21 @@ impl Shared {
                 }
             }
         }
+    }
+
+    /// Takes the records there are, and tells how many.
+    fn drain(&self, tap: &Tap, watcher: &mut Watcher) -> Result<u32, BusError> {
+        let mut taken = 0;
+        while let Some(sample) = tap.records.receive()? {
+            taken += 1;
+            if let Ok(record) = RecordView::parse(sample.bytes()) {
+                self.take(watcher, record);
+            }
+            if taken == BUFFER {
+                break; // Others want to be looked at as well: the clock, the end.
+            }
+        }
+        Ok(taken)
     }
 
     fn end(&self, how: &str) {
@@ -200,10 +218,14 @@ impl Shared {
 struct Watcher {
     observer: Observer,
     selected: u32,
-    /// Ticks between two samples at most.
-    stride: u64,
+    /// Ticks that a fast swarm is looked at closely.
+    close: u64,
     picture: Duration,
-    last_tick: Option<u64>,
+    /// Whether every tick is looked at closely.
+    slow: bool,
+    /// The tick in which a picture became due.
+    due: Option<u64>,
+    last_tick: u64,
     last: Instant,
     ended: Option<String>,
 }
@@ -213,9 +235,11 @@ impl Watcher {
         Self {
             observer: Observer::new(tap.facts.clone()),
             selected: NOBODY,
-            stride: (SAMPLE_S / tap.facts.dt_s).round().max(1.0) as u64,
+            close: (CLOSE_S / tap.facts.dt_s).round().max(1.0) as u64,
             picture: PICTURE[usize::from(tap.facts.drones > MANY)],
-            last_tick: None,
+            slow: true,
+            due: None,
+            last_tick: 0,
             last: Instant::now(),
             ended: None,
         }
@@ -229,13 +253,23 @@ impl Watcher {
                 self.ended = Some(format!("ended at {:.2} s: {reason}", event.t_s));
             }
         }
-        let tick = record.head.tick;
-        let far = self.last_tick.is_none_or(|last| tick >= last + self.stride);
-        let wanted = far || self.last.elapsed() >= self.picture;
-        let sample = self.observer.take(record, wanted);
-        if sample.is_some() {
-            (self.last_tick, self.last) = (Some(tick), Instant::now());
-        }
+        let sample = self.look(record);
         (events.iter().filter_map(page::event_line).collect(), sample.as_ref().map(page::sample_line))
+    }
+
+    fn look(&mut self, record: RecordView<'_>) -> Option<Sample> {
+        let tick = record.head.tick;
+        if self.due.is_none() && (self.last.elapsed() >= self.picture || self.ended.is_some()) {
+            self.due = Some(tick);
+        }
+        if !self.slow && self.due.is_none() {
+            self.observer.skip(record);
+            return None;
+        }
+        let wanted = self.due.is_some_and(|due| self.slow || tick >= due + self.close || self.ended.is_some());
+        let sample = self.observer.take(record, wanted)?;
+        self.slow = tick - self.last_tick.min(tick) < 2 * self.close;
+        (self.due, self.last_tick, self.last) = (None, tick, Instant::now());
+        Some(sample)
     }
 }

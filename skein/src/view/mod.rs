@@ -37,9 +37,14 @@ pub struct ViewArgs {
     pub run: Option<String>,
 }
 
+/// How far a view stands back behind the swarm that it shows, as in `nice -n`.
+const NICE: i32 = 10;
+
 /// Serves the page until it is interrupted.
 pub fn view(args: &ViewArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
+    // The swarm comes first. Where it cannot be done, a view costs a little more.
+    let _ = rustix::process::nice(NICE);
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, args.port))
         .map_err(|error| Failure::environment(format!("127.0.0.1:{}: {error}; another --port?", args.port)))?;
     let port = listener.local_addr().map_err(Failure::environment)?.port();

@@ -1,0 +1,268 @@
+//! What is recorded in flight: the records as they came, appended to one file by a thread of its own. What people read
+//! is made of it after the flight, so that a swarm which needs all cores does not wait for text.
+//!
+//! A record is its length in bytes as a `u64` in this machine's byte order, then itself, padded to eight bytes.
+
+use crate::error::ReportError;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use rustix::fs::{FallocateFlags, fallocate};
+use skein_protocol::record::RecordView;
+use std::fs::File;
+use std::io::{self, BufReader, ErrorKind, Read, Write};
+use std::mem;
+use std::path::Path;
+use std::thread::JoinHandle;
+
+/// Name of the file in a run's folder, while it flies.
+pub(crate) const FILE: &str = "flight.spool";
+/// A block is handed to the thread once it holds so many bytes.
+const BLOCK: usize = 64 << 10;
+/// Blocks there are, so many a slow disk may be behind: with the records that exceed a block, all the memory used.
+const BLOCKS: usize = 128;
+/// What is read at once, and given back at once, bytes.
+const PIECE: usize = 1 << 20;
+const WORD: usize = size_of::<u64>();
+
+/// Appends records.
+pub(crate) struct Spool {
+    block: Vec<u8>,
+    block_len: usize,
+    full: Sender<Vec<u8>>,
+    empty: Receiver<Vec<u8>>,
+    writer: JoinHandle<io::Result<()>>,
+}
+
+impl Spool {
+    /// Starts the file.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        Self::start(File::create(path)?, BLOCK)
+    }
+
+    fn start(mut out: impl Write + Send + 'static, block_len: usize) -> io::Result<Self> {
+        let (full, filled) = bounded::<Vec<u8>>(BLOCKS);
+        let (emptied, empty) = bounded(BLOCKS);
+        // Room for all of them: no send of an empty block fails or waits.
+        (1..BLOCKS).for_each(|_| drop(emptied.send(Vec::new())));
+        let write = move || {
+            for mut block in filled {
+                out.write_all(&block)?;
+                block.clear();
+                // Whoever filled it may have finished meanwhile.
+                let _ = emptied.send(block);
+            }
+            out.flush()
+        };
+        let writer = std::thread::Builder::new().name("spool".to_owned()).spawn(write)?;
+        Ok(Self { block: Vec::new(), block_len, full, empty, writer })
+    }
+
+    /// Whether [`Spool::take`] would not wait for the disk.
+    pub fn ready(&self) -> bool {
+        !self.empty.is_empty() || self.writer.is_finished()
+    }
+
+    /// Takes a record; waits for a slow disk. False once the disk has refused: [`Spool::finish`] tells why.
+    pub fn take(&mut self, record: RecordView<'_>) -> bool {
+        let len = record.byte_len();
+        let at = self.block.len();
+        self.block.extend_from_slice(&(len as u64).to_ne_bytes());
+        self.block.resize(at + WORD + len.next_multiple_of(WORD), 0);
+        record.write_to(&mut self.block[at + WORD..]);
+        if self.block.len() < self.block_len {
+            return true;
+        }
+        let Ok(next) = self.empty.recv() else { return false };
+        self.full.send(mem::replace(&mut self.block, next)).is_ok()
+    }
+
+    /// Waits until all is written.
+    ///
+    /// # Errors
+    /// What the disk said; all records before are in the file.
+    pub fn finish(self) -> io::Result<()> {
+        if !self.block.is_empty() {
+            // If nobody takes it, the thread has ended with an error.
+            let _ = self.full.send(self.block);
+        }
+        drop(self.full);
+        self.writer.join().unwrap_or_else(|_| Err(io::Error::other("the writing thread panicked")))
+    }
+}
+
+/// Reads a file's records in order, and gives back their room on the disk, which what is made of them may need. Ends
+/// before a record that was cut short.
+///
+/// # Errors
+/// Of `take`, or [`ReportError::Io`].
+pub(crate) fn consume(
+    path: &Path,
+    mut take: impl FnMut(RecordView<'_>) -> Result<(), ReportError>,
+) -> Result<(), ReportError> {
+    let open = || {
+        let file = File::options().read(true).write(true).open(path)?;
+        let left = file.metadata()?.len();
+        io::Result::Ok((file, left))
+    };
+    let (file, left) = open().map_err(ReportError::io(path))?;
+    let mut records = Records { input: BufReader::with_capacity(PIECE, &file), left, words: Vec::new() };
+    let mut freed = 0;
+    while let Some(record) = records.next().map_err(ReportError::io(path))? {
+        take(record)?;
+        let read = left - records.left;
+        let past = read - read % PIECE as u64;
+        if past > freed {
+            // A file system that cannot do it keeps the file a little longer.
+            let _ = fallocate(&file, FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE, freed, past - freed);
+            freed = past;
+        }
+    }
+    Ok(())
+}
+
+struct Records<R> {
+    input: R,
+    /// Bytes that are not read yet.
+    left: u64,
+    /// The record read last; words, since its parts must be aligned.
+    words: Vec<u64>,
+}
+
+impl<R: Read> Records<R> {
+    fn next(&mut self) -> io::Result<Option<RecordView<'_>>> {
+        let mut len = [0; WORD];
+        let Some(left) = self.left.checked_sub(WORD as u64) else { return Ok(None) };
+        self.input.read_exact(&mut len)?;
+        let len = u64::from_ne_bytes(len);
+        let padded = len.checked_next_multiple_of(WORD as u64);
+        let Some(left) = padded.and_then(|padded| left.checked_sub(padded)) else { return Ok(None) };
+        self.left = left;
+        self.words.resize(len.div_ceil(WORD as u64) as usize, 0);
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.words);
+        self.input.read_exact(bytes)?;
+        let record = RecordView::parse(&bytes[..len as usize]);
+        record.map(Some).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::row;
+    use skein_protocol::record::{DroneRow, RecordHead};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    /// A disk that takes its time, and fails once it holds `room` bytes.
+    struct Disk {
+        file: File,
+        room: usize,
+        nap: Duration,
+        largest: Arc<AtomicUsize>,
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            std::thread::sleep(self.nap);
+            self.largest.fetch_max(bytes.len(), Ordering::Relaxed);
+            if self.room == 0 {
+                return Err(ErrorKind::StorageFull.into());
+            }
+            let part = self.file.write(&bytes[..bytes.len().min(self.room)])?;
+            self.room -= part;
+            Ok(part)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.file.flush()
+        }
+    }
+
+    fn disk(path: &Path, room: usize, nap_us: u64) -> Disk {
+        let file = File::create(path).unwrap();
+        Disk { file, room, nap: Duration::from_micros(nap_us), largest: Arc::default() }
+    }
+
+    /// A record of `tick`, with events of another length each time. True as long as it is taken.
+    fn give(spool: &mut Spool, tick: u64) -> bool {
+        let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick as f64, f64::from(drone))).collect();
+        let events = vec![b'x'; tick as usize % 11];
+        let head = RecordHead { tick, rows: 4, events_len: events.len() as u32, ..RecordHead::default() };
+        spool.take(RecordView { head: &head, rows: &rows, frames: &[], events: &events })
+    }
+
+    fn ticks(path: &Path) -> Vec<u64> {
+        let mut ticks = Vec::new();
+        let take = |record: RecordView<'_>| {
+            assert_eq!(record.rows[3].position_m, [record.head.tick as f64, 3.0]);
+            assert_eq!(record.events.len() as u64, record.head.tick % 11);
+            ticks.push(record.head.tick);
+            Ok(())
+        };
+        consume(path, take).unwrap();
+        ticks
+    }
+
+    #[test]
+    fn a_slow_disk_holds_up_and_loses_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE);
+        let slow = disk(&path, usize::MAX, 300);
+        let largest = Arc::clone(&slow.largest);
+        let mut spool = Spool::start(slow, 4096).unwrap();
+        let waited = (0..2000).filter(|&tick| {
+            let ready = spool.ready();
+            assert!(give(&mut spool, tick));
+            !ready
+        });
+        assert!(waited.count() > 0, "the disk was never behind");
+        spool.finish().unwrap();
+        assert_eq!(ticks(&path), (0..2000).collect::<Vec<_>>());
+        assert!(largest.load(Ordering::Relaxed) < 2 * 4096, "blocks grow behind a slow disk");
+    }
+
+    #[test]
+    fn a_full_disk_is_named_and_what_it_took_is_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE);
+        let mut spool = Spool::start(disk(&path, 100_000, 0), 4096).unwrap();
+        let refused = (0..100_000).find(|&tick| !give(&mut spool, tick));
+        assert!(refused.is_some() && spool.ready(), "it waits for a disk that is full");
+        assert_eq!(spool.finish().unwrap_err().kind(), ErrorKind::StorageFull);
+        let kept = ticks(&path);
+        assert!(kept.len() > 90 && kept.iter().zip(0..).all(|(&tick, place)| tick == place), "{kept:?}");
+    }
+
+    #[test]
+    fn what_was_read_is_off_the_disk() {
+        use std::os::unix::fs::MetadataExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE);
+        let mut spool = Spool::create(&path).unwrap();
+        (0..4000).for_each(|tick| assert!(give(&mut spool, tick)));
+        spool.finish().unwrap();
+        let blocks = || std::fs::metadata(&path).unwrap().blocks() * 512;
+        let (whole, mut left) = (blocks(), 0);
+        let take = |_: RecordView<'_>| {
+            left = blocks();
+            Ok(())
+        };
+        consume(&path, take).unwrap();
+        assert!(whole > 2 << 20 && left < whole / 2, "{whole} bytes, {left} while the last record is read");
+    }
+
+    #[test]
+    fn what_is_no_record_is_refused_and_what_is_cut_short_ends_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE);
+        let read = |words: &[u64]| {
+            std::fs::write(&path, bytemuck::cast_slice(words)).unwrap();
+            consume(&path, |_| panic!("{words:?} is no record"))
+        };
+        let error = read(&[16, 7, 7]).unwrap_err().to_string();
+        assert!(error.contains(FILE) && error.contains("16 bytes"), "{error}");
+        for cut in [&[][..], &[24, 7, 7], &[u64::MAX, 7]] {
+            read(cut).unwrap();
+        }
+    }
+}
