@@ -107,3 +107,27 @@ fn a_steady_tick_makes_no_system_call_but_the_barrier_s() {
     let futexes = (counts[1]["futex"] - counts[0]["futex"]) as f64 / ticks / 4.0;
     assert!(futexes > 0.2 && futexes < 4.0, "{futexes} futex calls an agent-step");
 }
+
+#[test]
+fn the_bench_tells_each_case_and_its_ratio_to_the_floor() {
+    let place = Place::new();
+    let args = ["bench", "runtime", "--drones", "2", "--rounds", "1", "--quick", "--compare", "uds", "--json"];
+    let done = place.run(&args);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let bench: Value = serde_json::from_str(&done.stdout).unwrap();
+    let rows = bench["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 8);
+    assert!(rows.iter().all(|row| row["ticks_per_s"].as_f64().unwrap() > 0.0), "{rows:?}");
+    let block = rows.iter().find(|row| row["case"] == "block").unwrap();
+    for key in ["cpu_us_per_step", "switches_per_step", "calls_per_step", "pss_mib", "startup_s", "step_us_p99"] {
+        assert!(block[key].as_f64().unwrap() > 0.0, "{key}: {block}");
+    }
+    let ratios = bench["ratios"].as_array().unwrap();
+    let floor = ratios.iter().filter(|ratio| ratio["to"] == "floor").count();
+    assert_eq!((ratios.len(), floor), (6, 3), "{ratios:?}");
+    for part in ["radio", "grouping", "sense"] {
+        let done = place.run(&["bench", part, "--drones", "8", "--rounds", "1", "--json"]);
+        let figures: Value = serde_json::from_str(&done.stdout).unwrap();
+        assert!(figures.as_array().unwrap().iter().all(|figure| figure["value"].as_f64().unwrap() > 0.0), "{figures}");
+    }
+}

@@ -179,7 +179,7 @@ fn record(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Fai
     let folder = std::env::temp_dir().join(format!("skein-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(Failure::environment)?;
     let file = folder.join("record.toml");
-    let ticks = (200_000 / drones.max(8)).max(100);
+    let ticks = (80_000 / drones.max(8)).max(100);
     let mut flown = scenario(drones, "")?;
     flown.time.timeout_s = f64::from(ticks) * flown.time.dt_s;
     let text = flown.to_toml().map_err(Failure::environment)?;
