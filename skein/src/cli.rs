@@ -48,6 +48,12 @@ pub enum Command {
     Top(crate::top::TopArgs),
     /// Tap what a running swarm says: list, echo, hz
     Topic(crate::topic::TopicArgs),
+    /// Measure what the swarm does by itself: failover
+    Bench {
+        /// What is measured.
+        #[command(subcommand)]
+        of: crate::bench::BenchCommand,
+    },
     /// Say what of this machine limits a swarm
     Doctor(crate::doctor::DoctorArgs),
     /// Remove what dead runs left behind

@@ -1,5 +1,6 @@
 //! The `skein` binary: it parses, calls and prints.
 
+mod bench;
 mod check;
 mod cli;
 mod doctor;
@@ -57,6 +58,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::View(args) => view::view(&args),
         Command::Top(args) => top::top(&args),
         Command::Topic(args) => topic::topic(&args),
+        Command::Bench { of } => bench::bench(&of),
         Command::Doctor(args) => doctor::doctor(&args),
         Command::Clean => housekeeping::clean(),
         Command::Schema { of } => schema::schema(of),
