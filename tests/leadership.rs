@@ -17,7 +17,7 @@ struct Story {
     failsafe: &'static str,
 }
 
-const STORIES: [Story; 8] = [
+const STORIES: [Story; 9] = [
     Story {
         name: "kill-leader",
         scenario: "s2-right",
@@ -57,6 +57,13 @@ const STORIES: [Story; 8] = [
         name: "restart",
         scenario: "s2-right",
         faults: "{kind='restart', at_s=2, target='leader', for_s=1}",
+        elections: 2,
+        failsafe: "hover",
+    },
+    Story {
+        name: "blind-leader",
+        scenario: "s2-right",
+        faults: "{kind='blind', at_s=2, target='leader', for_s=6}",
         elections: 2,
         failsafe: "hover",
     },

@@ -50,7 +50,7 @@ impl Peers {
             Entry::Occupied(mut place) if pose.stamp > place.get().pose.stamp => {
                 let longest_s = place.get().rhythm.patience_s(self.timeout_s);
                 place.get_mut().pose = pose;
-                place.get_mut().rhythm.hear(now, longest_s);
+                place.get_mut().rhythm.hear(now, 0.0, longest_s);
                 self.delay_s += NOVELTY * (delay_s - self.delay_s);
             }
             Entry::Occupied(_) => {}
