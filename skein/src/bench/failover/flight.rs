@@ -22,6 +22,9 @@ pub const TIMEOUT_S: f64 = 0.06;
 /// Length of a tick, s: two to a heartbeat, so that what is measured is not the tick.
 pub const DT_S: f64 = 0.01;
 
+/// Distance of slots, m: so wide that nobody has to evade a drone which stops dead.
+const SPACING_M: f64 = 60.0;
+
 /// Before the first kill, s.
 const SETTLE_S: f64 = 5.0;
 /// Between two kills, s: so much, and more on an air that loses or delays.
@@ -64,7 +67,7 @@ impl Air {
         let timeout_s = SETTLE_S + f64::from(self.kills) * interval_s + 1.0;
         format!(
             "name = \"failover\"\nseed = {}\n[time]\ndt_s = {DT_S}\ntimeout_s = {timeout_s:.3}\n\
-             [formation]\nshape = \"v\"\ndrones = {DRONES}\n[mission]\nend = \"hold\"\nstop_x_m = 1e6\n\
+             [formation]\nshape = \"v\"\ndrones = {DRONES}\nspacing_m = {SPACING_M}\n[mission]\nend = \"hold\"\nstop_x_m = 1e6\n\
              [protocol]\nheartbeat_period_s = {HEARTBEAT_S}\nleader_timeout_s = {TIMEOUT_S}\n\
              election_wait_s = {HEARTBEAT_S}\n[radio]\nloss = {:?}\ndelay_s = {:?}\n{faults}",
             self.seed, self.loss, self.delay_s

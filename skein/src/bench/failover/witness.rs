@@ -19,6 +19,8 @@ pub struct Found {
     pub followed_s: Vec<f64>,
     /// Terms in which somebody began to lead although the swarm had a living leader.
     pub false_elections: usize,
+    /// Longest time with two leaders at once, who all hear each other here, s.
+    pub split_max_s: f64,
     /// Flown since the swarm first had a leader, s.
     pub seconds: f64,
     /// The same for each living drone, added up, s.
@@ -46,6 +48,8 @@ pub struct Witness {
     by_wall: bool,
     orphaned: Option<Orphaned>,
     begun: bool,
+    /// For how long there have been two leaders, s.
+    split_s: f64,
     leaders: Vec<bool>,
     terms: BTreeSet<Ballot>,
     found: Found,
@@ -60,6 +64,7 @@ impl Witness {
             by_wall,
             orphaned: None,
             begun: false,
+            split_s: 0.0,
             leaders: Vec::new(),
             terms: BTreeSet::new(),
             found: Found::default(),
@@ -83,6 +88,9 @@ impl Witness {
         if self.begun && self.orphaned.is_none() {
             self.found.false_elections += new;
         }
+        let split = self.begun && rows.iter().filter(|row| leads(row)).count() > 1;
+        self.split_s = if split { self.split_s + self.dt_s } else { 0.0 };
+        self.found.split_max_s = self.found.split_max_s.max(self.split_s);
         if follow(rows) {
             self.begun = true;
             if let Some(orphaned) = self.orphaned.take() {
@@ -177,6 +185,7 @@ mod tests {
         }
         let found = witness.finish().1;
         assert_eq!((found.deaths, found.false_elections), (1, 1));
+        assert!((found.split_max_s - 0.01).abs() < 1e-9, "{found:?}");
         assert!((found.followed_s[0] - 0.03).abs() < 1e-9, "{found:?}");
     }
 }
