@@ -152,9 +152,13 @@ fn whoever_dies_is_followed_by_one_with_all_sensors() {
     (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().feel(true));
     swarm.run(1.0);
     swarm.kill(0);
+    let heir = |s: &Swarm| Some(s.term(7)?.claimant).filter(|&id| id != DroneId(3)).map(|id| id.to_string());
+    // It waits for nobody, although two are closer.
+    swarm.until(1.1, heir).unwrap();
     swarm.run(3.0);
-    assert_eq!(swarm.term(7).unwrap().claimant, DroneId(3));
-    assert_eq!(swarm.disunion(0), None);
+    assert_eq!((heir(&swarm), swarm.disunion(0)), (None, None));
+    let leaders: Vec<_> = swarm.watch.unwrap().leaders.into_values().collect();
+    assert_eq!(leaders, [DroneId(0), DroneId(3)], "nobody else claimed");
 }
 
 /// What is wrong where not everybody hears everybody: each is to follow a leader that it hears itself, or to lead.
@@ -180,6 +184,7 @@ fn along_a_chain_everybody_follows_a_leader_it_hears_and_nobody_is_deposed() {
         swarm.reach = reach;
         // The first is in the middle: so that ballots and places do not agree.
         swarm.own.rotate_right(drones / 2);
+        assert!(unled(&swarm).is_some());
         swarm.run(30.0);
         assert_eq!(unled(&swarm), None, "{name}");
         let settled = swarm.watch.as_ref().unwrap().leaders.len();
