@@ -53,6 +53,7 @@ fn leaders_die_in_lockstep_and_the_figures_are_the_same_each_time() {
             "{row}"
         );
         assert!(number(row, "p99_s") <= p99_s, "{row}");
+        assert_eq!((&row["on_time"], &row["on_time_p99_s"]), (&row["kills"], &row["p99_s"]), "{row}");
         assert_eq!(row["digest"].as_str().unwrap().len(), 16);
     }
     let seeded = rows(&bench(&place, &[&args[..], &["--seed", "2"]].concat()));

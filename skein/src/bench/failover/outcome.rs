@@ -24,6 +24,9 @@ pub struct Row {
     p90_s: Option<f64>,
     p99_s: Option<f64>,
     max_s: Option<f64>,
+    /// Of those replaced, those during which the machine kept time, and for half a second before; and their last quantile.
+    on_time: usize,
+    on_time_p99_s: Option<f64>,
     /// Terms in which somebody began to lead beside a living leader that all followed.
     false_elections: usize,
     false_elections_per_h: f64,
@@ -47,9 +50,7 @@ pub struct Row {
 impl Row {
     /// From what was seen of a flight.
     pub fn new(air: &Air, found: &Found, summary: &Summary) -> Self {
-        // To the microsecond: sums of ticks are not exact.
-        let mut times: Vec<f64> = found.followed_s.iter().map(|s| (s * 1e6).round() / 1e6).collect();
-        times.sort_by(f64::total_cmp);
+        let (times, on_time) = (ascending(&found.followed_s), ascending(&found.on_time_s));
         let rate = |count: f64, seconds: f64| if seconds > 0.0 { count / seconds } else { 0.0 };
         Self {
             clock: match air.clock {
@@ -64,6 +65,8 @@ impl Row {
             p90_s: quantile(&times, 0.9),
             p99_s: quantile(&times, 0.99),
             max_s: times.last().copied(),
+            on_time: on_time.len(),
+            on_time_p99_s: quantile(&on_time, 0.99),
             false_elections: found.false_elections,
             false_elections_per_h: rate(3600.0 * found.false_elections as f64, found.seconds),
             frames_per_s: rate(found.frames as f64, found.drone_seconds),
@@ -82,7 +85,7 @@ impl Row {
         self.violations > 0
     }
 
-    fn cells(&self) -> [String; 13] {
+    fn cells(&self) -> [String; 15] {
         let time = |seconds: Option<f64>| seconds.map_or("-".to_owned(), |s| format!("{s:.3}"));
         [
             self.clock.to_owned(),
@@ -93,6 +96,8 @@ impl Row {
             time(self.p90_s),
             time(self.p99_s),
             time(self.max_s),
+            self.on_time.to_string(),
+            time(self.on_time_p99_s),
             format!("{:.1}", self.false_elections_per_h),
             format!("{:.1}", self.frames_per_s),
             format!("{:.0}", self.bytes_per_s),
@@ -102,10 +107,17 @@ impl Row {
     }
 }
 
-const HEAD: [&str; 13] = [
-    "clock", "loss", "delay_s", "replaced", "p50_s", "p90_s", "p99_s", "max_s", "false/h", "frames/s", "bytes/s",
-    "split_s", "late",
+const HEAD: [&str; 15] = [
+    "clock", "loss", "delay_s", "replaced", "p50_s", "p90_s", "p99_s", "max_s", "on time", "p99_s", "false/h",
+    "frames/s", "bytes/s", "split_s", "late",
 ];
+
+/// To the microsecond: sums of ticks are not exact.
+fn ascending(times: &[f64]) -> Vec<f64> {
+    let mut times: Vec<f64> = times.iter().map(|s| (s * 1e6).round() / 1e6).collect();
+    times.sort_by(f64::total_cmp);
+    times
+}
 
 /// The value that so large a share of ascending values does not exceed (nearest rank).
 fn quantile(ascending: &[f64], share: f64) -> Option<f64> {
@@ -115,10 +127,10 @@ fn quantile(ascending: &[f64], share: f64) -> Option<f64> {
 
 /// The table for a person.
 pub fn table(rows: &[Row]) -> String {
-    let lines: Vec<[String; 13]> =
+    let lines: Vec<[String; 15]> =
         std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(Row::cells)).collect();
     let width = |i: usize| lines.iter().map(|line| line[i].len()).max().unwrap_or(0);
-    let padded = |line: &[String; 13]| {
+    let padded = |line: &[String; 15]| {
         let fields = line.iter().enumerate().map(|(i, field)| format!("{field:<width$}", width = width(i)));
         fields.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };

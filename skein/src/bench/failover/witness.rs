@@ -1,6 +1,6 @@
 //! Looks at the record of a flight: when a leader died, and when everybody followed another one.
 
-use skein_protocol::record::{DroneRow, ROW_FROZEN, ROW_LEADS, RecordSink, RecordView};
+use skein_protocol::record::{DroneRow, ROW_FROZEN, ROW_LATE, ROW_LEADS, RecordSink, RecordView};
 use skein_protocol::{Ballot, SimTime};
 use skein_report::Recorder;
 use std::collections::BTreeSet;
@@ -8,6 +8,9 @@ use std::time::Instant;
 
 /// Bytes that a frame has besides its payload: kind, version, length.
 const FRAME_HEAD: u64 = 8;
+
+/// So long the machine must have kept time before a death, s.
+const CALM_S: f64 = 0.5;
 
 /// What was seen.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +20,8 @@ pub struct Found {
     /// For each that was replaced before the next one died: from its death to the end of the tick in which every living
     /// drone obeyed one living leader's term, s. By the wall clock measured on it.
     pub followed_s: Vec<f64>,
+    /// Those of them during which the machine kept time, and for half a second before: nobody answered late.
+    pub on_time_s: Vec<f64>,
     /// Terms in which somebody began to lead although the swarm had a living leader.
     pub false_elections: usize,
     /// Longest time with two leaders at once, who all hear each other here, s.
@@ -48,6 +53,8 @@ pub struct Witness {
     by_wall: bool,
     orphaned: Option<Orphaned>,
     begun: bool,
+    /// When somebody last answered late.
+    late: Option<SimTime>,
     /// For how long there have been two leaders, s.
     split_s: f64,
     leaders: Vec<bool>,
@@ -64,6 +71,7 @@ impl Witness {
             by_wall,
             orphaned: None,
             begun: false,
+            late: None,
             split_s: 0.0,
             leaders: Vec::new(),
             terms: BTreeSet::new(),
@@ -84,6 +92,9 @@ impl Witness {
             self.found.deaths += 1;
             self.orphaned = Some(Orphaned { at: now, seen: Instant::now() });
         }
+        if rows.iter().any(|row| row.flags & ROW_LATE != 0) {
+            self.late = Some(now);
+        }
         let new = rows.iter().filter(|row| leads(row)).filter(|row| self.terms.insert(row.term)).count();
         if self.begun && self.orphaned.is_none() {
             self.found.false_elections += new;
@@ -100,6 +111,9 @@ impl Witness {
                     false => now.since(orphaned.at),
                 };
                 self.found.followed_s.push(since_s + self.dt_s);
+                if self.late.is_none_or(|late| orphaned.at.since(late) > CALM_S) {
+                    self.found.on_time_s.push(since_s + self.dt_s);
+                }
             }
         }
     }
@@ -185,6 +199,7 @@ mod tests {
         }
         let found = witness.finish().1;
         assert_eq!((found.deaths, found.false_elections), (1, 1));
+        assert_eq!(found.on_time_s, found.followed_s);
         assert!((found.split_max_s - 0.01).abs() < 1e-9, "{found:?}");
         assert!((found.followed_s[0] - 0.03).abs() < 1e-9, "{found:?}");
     }
