@@ -17,7 +17,7 @@ struct Story {
     failsafe: &'static str,
 }
 
-const STORIES: [Story; 8] = [
+const STORIES: [Story; 9] = [
     Story {
         name: "kill-leader",
         scenario: "s2-right",
@@ -57,6 +57,13 @@ const STORIES: [Story; 8] = [
         name: "restart",
         scenario: "s2-right",
         faults: "{kind='restart', at_s=2, target='leader', for_s=1}",
+        elections: 2,
+        failsafe: "hover",
+    },
+    Story {
+        name: "blind-leader",
+        scenario: "s2-right",
+        faults: "{kind='blind', at_s=2, target='leader', for_s=6}",
         elections: 2,
         failsafe: "hover",
     },
@@ -102,12 +109,26 @@ fn assert_led(story: &Story, summary: &Value) {
     assert_eq!(fires, story.faults.matches("kind=").count(), "{}: {}", story.name, summary["faults"]);
 }
 
+/// A leader that does not see any more is followed by another one at once, and nobody has died.
+fn assert_handed_over(summary: &Value) {
+    let leaders = summary["leaders"].as_array().unwrap();
+    let (blind, heir) = (&leaders[0], &leaders[1]);
+    assert!(heir["group"] == "N" && heir["leader"] != blind["leader"], "{leaders:?}");
+    assert!((2.0..2.3).contains(&heir["t_s"].as_f64().unwrap()), "{leaders:?}");
+    assert_eq!(summary["failover_s"].as_array().unwrap().len(), 0);
+    let while_blind = |leader: &&Value| leader["leader"] == blind["leader"] && leader["t_s"].as_f64() < Some(8.0);
+    assert_eq!(leaders[1..].iter().filter(while_blind).count(), 0, "{leaders:?}");
+}
+
 #[test]
 fn every_story_ends_in_formation_with_one_digest_and_by_the_wall_clock_too() {
     let place = Place::new();
     for story in &STORIES {
         let inline = fly(&place, story, "inline", "lockstep");
         assert_led(story, &inline);
+        if story.name == "blind-leader" {
+            assert_handed_over(&inline);
+        }
         let processes = fly(&place, story, "processes", "lockstep");
         assert_eq!(inline["digest"], processes["digest"], "{}", story.name);
         assert_eq!(processes["split_brain_s"], inline["split_brain_s"], "{}", story.name);

@@ -242,6 +242,7 @@ impl Pilot for SwarmPilot {
         for Heard { source, message } in heard {
             self.leading.hear(senses.now, *source, message, say);
         }
+        self.leading.feel(senses.broken != 0);
         self.sense(senses);
         self.find_silent(senses);
         self.lead(senses, &own, say);

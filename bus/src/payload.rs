@@ -6,7 +6,8 @@ use iceoryx2::prelude::ZeroCopySend;
 use skein_protocol::frame::Frame;
 use std::fmt;
 
-// The names below carry the version of the protocol's payloads: raise both together.
+// The names below carry the version of the protocol's payloads: raise both together. Senses and records have changed
+// once more than what drones say.
 const _: () = assert!(skein_protocol::payload::VERSION == 2);
 
 /// Eight bytes of a byte stream; which stream is told by the type.
@@ -28,14 +29,14 @@ pub struct RecordWord(u64);
 // SAFETY: an integer, self-contained and of one layout.
 unsafe impl ZeroCopySend for DownWord {
     unsafe fn type_name() -> &'static str {
-        "skein.downlink.v2"
+        "skein.downlink.v3"
     }
 }
 
 // SAFETY: an integer, self-contained and of one layout.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
-        "skein.record.v2"
+        "skein.record.v3"
     }
 }
 

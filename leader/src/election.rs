@@ -15,6 +15,12 @@ use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
 /// refused, so that nobody drives rounds to where they cannot be raised any more.
 const CLAIMS_PER_S: f64 = 1000.0;
 
+/// Signs of a leader that come sooner after another one than this part of its period belong to the same beat.
+const BEAT: f64 = 0.75;
+
+/// A drone that was started again listens for so many time-outs before it claims.
+const NEWCOMER_TIMEOUTS: f64 = 4.0;
+
 /// Periods and time-outs.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectionParams {
@@ -94,7 +100,7 @@ impl Election {
             highest_round: 0,
             leads: false,
             heard: now,
-            rhythm: Rhythm::new(now),
+            rhythm: Rhythm::expecting(now, params.heartbeat_period_s),
             next_heartbeat: now,
             probed: None,
         }
@@ -136,17 +142,32 @@ impl Election {
         self.leads || (self.obeyed.is_some() && now.since(self.heard) <= self.patience_s())
     }
 
+    /// Whether it has no leader, or has asked who heard of the one it misses.
+    #[must_use]
+    pub fn seeks(&self, now: SimTime) -> bool {
+        self.probed.is_some() || !self.has_leader(now)
+    }
+
     /// When the machine next wants a [`Input::Tick`], if nothing is heard until then. Answers to a probe need the air's
-    /// delay twice, a claim needs it once.
+    /// delay twice, a claim needs it once. It is asked so early that the answer is there when patience ends, but not
+    /// before half of it.
     #[must_use]
     pub fn next_deadline(&self, closer: usize, delay_s: f64) -> SimTime {
-        let closer = closer as f64;
+        let (closer, answer_s) = (closer as f64, self.wait_s.max(2.0 * delay_s));
         match self.probed {
             _ if self.leads => self.next_heartbeat,
-            Some(probed) => probed.after(self.wait_s.max(2.0 * delay_s) + self.wait_s.max(delay_s) * closer),
-            None if self.obeyed.is_some() => self.heard.after(self.patience_s()),
-            None => self.heard.after(self.wait_s * (closer + 1.0)),
+            Some(probed) => probed.after(answer_s + self.wait_s.max(delay_s) * closer),
+            None if self.obeyed.is_some() => {
+                self.heard.after((self.patience_s() - answer_s).max(0.5 * self.patience_s()))
+            }
+            None => self.heard.after(self.newcomer_s() + self.wait_s * (closer + 1.0)),
         }
+    }
+
+    /// How long a drone that was started again listens, before it takes it that nobody leads, s: in its first life nobody
+    /// can lead yet, later somebody most likely does.
+    fn newcomer_s(&self) -> f64 {
+        if self.incarnation > 1 { NEWCOMER_TIMEOUTS * self.leader_timeout_s } else { 0.0 }
     }
 
     /// Takes an input; returns what is to be said, if anything. `epoch` is the number of the last plan this drone made
@@ -209,7 +230,7 @@ impl Election {
             self.leads = false;
         }
         if ballot == self.obeyed {
-            self.rhythm.hear(now, self.patience_s());
+            self.rhythm.hear(now, BEAT * self.heartbeat_period_s, self.patience_s());
         }
         if ballot == self.obeyed || parted {
             self.heard = now;

@@ -12,7 +12,7 @@ use crate::obstacles::Obstacles;
 use crate::parts::Due;
 use crate::planner::{Member, Planner, PlannerParams, Situation};
 use crate::talk::Talk;
-use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_LEADS, Pose};
+use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_IMPAIRED, POSE_LEADS, Pose};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, SimTime, Vec2};
 
@@ -73,6 +73,7 @@ pub struct Leading {
     pub(crate) members: Vec<Member>,
     pub(crate) others: Vec<Member>,
     pub(crate) due: Due,
+    pub(crate) impaired: bool,
 }
 
 impl Leading {
@@ -94,6 +95,7 @@ impl Leading {
             members: Vec::new(),
             others: Vec::new(),
             due: Due::default(),
+            impaired: false,
         }
     }
 
@@ -200,6 +202,16 @@ impl Leading {
         new
     }
 
+    /// Whether a sensor of its own is broken: then it leads only while nobody else can.
+    pub fn feel(&mut self, impaired: bool) {
+        self.impaired = impaired;
+    }
+
+    /// Whether a peer's last beacon says that it has all its sensors.
+    pub(crate) fn is_sound(&self, peer: DroneId) -> bool {
+        self.peers.last(peer).is_some_and(|pose| pose.flags & POSE_IMPAIRED == 0)
+    }
+
     fn settle(&mut self, now: SimTime) {
         self.ledger.settle(&self.obstacles);
         self.join(now);
@@ -227,17 +239,17 @@ impl Leading {
         self.election.next_deadline(self.closer(now, own), self.peers.delay_s())
     }
 
-    /// Living drones of the scope that are closer to the destination, the suspect not counted; nobody has to be counted
-    /// while there is a leader.
+    /// Living drones of the scope that are closer to the destination, or sound while this one is not, the suspect not
+    /// counted; nobody has to be counted while there is a leader.
     fn closer(&self, now: SimTime, own: &Own) -> usize {
-        if self.election.has_leader(now) {
+        if !self.election.seeks(now) {
             return 0;
         }
-        let mine = self.key(own.position, self.me);
+        let mine = (self.impaired, self.key(own.position, self.me));
         let (scope, suspect) = (self.election.scope(), self.election.obeyed());
         let rivals =
             self.living(now).filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
-        rivals.filter(|m| self.key(m.position, m.id) < mine).count()
+        rivals.filter(|m| (!self.is_sound(m.id), self.key(m.position, m.id)) < mine).count()
     }
 
     /// Order of claims: by distance to the destination, ties by id.

@@ -60,7 +60,7 @@ impl Peers {
             Ok(place) if pose.stamp > self.last[place].pose.stamp => {
                 let peer = &mut self.last[place];
                 peer.pose = pose;
-                peer.rhythm.hear(now, peer.patience_s);
+                peer.rhythm.hear(now, 0.0, peer.patience_s);
                 peer.patience_s = peer.rhythm.patience_s(self.timeout_s);
                 self.delay_s += NOVELTY * (delay_s - self.delay_s);
             }

@@ -17,8 +17,8 @@ pub(crate) struct Due {
     part: Option<SimTime>,
     /// Since when the parts could be one again.
     whole: Option<SimTime>,
-    /// Since when this leader has been behind.
-    behind: Option<SimTime>,
+    /// From when on this leader asks another one to take over, and whether because a sensor is broken.
+    heir: Option<(bool, SimTime)>,
     /// Somebody obeys what this leader never said: a new term puts an end to that.
     pub belied: bool,
 }
@@ -33,17 +33,33 @@ impl Leading {
         claim.or_else(|| self.heir(now, own).map(Input::Yield))
     }
 
-    /// Who is to take over from this leader, which fell behind in formation: it has been the last of several for a
-    /// while, and so far behind its own slot and the first one that it lost touch. Asked again until somebody does.
+    /// Who is to take over from this leader: at once if a sensor of its own is broken and a member has all of them; or
+    /// if it fell behind in formation: it has been the last of several for a while, and so far behind its own slot and
+    /// the first one that it lost touch. Asked again until somebody does.
     fn heir(&mut self, now: SimTime, own: &Own) -> Option<DroneId> {
-        let heir = if self.election.leads() { self.first_if_behind(now, own) } else { None };
-        let since = heir.map(|_| self.due.behind.unwrap_or(now));
-        self.due.behind = since;
-        let due = since.is_some_and(|since| now.since(since) >= BEHIND_S);
-        if due {
-            self.due.behind = Some(now.after(self.wait_s - BEHIND_S));
+        if !self.election.leads() {
+            self.due.heir = None;
+            return None;
         }
+        let sound = if self.impaired { self.first_sound(now) } else { None };
+        let broken = sound.is_some();
+        let heir = sound.or_else(|| self.first_if_behind(now, own));
+        let begin = now.after(if broken { 0.0 } else { BEHIND_S });
+        let from = heir.map(|_| self.due.heir.filter(|(why, _)| *why == broken).map_or(begin, |(_, from)| from));
+        let due = from.is_some_and(|from| now >= from);
+        self.due.heir = from.map(|from| (broken, if due { now.after(self.wait_s) } else { from }));
         heir.filter(|_| due)
+    }
+
+    /// The follower with all its sensors that is closest to the destination.
+    fn first_sound(&self, now: SimTime) -> Option<DroneId> {
+        let scope = self.election.scope();
+        let follows = |m: &Member| scope.contains(m.group) && self.term_of(m.id) == self.election.obeyed();
+        let sound = self.living(now).filter(|m| follows(m) && self.is_sound(m.id));
+        sound
+            .map(|m| self.key(m.position, m.id))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .map(|(_, id)| id)
     }
 
     fn first_if_behind(&self, now: SimTime, own: &Own) -> Option<DroneId> {

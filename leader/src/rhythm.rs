@@ -4,8 +4,9 @@ use skein_protocol::SimTime;
 
 /// Weight of a new gap in the running means, once there are many.
 const NOVELTY: f64 = 0.02;
-/// Deviation that a link is thought to have before it is known, as a part of the first gap.
-const DOUBT: f64 = 0.25;
+/// Deviation that a link is thought to have before it is known, as a part of the first gap: that of a link which loses
+/// every other sign.
+const DOUBT: f64 = 1.0;
 /// So many mean deviations above the mean gap a silence is no chance any more: at 50 % loss that are 24 periods, and
 /// one silence in ten million is as long.
 const PATIENCE: f64 = 22.0;
@@ -29,6 +30,11 @@ impl Rhythm {
         Self { last: now, ..Self::default() }
     }
 
+    /// A source that is to be heard once in so long, s, if the link is good; which is doubted until it shows.
+    pub fn expecting(now: SimTime, period_s: f64) -> Self {
+        Self { last: now, gaps: 1, mean_s: period_s, deviation_s: DOUBT * period_s }
+    }
+
     /// When the last sign came in.
     pub fn last(&self) -> SimTime {
         self.last
@@ -39,9 +45,13 @@ impl Rhythm {
         self.last = now;
     }
 
-    /// A further sign; several at once count as one. A silence of more than `longest_s` was no gap but an absence.
-    pub fn hear(&mut self, now: SimTime, longest_s: f64) {
+    /// A further sign. Several at once count as one, and so does whatever comes sooner than `shortest_s` after the last
+    /// one: it says nothing about how late the next may be. A silence of more than `longest_s` was no gap but an absence.
+    pub fn hear(&mut self, now: SimTime, shortest_s: f64, longest_s: f64) {
         let gap_s = now.since(self.last);
+        if gap_s < shortest_s {
+            return;
+        }
         self.last = now;
         if gap_s <= 0.0 || gap_s > longest_s {
             return;
@@ -70,7 +80,7 @@ mod tests {
     fn after(gaps_s: impl Iterator<Item = f64>) -> Rhythm {
         let mut rhythm = Rhythm::new(SimTime::ZERO);
         gaps_s.fold(SimTime::ZERO, |now, gap_s| {
-            rhythm.hear(now.after(gap_s), f64::INFINITY);
+            rhythm.hear(now.after(gap_s), 0.0, f64::INFINITY);
             now.after(gap_s)
         });
         rhythm
@@ -86,10 +96,25 @@ mod tests {
     }
 
     #[test]
+    fn signs_between_the_beats_are_no_irregularity() {
+        let (mut rhythm, mut now) = (Rhythm::new(SimTime::ZERO), SimTime::ZERO);
+        for beat in 0..400 {
+            now = now.after(0.01);
+            // Every fifth beat something else is said in between.
+            if beat % 5 == 0 {
+                rhythm.hear(now, 0.015, f64::INFINITY);
+            }
+            now = now.after(0.01);
+            rhythm.hear(now, 0.015, f64::INFINITY);
+        }
+        assert!(rhythm.patience_s(0.06) < 0.0601, "{rhythm:?}");
+    }
+
+    #[test]
     fn an_absence_and_a_change_of_the_source_are_no_gaps() {
         let regular = after(std::iter::repeat_n(0.02, 400));
         let (mut absent, mut turned) = (regular, regular);
-        absent.hear(SimTime::from_secs(20.0), 0.06);
+        absent.hear(SimTime::from_secs(20.0), 0.0, 0.06);
         turned.turn(SimTime::from_secs(20.0));
         assert_eq!(absent.patience_s(0.06), regular.patience_s(0.06));
         assert_eq!(turned, absent);

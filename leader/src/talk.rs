@@ -3,7 +3,7 @@
 use crate::leading::{Leading, Own};
 use crate::ledger::Orders;
 use crate::obstacles::{Obstacles, set_array, set_ids};
-use skein_protocol::payload::{MAX_PLACES, Obstacle, PHASE_AVOID, POSE_LEADS, Passed, Pose, QueuePlace};
+use skein_protocol::payload::{MAX_PLACES, Obstacle, PHASE_AVOID, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime};
 
 /// Periods, and what was said when.
@@ -75,7 +75,7 @@ impl Leading {
             group: self.ledger.group(),
             term: self.election.obeyed(),
             incarnation: self.incarnation,
-            flags: if self.election.leads() { POSE_LEADS } else { 0 },
+            flags: flag(self.election.leads(), POSE_LEADS) | flag(self.impaired, POSE_IMPAIRED),
             reserved: 0,
         }
     }
@@ -136,6 +136,10 @@ impl Leading {
             say.extend(ids.iter().filter_map(|&id| told(&self.obstacles, id)));
         }
     }
+}
+
+fn flag(set: bool, flag: u32) -> u32 {
+    if set { flag } else { 0 }
 }
 
 fn told(obstacles: &Obstacles, id: ObstacleId) -> Option<Message> {

@@ -38,5 +38,5 @@ fn a_drone_dies_and_is_started_again() {
 fn the_swarm_is_cut_in_two_and_healed() {
     explore(3, 2, 16, Faults { cuts: 1, ..Faults::default() }, 2437);
     explore(4, 2, 17, Faults { cuts: 1, ..Faults::default() }, 6707);
-    explore(5, 2, 18, Faults { cuts: 1, ..Faults::default() }, 16_855);
+    explore(5, 2, 18, Faults { cuts: 1, ..Faults::default() }, 16_879);
 }

@@ -113,3 +113,88 @@ fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
         assert!(handed_over_s.is_some_and(|t| (51.0..56.0).contains(&t)), "{handed_over_s:?}");
     }
 }
+
+#[test]
+fn a_leader_whose_sensor_breaks_hands_over_at_once_and_without_a_gap() {
+    for (loss, limit_s) in [(0.0, 0.1), (0.3, 2.0)] {
+        let mut swarm = Swarm::new(DEFAULT, Air { seed: 3, loss, ..Air::default() }, 8);
+        swarm.run(3.0);
+        let old = swarm.term(0).unwrap();
+        assert_eq!(old.claimant, DroneId(0));
+        let leads = |s: &Swarm| s.side(0).iter().filter(|(_, l)| l.election.leads()).count();
+        let led_by = |s: &Swarm, heir: u32| {
+            assert!(leads(s) >= 1, "nobody leads in {:?}", s.now());
+            let terms: BTreeSet<_> = (0..8).map(|i| s.term(i).unwrap()).collect();
+            (terms.len() != 1 || terms.iter().any(|t| t.claimant != DroneId(heir))).then(|| format!("{terms:?}"))
+        };
+        swarm.drones[0].as_mut().unwrap().feel(true);
+        swarm.until(limit_s, |s| led_by(s, 1)).unwrap();
+        // Until its next beacon nobody knows that the second is broken as well: of those who are sound the first leads.
+        swarm.drones[2].as_mut().unwrap().feel(true);
+        swarm.run(1.0);
+        swarm.drones[1].as_mut().unwrap().feel(true);
+        swarm.until(limit_s, |s| led_by(s, 3)).unwrap();
+        // Nobody takes it back, nor is anybody asked who is no better.
+        let terms = swarm.watch.as_ref().unwrap().leaders.len();
+        (4..8).for_each(|i| swarm.drones[i].as_mut().unwrap().feel(true));
+        swarm.run(1.0);
+        swarm.drones[3].as_mut().unwrap().feel(true);
+        swarm.run(20.0);
+        assert_eq!(led_by(&swarm, 3), None);
+        assert_eq!(swarm.watch.as_ref().unwrap().leaders.len(), terms, "loss {loss}");
+    }
+}
+
+#[test]
+fn whoever_dies_is_followed_by_one_with_all_sensors() {
+    let mut swarm = Swarm::new(DEFAULT, Air { seed: 4, ..Air::default() }, 8);
+    swarm.run(3.0);
+    (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().feel(true));
+    swarm.run(1.0);
+    swarm.kill(0);
+    let heir = |s: &Swarm| Some(s.term(7)?.claimant).filter(|&id| id != DroneId(3)).map(|id| id.to_string());
+    // It waits for nobody, although two are closer.
+    swarm.until(1.1, heir).unwrap();
+    swarm.run(3.0);
+    assert_eq!((heir(&swarm), swarm.disunion(0)), (None, None));
+    let leaders: Vec<_> = swarm.watch.unwrap().leaders.into_values().collect();
+    assert_eq!(leaders, [DroneId(0), DroneId(3)], "nobody else claimed");
+}
+
+/// What is wrong where not everybody hears everybody: each is to follow a leader that it hears itself, or to lead.
+fn unled(swarm: &Swarm) -> Option<String> {
+    for (id, leading) in swarm.side(0) {
+        let term = leading.election.obeyed();
+        let leader = swarm.drones[term.claimant.index()].as_ref();
+        let leads = leader.is_some_and(|l| l.election.leads() && l.election.obeyed() == term);
+        if !leads || id.index().abs_diff(term.claimant.index()) > swarm.reach {
+            return Some(format!("{id} obeys {term:?}"));
+        }
+    }
+    None
+}
+
+#[test]
+fn along_a_chain_everybody_follows_a_leader_it_hears_and_nobody_is_deposed() {
+    for (drones, reach, loss, seed) in
+        [(3, 1, 0.0, 1), (4, 1, 0.0, 2), (5, 1, 0.3, 3), (8, 1, 0.0, 4), (8, 2, 0.3, 5), (8, 3, 0.0, 6)]
+    {
+        let name = format!("{drones} drones that hear {reach}, loss {loss}");
+        let mut swarm = Swarm::new(DEFAULT, Air { seed, loss, ..Air::default() }, drones);
+        swarm.reach = reach;
+        // The first is in the middle: so that ballots and places do not agree.
+        swarm.own.rotate_right(drones / 2);
+        assert!(unled(&swarm).is_some());
+        swarm.run(30.0);
+        assert_eq!(unled(&swarm), None, "{name}");
+        let settled = swarm.watch.as_ref().unwrap().leaders.len();
+        swarm.run(120.0);
+        assert_eq!((unled(&swarm), swarm.watch.as_ref().unwrap().leaders.len()), (None, settled), "{name}");
+        let leaders: Vec<_> =
+            swarm.side(0).iter().filter(|(_, l)| l.election.leads()).map(|(id, _)| id.index()).collect();
+        assert!(leaders.windows(2).all(|pair| pair[0].abs_diff(pair[1]) > reach), "{name}: {leaders:?}");
+        println!("{name}: {leaders:?} lead");
+        swarm.reach = usize::MAX;
+        swarm.until(3.0, |s| s.disunion(0)).unwrap();
+    }
+}

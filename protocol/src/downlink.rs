@@ -66,7 +66,16 @@ pub struct SenseHead {
     pub cuts: Cuts,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
+    /// What its sensors say of themselves: [`BROKEN_OBSTACLES`], [`BROKEN_RANGING`].
+    pub broken: u32,
+    /// Always 0.
+    pub reserved: u32,
 }
+
+/// [`SenseHead::broken`]: the sensor of obstacles tells nothing.
+pub const BROKEN_OBSTACLES: u32 = 1;
+/// [`SenseHead::broken`]: the sensor of neighbours tells nothing.
+pub const BROKEN_RANGING: u32 = 2;
 
 impl SenseHead {
     /// Why its radio cannot hear a frame at all, if it cannot.
@@ -257,6 +266,7 @@ impl<'a> DownlinkView<'a> {
             position: Vec2::from(head.position_m),
             velocity: Vec2::from(head.velocity_mps),
             extra_reaction_s: head.extra_reaction_s,
+            broken: head.broken,
             obstacles: range(self.obstacles, head.obstacle_first, head.obstacle_count),
             neighbours: range(self.neighbours, head.neighbour_first, head.neighbour_count),
             shapes: self.shapes,
@@ -277,6 +287,8 @@ pub struct Senses<'a> {
     pub velocity: Vec2,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
+    /// Which of its sensors tell nothing: [`BROKEN_OBSTACLES`], [`BROKEN_RANGING`].
+    pub broken: u32,
     /// Obstacles with a point in detection range.
     pub obstacles: &'a [SensedObstacle],
     /// Neighbours in ranging distance.
@@ -294,7 +306,7 @@ impl<'a> Senses<'a> {
         neighbours: &'a [SensedNeighbour],
         shapes: &'a [SensedShape],
     ) -> Self {
-        Self { now, tick, position, velocity, extra_reaction_s: 0.0, obstacles, neighbours, shapes }
+        Self { now, tick, position, velocity, extra_reaction_s: 0.0, broken: 0, obstacles, neighbours, shapes }
     }
 
     /// The same senses as they will be at another time and place: for looking ahead.

@@ -17,6 +17,8 @@ pub const MAX_ROUTES: usize = MAX_SET + 1;
 
 /// [`Pose::flags`]: the drone believes it leads, in the term [`Pose::term`].
 pub const POSE_LEADS: u32 = 1;
+/// [`Pose::flags`]: a sensor of the drone is broken, and others should lead rather.
+pub const POSE_IMPAIRED: u32 = 2;
 
 /// A place in the queue past one obstacle set.
 #[repr(C)]
@@ -61,7 +63,7 @@ pub struct Pose {
     pub term: Ballot,
     /// Of its process.
     pub incarnation: u32,
-    /// [`POSE_LEADS`].
+    /// [`POSE_LEADS`], [`POSE_IMPAIRED`].
     pub flags: u32,
     /// Always 0.
     pub reserved: u32,

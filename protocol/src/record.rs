@@ -53,6 +53,8 @@ pub struct DroneRow {
     pub energy_j: f64,
     /// The plan it obeys.
     pub obeyed: PlanStamp,
+    /// The term it obeys, or leads in.
+    pub term: Ballot,
     /// Its group.
     pub group: GroupId,
     /// The group it leads, with [`ROW_LEADS`].
@@ -74,7 +76,7 @@ pub struct DroneRow {
     /// Place in the queue.
     pub rank: u16,
     /// Always 0; keeps the row a multiple of eight bytes.
-    pub reserved: [u32; 1 + DROP_REASONS % 2],
+    pub reserved: [u32; DROP_REASONS % 2],
 }
 
 impl DroneRow {

@@ -81,6 +81,7 @@ impl Process {
             velocity_mps: body.velocity.into(),
             energy_j: body.energy_j,
             obeyed: slot.obeyed,
+            term: slot.term,
             group: slot.group,
             led: slot.led,
             flags: alive * flags,

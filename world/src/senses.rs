@@ -3,7 +3,9 @@
 use crate::body::Body;
 use crate::geometry::{Nearest, Outline};
 use crate::grid::Neighbours;
-use skein_protocol::downlink::{Downlink, SenseHead, SensedNeighbour, SensedObstacle, SensedShape};
+use skein_protocol::downlink::{
+    BROKEN_OBSTACLES, BROKEN_RANGING, Downlink, SenseHead, SensedNeighbour, SensedObstacle, SensedShape,
+};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::sides::Cuts;
 use skein_protocol::{DroneId, ObstacleId, Vec2};
@@ -85,6 +87,14 @@ pub(crate) struct Hindrance {
     pub velocity_error_mps: Vec2,
 }
 
+impl Hindrance {
+    /// What the drone's sensors say of themselves. One that it does not have is not broken.
+    fn broken(&self, ranging: bool) -> u32 {
+        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
+        flag(self.no_obstacles, BROKEN_OBSTACLES) | flag(self.no_ranging && ranging, BROKEN_RANGING)
+    }
+}
+
 /// Writes senses into a downlink, each sensed shape once.
 #[derive(Clone, Debug)]
 pub(crate) struct Teller {
@@ -133,6 +143,8 @@ impl Teller {
                 incarnation,
                 cuts: hindrance.cuts,
                 extra_reaction_s: hindrance.extra_reaction_s,
+                broken: hindrance.broken(ranging_m.is_some()),
+                reserved: 0,
             });
         }
     }
@@ -229,7 +241,10 @@ mod tests {
     #[test]
     fn ranging_can_be_off() {
         let blind = Hindrance { no_ranging: true, ..Hindrance::default() };
-        assert!(told_to(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), blind).neighbours.is_empty());
+        let down = told_to(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), blind);
+        assert!(down.neighbours.is_empty());
+        assert_eq!(down.view().senses(DroneId(1)).unwrap().broken, BROKEN_RANGING);
+        assert_eq!(told_to(&bodies(&[[0.0, 0.0]]), &[], None, blind).drones[0].broken, 0, "it has none");
         assert!(told(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], None).neighbours.is_empty());
     }
 

@@ -7,8 +7,9 @@ fn at(seconds: f64) -> SimTime {
     SimTime::from_secs(seconds)
 }
 
+/// One that doubts the air no more.
 fn machine(id: u32) -> Election {
-    Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO)
+    Election { rhythm: Rhythm::new(SimTime::ZERO), ..Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO) }
 }
 
 fn ballot(round: u32, claimant: u32) -> Ballot {
@@ -47,6 +48,24 @@ fn the_closest_claims_first_and_the_next_only_if_it_hears_nothing() {
 }
 
 #[test]
+fn whoever_was_started_again_listens_before_it_claims() {
+    let again = || Election::new(DroneId(5), 2, PARAMS, at(10.0));
+    let (first, _) = claim(&mut again(), 10.0, 0);
+    assert!((14.2..14.24).contains(&first), "{first}");
+    let mut drone = again();
+    sign(&mut drone, 13.9, ballot(1, 0), N, false);
+    assert!(tick(&mut drone, 14.2, 0).is_none() && drone.obeyed() == ballot(1, 0), "not outbid by a later life");
+}
+
+#[test]
+fn an_air_that_is_not_known_yet_may_lose_every_other_sign() {
+    let mut drone = Election::new(DroneId(1), 1, PARAMS, SimTime::ZERO);
+    assert!((4.5..4.7).contains(&drone.patience_s()));
+    (1..=12).for_each(|beat| sign(&mut drone, 0.2 * f64::from(beat), ballot(1, 0), N, false));
+    assert_eq!(drone.patience_s(), PARAMS.leader_timeout_s);
+}
+
+#[test]
 fn two_claims_settle_on_the_higher_ballot() {
     let (mut a, mut b) = (machine(1), machine(2));
     let (_, said_a) = claim(&mut a, 0.0, 0);
@@ -63,8 +82,10 @@ fn a_silent_leader_is_asked_for_and_replaced_and_steps_down_when_it_wakes() {
     let (t, said) = claim(&mut old, 0.0, 0);
     heir.handle(at(t), 0, Input::Heard(said));
     let (asked, probe) = until_said(&mut heir, t, 0, LEADERSHIP_PROBE);
-    assert!(asked >= t + PARAMS.leader_timeout_s - 1e-9 && (probe.ballot, probe.stamp) == (said.ballot, at(t)));
+    assert!(asked >= t + PARAMS.leader_timeout_s - PARAMS.wait_s - 1e-9);
+    assert_eq!((probe.ballot, probe.stamp), (said.ballot, at(t)));
     let (later, next) = claim(&mut heir, asked + 0.02, 0);
+    assert!((0.0..0.021).contains(&(later - t - PARAMS.leader_timeout_s + 1e-9)), "{later}");
     assert!(later >= asked + PARAMS.wait_s - 1e-9 && next.ballot > said.ballot);
     old.handle(at(later), 0, Input::Heard(next));
     assert!(!old.leads());
@@ -75,16 +96,16 @@ fn whoever_heard_of_the_leader_objects_to_a_claim() {
     let (mut leader, mut deaf, mut other) = (machine(1), machine(2), machine(3));
     let (t, said) = claim(&mut leader, 0.0, 0);
     deaf.handle(at(t), 0, Input::Heard(said));
-    sign(&mut other, t + 0.9, said.ballot, N, false);
+    sign(&mut other, t + 0.7, said.ballot, N, false);
     let (asked, probe) = until_said(&mut deaf, t, 0, LEADERSHIP_PROBE);
     let objection = other.handle(at(asked), 0, Input::Heard(probe)).expect("it heard of the leader since");
-    assert_eq!((objection.kind, objection.stamp), (LEADERSHIP_OBJECTION, at(t + 0.9)));
+    assert_eq!((objection.kind, objection.stamp), (LEADERSHIP_OBJECTION, at(t + 0.7)));
     let (mut told, mut untold) = (deaf.clone(), deaf);
     told.handle(at(asked + 0.02), 0, Input::Heard(objection));
-    assert!((1..80).all(|i| tick(&mut told, asked + 0.02 + 0.01 * f64::from(i), 0).is_none()));
+    assert!((1..60).all(|i| tick(&mut told, asked + 0.02 + 0.01 * f64::from(i), 0).is_none()));
     assert!(claim(&mut untold, asked, 0).0 < asked + 0.25);
     // What is no news is not told, nor is anything about another term.
-    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { stamp: at(t + 0.9), ..probe })).is_none());
+    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { stamp: at(t + 0.7), ..probe })).is_none());
     assert!(other.handle(at(asked), 0, Input::Heard(Leadership { ballot: ballot(9, 9), ..probe })).is_none());
     // The leader itself answers that it lives.
     assert_eq!(leader.handle(at(asked), 0, Input::Heard(probe)).map(|said| said.stamp), Some(at(asked)));
@@ -185,7 +206,8 @@ fn a_slow_air_is_given_time_to_answer() {
     let mut drone = machine(1);
     sign(&mut drone, 0.0, ballot(1, 2), N, false);
     let slow = |now_s: f64, drone: &mut Election| drone.handle(at(now_s), 0, Input::Tick { closer: 1, delay_s: 1.0 });
-    assert_eq!(slow(1.0, &mut drone).map(|said| said.kind), Some(LEADERSHIP_PROBE));
-    assert!(slow(3.9, &mut drone).is_none(), "two ways for the answer, one for a claim of the other");
-    assert_eq!(slow(4.0, &mut drone).map(|said| said.kind), Some(LEADERSHIP_CLAIM));
+    assert!(slow(0.4, &mut drone).is_none(), "half of the patience at least");
+    assert_eq!(slow(0.5, &mut drone).map(|said| said.kind), Some(LEADERSHIP_PROBE));
+    assert!(slow(3.4, &mut drone).is_none(), "two ways for the answer, one for a claim of the other");
+    assert_eq!(slow(3.5, &mut drone).map(|said| said.kind), Some(LEADERSHIP_CLAIM));
 }

@@ -48,6 +48,8 @@ pub struct Swarm {
     pub own: Vec<Own>,
     /// Drones of different sides do not hear each other.
     pub sides: Vec<u8>,
+    /// Nor do those whose numbers differ by more: with 1 they are a chain.
+    pub reach: usize,
     pub scenery: Vec<(ObstacleId, ConvexShape)>,
     /// How far a drone senses obstacles, m.
     pub range_m: f64,
@@ -74,6 +76,7 @@ impl Swarm {
             incarnations: vec![1; drones],
             own: (0..drones).map(own).collect(),
             sides: vec![0; drones],
+            reach: usize::MAX,
             scenery: Vec::new(),
             range_m: 100.0,
             watch: Some(Watch::default()),
@@ -155,7 +158,7 @@ impl Swarm {
         let later = self.posts.split_off(&(self.tick + 1, 0, 0, 0));
         let (now, mut answers) = (self.now(), Vec::new());
         for ((_, from, _, to), message) in std::mem::replace(&mut self.posts, later) {
-            if self.sides[from] != self.sides[to] || self.frozen[to] {
+            if self.sides[from] != self.sides[to] || from.abs_diff(to) > self.reach || self.frozen[to] {
                 continue;
             }
             let Some(leading) = &mut self.drones[to] else { continue };
