@@ -191,6 +191,8 @@ pub struct Totals {
     pub deadline_misses: u64,
     /// Wall time from the first tick opened to the last tick done, s.
     pub wall_s: f64,
+    /// How late ticks opened (wall clock only).
+    pub lateness_s: Spread,
 }
 
 /// Something that happened.

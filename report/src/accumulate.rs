@@ -7,7 +7,9 @@ use crate::metrics::SwarmMetrics;
 use crate::recorder::Ending;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
-use crate::summary::{Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, Spread, Summary, Violation, numbers};
+use crate::summary::{
+    Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, Spread, StepTimes, Summary, Violation, numbers,
+};
 use crate::vicinity::Vicinity;
 use skein_protocol::payload::PHASE_REFORM;
 use skein_protocol::record::{self, DroneRow, Happening, Outcome, ROW_LATE, RecordView, RunEvent, Totals};
@@ -229,6 +231,7 @@ impl Accumulator {
             elections: self.leading.elections(),
             messages: messages(&self.counts, totals),
             deadline_misses: totals.map_or(self.counts.late, |totals| totals.deadline_misses),
+            lateness_us: totals.and_then(|totals| lateness(&totals.lateness_s)),
             step_us: self.steps.times().filter(|_| self.facts.runtime != "inline"),
             rejected_commands: totals.map(|totals| totals.rejected_commands),
             lost_ticks: self.counts.lost,
@@ -279,6 +282,11 @@ fn energies(rows: &[DroneRow]) -> Vec<f64> {
 
 fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
     rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
+}
+
+fn lateness(late_s: &record::Spread) -> Option<StepTimes> {
+    let us = |s: Option<f64>| s.map(|s| s * 1e6);
+    Some(StepTimes { p50: us(late_s.p50)?, p99: us(late_s.p99)?, max: us(late_s.max)? })
 }
 
 /// What the world counted; without its last word, what the record shows.

@@ -86,6 +86,8 @@ pub struct Summary {
     pub faults: Vec<FaultEntry>,
     /// Ticks that drones did not answer in time (wall clock only).
     pub deadline_misses: u64,
+    /// How late ticks opened, µs (wall clock only; null in lockstep).
+    pub lateness_us: Option<StepTimes>,
     /// Wall time of a drone's step, µs; null in the inline runtime.
     pub step_us: Option<StepTimes>,
     /// Commands that were not finite and not carried out.
@@ -272,7 +274,7 @@ pub struct FaultEntry {
     pub detail: String,
 }
 
-/// Wall time of drones' steps, µs.
+/// Wall times, µs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StepTimes {
     /// Median.

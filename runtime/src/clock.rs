@@ -1,5 +1,6 @@
 //! Lockstep and wall clock.
 
+use skein_protocol::record::Spread;
 use std::fmt;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -49,27 +50,82 @@ impl fmt::Display for Clock {
 const STALL: Duration = Duration::from_secs(1);
 
 /// Deadlines of ticks on the wall clock.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Pacer {
     next: Instant,
     period: Duration,
+    late: Lateness,
+}
+
+/// How late ticks opened: a histogram, one bin a microsecond.
+#[derive(Clone, Debug)]
+pub struct Lateness {
+    /// The last bin holds all that is longer.
+    bins: Vec<u32>,
+    sum_s: f64,
+    max_s: f64,
+}
+
+/// Bins of [`Lateness`].
+const LATE_BINS: usize = 20_000;
+
+impl Default for Lateness {
+    fn default() -> Self {
+        Self { bins: vec![0; LATE_BINS], sum_s: 0.0, max_s: 0.0 }
+    }
+}
+
+impl Lateness {
+    fn note(&mut self, late: Duration) {
+        self.bins[(late.as_micros() as usize).min(LATE_BINS - 1)] += 1;
+        self.sum_s += late.as_secs_f64();
+        self.max_s = self.max_s.max(late.as_secs_f64());
+    }
+
+    /// Mean, median, 99th percentile and maximum, s.
+    #[must_use]
+    pub fn spread(&self) -> Spread {
+        let count: u64 = self.bins.iter().map(|&n| u64::from(n)).sum();
+        if count == 0 {
+            return Spread::default();
+        }
+        let quantile = |share: f64| {
+            let rank = (share * count as f64).ceil() as u64;
+            let mut seen = 0;
+            let reached = self.bins.iter().position(|&n| {
+                seen += u64::from(n);
+                seen >= rank
+            });
+            reached.filter(|&bin| bin + 1 < LATE_BINS).map_or(self.max_s, |bin| bin as f64 * 1e-6)
+        };
+        let mean = self.sum_s / count as f64;
+        Spread { mean: Some(mean), p50: Some(quantile(0.5)), p99: Some(quantile(0.99)), max: Some(self.max_s) }
+    }
 }
 
 impl Pacer {
     /// The first tick opens now; ticks last `dt_s` simulated seconds.
     #[must_use]
     pub fn new(dt_s: f64, speed: f64) -> Self {
-        Self { next: Instant::now(), period: Duration::from_secs_f64(dt_s / speed) }
+        let period = Duration::from_secs_f64(dt_s / speed);
+        Self { next: Instant::now(), period, late: Lateness::default() }
     }
 
     /// The deadline of the tick that opens now, which is when the next one opens.
     pub fn open(&mut self) -> Instant {
         let now = Instant::now();
+        self.late.note(now.saturating_duration_since(self.next));
         if now.saturating_duration_since(self.next) > STALL {
             self.next = now;
         }
         self.next += self.period;
         self.next
+    }
+
+    /// How late ticks opened so far.
+    #[must_use]
+    pub fn lateness(&self) -> &Lateness {
+        &self.late
     }
 
     /// Stands still for a while that does not count.
@@ -107,5 +163,7 @@ mod tests {
         assert_eq!(pacer.open() - second, Duration::from_millis(50));
         pacer.next -= Duration::from_secs(5);
         assert!(pacer.open() > Instant::now());
+        let late = pacer.lateness().spread();
+        assert!(late.max.unwrap() > 4.0 && late.p99 == late.max && late.p50.unwrap() < 1.0, "{late:?}");
     }
 }

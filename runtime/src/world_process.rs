@@ -113,6 +113,9 @@ impl Air {
             }
         }
         let wall_s = opened.elapsed().as_secs_f64();
+        if let Some(pacer) = &pacer {
+            self.world.note_lateness(pacer.lateness().spread());
+        }
         let mut stats = LinkStats::default();
         (0..self.answers.len()).for_each(|drone| stats.merge(&self.control.stats(drone)));
         self.world.finish(&stats, wall_s);

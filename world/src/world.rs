@@ -22,7 +22,7 @@ use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DropReason, Queue};
-use skein_protocol::record::{DroneRow, FaultKind, Happening, Outcome, RecordHead, RecordView, Totals};
+use skein_protocol::record::{DroneRow, FaultKind, Happening, Outcome, RecordHead, RecordView, Spread, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
@@ -241,6 +241,11 @@ impl World {
         self.rows.clear();
         let events_len = self.log.told().len() as u32;
         self.head = RecordHead { rows: 0, frames: 0, events_len, digest: self.digest(), ..self.head };
+    }
+
+    /// How late ticks opened by the wall clock: for [`World::finish`].
+    pub fn note_lateness(&mut self, lateness_s: Spread) {
+        self.totals.lateness_s = lateness_s;
     }
 
     /// The digest so far, over every drone's state and what it heard in every tick.

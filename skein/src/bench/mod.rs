@@ -1,11 +1,13 @@
 //! `skein bench`: what Skein does by itself, measured over and over, in one table and one JSON object.
 
+mod clock;
 mod failover;
 mod parts;
 mod runtime;
 
 use crate::exit::{Exit, Failure};
 use clap::Subcommand;
+pub use clock::ClockArgs;
 pub use failover::FailoverArgs;
 use parts::{Part, PartArgs};
 pub use runtime::{FloorArgs, RuntimeArgs, peer};
@@ -17,6 +19,8 @@ pub enum BenchCommand {
     Runtime(RuntimeArgs),
     /// Kill leaders over and over: how soon everybody follows another one
     Failover(FailoverArgs),
+    /// Ticks by the wall clock: how late they open, and answers that come too late
+    Clock(ClockArgs),
     /// What the radio costs
     Radio(PartArgs),
     /// What the exact split costs
@@ -33,6 +37,7 @@ pub fn bench(command: Option<&BenchCommand>) -> Result<Exit, Failure> {
         None => runtime::runtime(&RuntimeArgs::default()),
         Some(BenchCommand::Runtime(args)) => runtime::runtime(args),
         Some(BenchCommand::Failover(args)) => failover::failover(args),
+        Some(BenchCommand::Clock(args)) => clock::clock(args),
         Some(BenchCommand::Radio(args)) => parts::part(Part::Radio, args),
         Some(BenchCommand::Grouping(args)) => parts::part(Part::Grouping, args),
         Some(BenchCommand::Sense(args)) => parts::part(Part::Sense, args),
