@@ -8,7 +8,7 @@
 
 use crate::stage::{Forecast, Stage};
 use crate::swarm_pilot::SwarmPilot;
-use skein_leader::ledger::{Ledger, Orders};
+use skein_leader::ledger::Orders;
 use skein_leader::planner::{Destination, Member, Objective};
 use skein_protocol::downlink::SensedShape;
 use skein_protocol::{DroneId, SimTime};
@@ -17,9 +17,9 @@ use skein_protocol::{DroneId, SimTime};
 const THINKING_S: f64 = 1.0;
 /// Length of a rehearsed step, s; never shorter than a tick.
 const STEP_S: f64 = 0.1;
-/// Drone-steps rehearsed in a tick.
-const STEPS_A_TICK: usize = 1200;
-/// Larger groups are not rehearsed: the neighbours of all drones are looked for pair by pair.
+/// Drone-steps rehearsed in a second, the same share of them in each tick.
+const STEPS_A_SECOND: f64 = 60_000.0;
+/// Larger swarms are not rehearsed: the neighbours of all drones are looked for pair by pair.
 pub const MOST_MEMBERS: usize = 32;
 /// A grouping has to cost less than the shortest ways by this share of their cost, …
 const WORTH: f64 = 0.01;
@@ -43,6 +43,8 @@ pub struct Start {
 #[derive(Clone, Debug)]
 pub struct Rehearsal {
     members: Vec<DroneId>,
+    /// Steps of all drones in a tick.
+    steps_a_tick: usize,
     shapes: Vec<SensedShape>,
     objective: Objective,
     decision_tick: u64,
@@ -57,23 +59,25 @@ pub struct Rehearsal {
 }
 
 impl Rehearsal {
-    /// A rehearsal of these alternatives by their leader, who obeys the first of them already; its members still stand
-    /// by the ledger `before`.
+    /// A rehearsal of these alternatives by their leader, before it obeys the first of them.
     #[must_use]
-    pub fn new(leader: &SwarmPilot, before: &Ledger, members: &[Member], start: Start, all: Vec<Orders>) -> Self {
+    pub fn new(leader: &SwarmPilot, start: Start, all: Vec<Orders>) -> Self {
         let dt_s = leader.params.dt_s;
         let ticks = ((STEP_S / dt_s).round() as u64).max(1);
         let step_s = dt_s * ticks as f64;
         let steps = (THINKING_S / step_s).ceil() as u64;
         let shape =
             |(id, known): (_, &skein_leader::obstacles::Known)| SensedShape { shape: known.shape, id, reserved: 0 };
-        let thinking = Stage::new(leader, before, members, (start.tick / ticks, start.now, step_s), steps);
+        let crew = leader.leading.living();
+        let thinking = Stage::new(leader, &crew, &all[0], (start.tick / ticks, start.now, step_s), steps);
         let decision = start.now.after(step_s * steps as f64);
+        let most = STEPS_A_SECOND * dt_s / crew.len().max(1) as f64;
         Self {
-            members: members.iter().map(|member| member.id).collect(),
+            members: leader.leading.members().iter().map(|member| member.id).collect(),
+            steps_a_tick: (most as usize).max(1),
             shapes: leader.leading.obstacles.iter().map(shape).collect(),
             objective: start.objective,
-            worth: if leader.sees_the_end(members.len()) { WORTH } else { WORTH_UNSEEN },
+            worth: if leader.sees_the_end(crew.len()) { WORTH } else { WORTH_UNSEEN },
             decision_tick: start.tick + ticks * steps,
             alternatives: all.into_iter().map(|orders| restamped(orders, decision)).collect(),
             forecasts: Vec::new(),
@@ -93,7 +97,7 @@ impl Rehearsal {
         if tick >= self.decision_tick {
             return Some(self.choose());
         }
-        let mut left = STEPS_A_TICK / self.members.len().max(1);
+        let mut left = self.steps_a_tick;
         while left > 0 && self.forecasts.len() < self.alternatives.len() {
             left -= 1;
             if self.thinking.is_thinking() {

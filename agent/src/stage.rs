@@ -9,8 +9,8 @@ use skein_leader::ledger::{Ledger, Orders};
 use skein_leader::planner::{Destination, Member, Objective, Strategy};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::power_w;
-use skein_protocol::payload::PHASE_AVOID;
-use skein_protocol::{DroneId, Message, SimTime, Vec2};
+use skein_protocol::payload::{PHASE_AVOID, QueuePlace};
+use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
 
 /// A rehearsal that takes longer has failed, s.
 const HORIZON_S: f64 = 200.0;
@@ -56,32 +56,47 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// The members as their leader knows them, who has orders of which they do not yet know. `(tick, now, step_s)`:
+    /// A crew as a leader knows it, all of them one group that it leads, flying by these orders. `(tick, now, step_s)`:
     /// number and time of the first step and the length of all, s; `thinking`: steps until the decision.
     #[must_use]
     pub fn new(
         leader: &SwarmPilot,
-        before: &Ledger,
-        members: &[Member],
+        crew: &[Member],
+        orders: &Orders,
         (tick, now, step_s): (u64, SimTime, f64),
         thinking: u64,
     ) -> Self {
-        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, before);
-        let gate_x_m = leader.leading.ledger.sets().last().map_or(f64::NEG_INFINITY, |set| set.routes.gate_x_m());
-        Self {
+        let ledger = leader.united_ledger(now);
+        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, &ledger);
+        let mut stage = Self {
             params: leader.params.clone(),
             step_s,
             start: now,
             now,
             tick,
             thinking,
-            gate_x_m,
-            pilots: members.iter().map(understudy).collect(),
-            bodies: members.iter().map(|member| (member.position, member.velocity)).collect(),
+            gate_x_m: f64::NEG_INFINITY,
+            pilots: crew.iter().map(understudy).collect(),
+            bodies: crew.iter().map(|member| (member.position, member.velocity)).collect(),
             said: Vec::new(),
             energy_j: 0.0,
             pass_s: None,
             safe: true,
+        };
+        stage.obey(orders);
+        let sets = stage.pilots.iter().flat_map(|pilot| pilot.leading.ledger.sets());
+        stage.gate_x_m = sets.map(|set| set.routes.gate_x_m()).fold(f64::NEG_INFINITY, f64::max);
+        stage
+    }
+
+    /// All obey these orders at once: what is on the air for a tick or two makes no difference.
+    fn obey(&mut self, orders: &Orders) {
+        let newest = self.pilots.iter().map(|pilot| pilot.leading.ledger.newest()).max().unwrap_or_default();
+        let mut orders = orders.clone();
+        orders.plan.stamp = self.now;
+        orders.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
+        for pilot in &mut self.pilots {
+            pilot.leading.obey(self.now, orders.clone());
         }
     }
 
@@ -95,10 +110,7 @@ impl Stage {
     #[must_use]
     pub fn under(&self, orders: &Orders) -> Self {
         let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
-        let me = self.params.me;
-        if let Some(leader) = stage.pilots.iter_mut().find(|pilot| pilot.params.me == me) {
-            leader.leading.adopt(stage.now, orders.clone());
-        }
+        stage.obey(orders);
         stage
     }
 
@@ -200,15 +212,22 @@ impl Stage {
 }
 
 impl SwarmPilot {
-    /// A member of this leader's group as the leader knows it, to be stepped every `dt_s`; it has heard what the ledger
-    /// `before` holds.
-    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, before: &Ledger) -> Self {
+    /// What this leader knows of plans, and of what others fly, as if all were one group.
+    fn united_ledger(&self, now: SimTime) -> Ledger {
+        let living = self.leading.peers.living(now);
+        let places = living.flat_map(|(id, pose)| pose.queue.into_iter().map(move |place| (id, place)));
+        let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
+        self.leading.ledger.united(self.leading.first_term(), &flown)
+    }
+
+    /// A drone as this leader knows it, to be stepped every `dt_s`.
+    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
         let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
         params.safety.dt_s = dt_s;
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // In the mind nothing is rehearsed again.
         params.planner.strategy = Strategy::CongestionAware;
-        let leading = self.leading.of_member(&params.leading(), now, before);
+        let leading = self.leading.of_crew(&params.leading(), now, ledger.of_member(me));
         let mut study = Self::new(params);
         study.leading = leading;
         study

@@ -2,7 +2,7 @@
 
 use crate::rhythm::Rhythm;
 use skein_protocol::payload::Pose;
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -66,6 +66,13 @@ impl Peers {
     /// Forgets a peer.
     pub fn forget(&mut self, peer: DroneId) {
         self.last.remove(&peer);
+    }
+
+    /// As if all peers were one group and obeyed this plan.
+    pub fn unite(&mut self, stamp: PlanStamp) {
+        for Peer { pose, .. } in self.last.values_mut() {
+            (pose.group, pose.term, pose.obeyed) = (GroupId::ALL, stamp.ballot, stamp);
+        }
     }
 
     /// Whether a beacon of the peer came in lately.

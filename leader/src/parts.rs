@@ -55,7 +55,7 @@ impl Leading {
         let (mine_m, spacing_m) = (distance_m(own.position), self.planner.params.spacing_m);
         let slot_m = distance_m(anchor + Vec2::from(part.slot_m));
         let scope = self.election.scope();
-        let members: Vec<Member> = self.living(now).filter(|m| scope.contains(m.group)).collect();
+        let members: Vec<Member> = self.living_peers(now).filter(|m| scope.contains(m.group)).collect();
         let last = members.iter().all(|m| distance_m(m.position) < mine_m);
         if !self.ledger.sets().is_empty() || !last || mine_m - slot_m <= spacing_m {
             return None;
@@ -96,7 +96,7 @@ impl Leading {
 
     /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
     /// its beacon shows that it is on already or will not obey it.
-    pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> {
+    pub(crate) fn living_peers(&self, now: SimTime) -> impl Iterator<Item = Member> {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
             let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
@@ -112,7 +112,7 @@ impl Leading {
     /// Living peers in this drone's part.
     fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> {
         let group = me.group;
-        self.living(now).filter(move |m| group.contains(m.group))
+        self.living_peers(now).filter(move |m| group.contains(m.group))
     }
 
     /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
@@ -123,7 +123,7 @@ impl Leading {
     }
 
     fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
-        let all: Vec<Member> = self.living(now).collect();
+        let all: Vec<Member> = self.living_peers(now).collect();
         self.planner.has_ahead(&self.obstacles, all.iter().chain([me]))
     }
 
@@ -146,7 +146,7 @@ impl Leading {
     pub fn muster(&mut self, now: SimTime, own: &Own) {
         let scope = self.election.scope();
         let (mut members, mut others, mut orphans) = (vec![self.myself(own)], Vec::new(), Vec::new());
-        for peer in self.living(now) {
+        for peer in self.living_peers(now) {
             if scope.contains(peer.group) {
                 members.push(peer);
             } else if peer.group.contains(scope) && self.term_of(peer.id) <= self.election.obeyed() {
@@ -174,6 +174,14 @@ impl Leading {
     /// The term that a peer obeys, by its last beacon.
     fn term_of(&self, peer: DroneId) -> Ballot {
         self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
+    }
+
+    /// All living drones, by id, as of the last [`Self::muster`].
+    #[must_use]
+    pub fn living(&self) -> Vec<Member> {
+        let mut all: Vec<Member> = self.members.iter().chain(&self.others).copied().collect();
+        all.sort_by_key(|member| member.id);
+        all
     }
 
     /// The living members, by id, as of the last [`Self::muster`].
