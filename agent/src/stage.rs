@@ -6,9 +6,9 @@ use crate::pilot::{Heard, Pilot};
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::geometry::nearest;
 use skein_leader::ledger::{Ledger, Orders};
-use skein_leader::planner::{Destination, Member, Objective, Strategy};
+use skein_leader::planner::{Destination, Member, Objective, PlannerParams, Strategy};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
-use skein_protocol::energy::power_w;
+use skein_protocol::energy::{CHEAPEST_MPS, power_w};
 use skein_protocol::payload::{PHASE_AVOID, QueuePlace};
 use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
 
@@ -34,6 +34,8 @@ pub struct Forecast {
     pub end_s: f64,
     /// From the decision until the last drone passed the gate, s.
     pub pass_s: f64,
+    /// Way to the gate in free flight, s: a mean over the drones.
+    pub way_s: f64,
 }
 
 /// Understudies and their bodies.
@@ -52,6 +54,7 @@ pub struct Stage {
     said: Vec<Heard>,
     energy_j: f64,
     pass_s: Option<f64>,
+    way_s: f64,
     safe: bool,
 }
 
@@ -81,6 +84,7 @@ impl Stage {
             said: Vec::new(),
             energy_j: 0.0,
             pass_s: None,
+            way_s: 0.0,
             safe: true,
         };
         stage.obey(orders);
@@ -110,6 +114,7 @@ impl Stage {
     #[must_use]
     pub fn under(&self, orders: &Orders) -> Self {
         let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
+        stage.way_s = orders.parts.values().map(|part| part.arrival_s).sum::<f64>() / orders.parts.len().max(1) as f64;
         stage.obey(orders);
         stage
     }
@@ -188,8 +193,20 @@ impl Stage {
         let cost = objective.cost(energy_j, end_s);
         let good = cruise_s.is_some() && self.safe;
         let pass_s = self.pass_s.unwrap_or(elapsed_s);
-        let over = cruise_s.is_some() || elapsed_s >= HORIZON_S || cost > limit;
-        over.then_some(Forecast { good, cost, energy_j, end_s, pass_s })
+        let least_s = self.least_rest_s();
+        let least = objective.cost(self.energy_j + count * power_w(CHEAPEST_MPS) * least_s, elapsed_s + least_s);
+        let over = cruise_s.is_some() || elapsed_s >= HORIZON_S || least > limit;
+        over.then_some(Forecast { good, cost, energy_j, end_s, pass_s, way_s: self.way_s })
+    }
+
+    /// The swarm cannot be where its mission ends before so long, s: so far has its middle still to go.
+    fn least_rest_s(&self) -> f64 {
+        let planner = &self.params.planner;
+        let fastest_mps = planner.speed_mps.max(self.params.guidance.reform_speed_max_mps);
+        let middle_m = |xs: &mut dyn Iterator<Item = f64>| xs.sum::<f64>() / self.bodies.len().max(1) as f64;
+        let end_m = middle_m(&mut end_slots(planner, self.bodies.len()).into_iter());
+        let here_m = middle_m(&mut self.bodies.iter().map(|(position, _)| position.x));
+        (end_m - here_m).max(0.0) / fastest_mps
     }
 
     /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
@@ -209,6 +226,15 @@ impl Stage {
         let rest_m = if velocity.x > 0.0 { (orders.plan.anchor_stop_x_m - place.x).max(0.0) } else { 0.0 };
         all.then(|| rest_m / velocity.x.max(1e-9))
     }
+}
+
+/// Abscissas of the slots in which so many drones end a mission, m.
+pub(crate) fn end_slots(planner: &PlannerParams, drones: usize) -> Vec<f64> {
+    let front_m = match planner.destination {
+        Destination::Hold { stop_x_m } => stop_x_m,
+        Destination::Goal { front_m } => front_m.x,
+    };
+    planner.shape.slots(drones, planner.spacing_m).iter().map(|slot| front_m + slot.x).collect()
 }
 
 impl SwarmPilot {

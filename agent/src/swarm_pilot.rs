@@ -95,9 +95,7 @@ impl SwarmPilot {
         }
         let alternatives = self.leading.decide(now, &self.silent, say);
         match self.params.planner.strategy {
-            Strategy::Rehearsed(objective)
-                if alternatives.len() > 1 && self.leading.living().len() <= MOST_MEMBERS =>
-            {
+            Strategy::Rehearsed(objective) if alternatives.len() > 1 && self.leading.living().len() <= MOST_MEMBERS => {
                 self.rehearse(Start { tick: own.tick, now, objective }, alternatives);
             }
             // Too many for a rehearsal: the rule's.
@@ -105,10 +103,10 @@ impl SwarmPilot {
         }
     }
 
-    /// Sends all on their shortest ways, in the groups they have, and begins to rehearse what else could be done.
+    /// Sends all on the ways to fly meanwhile, in the groups they have, and begins to rehearse what else could be done.
     fn rehearse(&mut self, start: Start, alternatives: Vec<Orders>) {
         let (members, scope) = (self.leading.members(), self.leading.election.scope());
-        let mut first = alternatives[0].clone();
+        let mut first = alternatives[self.leading.meanwhile()].clone();
         first.unsplit(members, scope);
         first.parts.retain(|&id, _| members.iter().any(|m| m.id == id));
         self.rehearsal = Some(Rehearsal::new(self, start, alternatives));

@@ -63,6 +63,7 @@ impl Planner {
     ) -> Option<Vec<Orders>> {
         let survey = self.survey(s, set)?;
         let others = self.others_before(s, set);
+        self.meanwhile = 0;
         if others.is_empty() {
             let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
             let groupings = self.choose(s.members, &survey)?;

@@ -226,6 +226,36 @@ mod tests {
     }
 
     #[test]
+    fn a_choice_counts_from_the_one_who_thinks_for_all_and_not_if_it_is_older() {
+        let mut council = Council::new(4, 0.2);
+        let choice =
+            |stamp_s| Arrivals { flags: ARRIVALS_CHOSEN, gate_s: one_of(1), routes: 3, ..row_of(2, stamp_s, 7) };
+        council.hear(at(1.1), &choice(1.0));
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
+        assert_eq!(council.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
+        assert!(council.heard.is_empty(), "a choice is no row of the table");
+    }
+
+    #[test]
+    fn a_choice_is_repeated_for_a_while() {
+        let mut council = Council::new(4, 0.2);
+        council.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
+        let mut said = Vec::new();
+        for tick in 0..100 {
+            council.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
+        }
+        assert!((5..=7).contains(&said.len()), "{}", said.len());
+    }
+
+    fn one_of(route: usize) -> [f32; MAX_ROUTES] {
+        let mut gate_s = [f32::INFINITY; MAX_ROUTES];
+        gate_s[route] = 3.0;
+        gate_s
+    }
+
+    #[test]
     fn rows_of_strangers_from_the_future_and_to_nowhere_are_refused() {
         let mut council = Council::new(4, 0.2);
         asking(&mut council, 1.0);

@@ -12,6 +12,9 @@ use skein_protocol::payload::{ARRIVALS_CHOSEN, Arrivals, Assignment, set_tag};
 use skein_protocol::{Ballot, DroneId, ObstacleId, SimTime};
 use std::collections::BTreeMap;
 
+/// While one thinks, all fly their shortest ways, or the rule's if those save this share of the last drone's time: groups
+/// meet before the same set when they are near it, and then a second on the wrong way cannot be made up for.
+const WORTH_UNREHEARSED: f64 = 0.2;
 /// What another leader chose is waited for so long, s; the air's delay comes on top, both ways. It thinks for a second.
 const PATIENCE_S: f64 = 2.0;
 
@@ -42,15 +45,18 @@ impl Planner {
         let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
         let union = self.table(&arrivals, survey.routes.count())?;
         let thinker = first_leader(&table)?;
+        let start_s = table.iter().map(|row| row.stamp.since(SimTime::ZERO)).fold(f64::INFINITY, f64::min);
+        let (shortest, rule) = (union.shortest(), union.split());
+        let saves = rule.makespan_s - start_s <= (1.0 - WORTH_UNREHEARSED) * (shortest.makespan_s - start_s);
         let splits = match self.params.strategy {
-            Strategy::ShortestPath => vec![union.shortest()],
+            Strategy::ShortestPath => vec![shortest],
             Strategy::Rehearsed(_) if thinker == s.ballot.claimant => {
                 let all = || s.members.iter().chain(s.others);
                 let lateral_m = |row: &Arrivals| all().find(|m| m.id == row.drone).map_or(0.0, |m| m.position.y);
                 candidates(&union, &table.iter().map(lateral_m).collect::<Vec<_>>(), survey.routes.count())
             }
-            Strategy::Rehearsed(_) => vec![union.shortest()],
-            Strategy::CongestionAware | Strategy::Fixed { .. } => vec![union.split()],
+            Strategy::Rehearsed(_) if !saves => vec![shortest],
+            Strategy::Rehearsed(_) | Strategy::CongestionAware | Strategy::Fixed { .. } => vec![rule],
         };
         let rehearsed = matches!(self.params.strategy, Strategy::Rehearsed(_));
         let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
@@ -64,7 +70,8 @@ impl Planner {
             }
             orders
         };
-        let all = splits.iter().map(orders).collect();
+        let all: Vec<Orders> = splits.iter().map(orders).collect();
+        self.meanwhile = usize::from(saves && all.len() > 1);
         let kept = s.members.iter().zip(&survey.kept).filter_map(|(m, part)| Some((m.id, *(*part)?))).collect();
         let waits = rehearsed && thinker != s.ballot.claimant;
         let joint = Joint { set: set.to_vec(), ballot: s.ballot, since: s.now, thinker, table, kept, replan };
@@ -110,7 +117,8 @@ impl Planner {
 
 /// The leader of the drone that can be at the gate first.
 fn first_leader(table: &[Arrivals]) -> Option<DroneId> {
-    let soonest = |row: &Arrivals| arrivals_s(row).into_iter().filter(|s| s.abs() < NEVER_S).fold(f64::INFINITY, f64::min);
+    let soonest =
+        |row: &Arrivals| arrivals_s(row).into_iter().filter(|s| s.abs() < NEVER_S).fold(f64::INFINITY, f64::min);
     let first = table.iter().min_by(|a, b| soonest(a).total_cmp(&soonest(b)).then(a.drone.cmp(&b.drone)))?;
     Some(first.ballot.claimant)
 }

@@ -239,14 +239,21 @@ impl Leading {
         }
         let mine = self.key(own.position, self.me);
         let (scope, suspect) = (self.election.scope(), self.election.obeyed());
-        let rivals =
-            self.living_peers(now).filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
+        let rivals = self
+            .living_peers(now)
+            .filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
         rivals.filter(|m| self.key(m.position, m.id) < mine).count()
     }
 
     /// Order of claims: by distance to the destination, ties by id.
     pub(crate) fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
         (self.planner.params.destination.distance_m(position), id)
+    }
+
+    /// Which of the alternatives decided on last is to be flown while this leader thinks.
+    #[must_use]
+    pub fn meanwhile(&self) -> usize {
+        self.planner.meanwhile
     }
 
     /// What a leader decides now: nothing, orders, or alternatives. `silent`: where drones that fell silent may hang, m.

@@ -147,6 +147,8 @@ pub struct Planner {
     pub(crate) reform: Reform,
     pub(crate) council: Council,
     pub(crate) joint: Option<Joint>,
+    /// Which of the alternatives decided on last is flown while a leader thinks.
+    pub(crate) meanwhile: usize,
 }
 
 /// What is to be decided.
@@ -163,7 +165,7 @@ impl Planner {
     /// A planner that has decided nothing yet, in a swarm of `drones`; questions are repeated every `repeat_s`.
     #[must_use]
     pub fn new(params: PlannerParams, drones: u32, repeat_s: f64) -> Self {
-        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s), joint: None }
+        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s), joint: None, meanwhile: 0 }
     }
 
     /// Hears when a drone of another group can be where.
