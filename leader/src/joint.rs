@@ -1,5 +1,5 @@
 //! Several groups before one obstacle set. Their leaders split one table, so that their queues are one. To rehearse takes
-//! one mind: the leader of the group that is there first thinks for all, the others wait for what it chose, on the
+//! one mind: the leader of the oldest term thinks for all, the others wait for what it chose, on the
 //! shortest ways, and stay on them if they do not hear of it.
 
 use crate::avoid::{Grouping, Survey, ranks};
@@ -7,7 +7,7 @@ use crate::candidates::candidates;
 use crate::council::{self, arrivals_s};
 use crate::ledger::Orders;
 use crate::planner::{Planner, Situation, Strategy};
-use crate::split::{NEVER_S, Split};
+use crate::split::Split;
 use skein_protocol::payload::{ARRIVALS_CHOSEN, Arrivals, Assignment, set_tag};
 use skein_protocol::{Ballot, DroneId, ObstacleId, SimTime};
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ impl Planner {
     ) -> Option<Vec<Orders>> {
         let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
         let union = self.table(&arrivals, survey.routes.count())?;
-        let thinker = first_leader(&table)?;
+        let thinker = thinker(&table)?;
         let start_s = table.iter().map(|row| row.stamp.since(SimTime::ZERO)).fold(f64::INFINITY, f64::min);
         let (shortest, rule) = (union.shortest(), union.split());
         let saves = rule.makespan_s - start_s <= (1.0 - WORTH_UNREHEARSED) * (shortest.makespan_s - start_s);
@@ -85,7 +85,11 @@ impl Planner {
         if joint.ballot != s.ballot || s.now.since(joint.since) > PATIENCE_S + 2.0 * s.delay_s {
             return None;
         }
-        let choice = |row: &Arrivals| self.council.chosen(row.drone, set_tag(&joint.set), joint.thinker, joint.since);
+        // Who has but one way left needs no choice, and who thinks may not have asked about it.
+        let choice = |row: &Arrivals| {
+            let heard = self.council.chosen(row.drone, set_tag(&joint.set), joint.thinker, joint.since);
+            heard.or_else(|| only_route(row))
+        };
         let Some(routes) = joint.table.iter().map(choice).collect::<Option<Vec<usize>>>() else {
             self.joint = Some(joint);
             return None;
@@ -115,12 +119,16 @@ impl Planner {
     }
 }
 
-/// The leader of the drone that can be at the gate first.
-fn first_leader(table: &[Arrivals]) -> Option<DroneId> {
-    let soonest =
-        |row: &Arrivals| arrivals_s(row).into_iter().filter(|s| s.abs() < NEVER_S).fold(f64::INFINITY, f64::min);
-    let first = table.iter().min_by(|a, b| soonest(a).total_cmp(&soonest(b)).then(a.drone.cmp(&b.drone)))?;
-    Some(first.ballot.claimant)
+/// The leader who thinks for all: that of the oldest term. Two leaders may both count a drone as theirs, and each knows
+/// its own row of it; the terms in the table are the same for all.
+fn thinker(table: &[Arrivals]) -> Option<DroneId> {
+    table.iter().map(|row| row.ballot).min().map(|ballot| ballot.claimant)
+}
+
+/// The route of a drone that has no choice.
+fn only_route(row: &Arrivals) -> Option<usize> {
+    let mut open = (0..row.routes as usize).filter(|&route| row.gate_s[route].is_finite());
+    open.next().filter(|_| open.next().is_none())
 }
 
 /// Of a split of the table the part that is about the members.
