@@ -1,6 +1,6 @@
 //! Several groups before one obstacle set. Their leaders split one table, so that their queues are one. To rehearse takes
-//! one mind: the leader of the oldest term thinks for all, the others wait for what it chose, on the
-//! shortest ways, and stay on them if they do not hear of it.
+//! one mind: the leader of the oldest term thinks for all. The others fly on and wait for what it chose; if they do not hear
+//! of it, they stay on the ways they fly.
 
 use crate::avoid::{Grouping, Survey, ranks};
 use crate::candidates::candidates;
@@ -127,7 +127,8 @@ fn thinker(table: &[Arrivals]) -> Option<DroneId> {
 
 /// The route of a drone that has no choice.
 fn only_route(row: &Arrivals) -> Option<usize> {
-    let mut open = (0..row.routes as usize).filter(|&route| row.gate_s[route].is_finite());
+    let finite = row.gate_s.iter().take(row.routes as usize).enumerate().filter(|(_, s)| s.is_finite());
+    let mut open = finite.map(|(route, _)| route);
     open.next().filter(|_| open.next().is_none())
 }
 
