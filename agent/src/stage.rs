@@ -6,11 +6,11 @@ use crate::pilot::{Heard, Pilot};
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::geometry::nearest;
 use skein_leader::ledger::{Ledger, Orders};
-use skein_leader::planner::{Destination, Member, Objective, Strategy};
+use skein_leader::planner::{Destination, Member, Objective, PlannerParams, Strategy};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
-use skein_protocol::energy::power_w;
-use skein_protocol::payload::PHASE_AVOID;
-use skein_protocol::{DroneId, Message, SimTime, Vec2};
+use skein_protocol::energy::{CHEAPEST_MPS, power_w};
+use skein_protocol::payload::{PHASE_AVOID, QueuePlace};
+use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
 
 /// A rehearsal that takes longer has failed, s.
 const HORIZON_S: f64 = 200.0;
@@ -34,6 +34,8 @@ pub struct Forecast {
     pub end_s: f64,
     /// From the decision until the last drone passed the gate, s.
     pub pass_s: f64,
+    /// Way to the gate in free flight, s: a mean over the drones.
+    pub way_s: f64,
 }
 
 /// Understudies and their bodies.
@@ -52,36 +54,53 @@ pub struct Stage {
     said: Vec<Heard>,
     energy_j: f64,
     pass_s: Option<f64>,
+    way_s: f64,
     safe: bool,
 }
 
 impl Stage {
-    /// The members as their leader knows them, who has orders of which they do not yet know. `(tick, now, step_s)`:
+    /// A crew as a leader knows it, all of them one group that it leads, flying by these orders. `(tick, now, step_s)`:
     /// number and time of the first step and the length of all, s; `thinking`: steps until the decision.
     #[must_use]
     pub fn new(
         leader: &SwarmPilot,
-        before: &Ledger,
-        members: &[Member],
+        crew: &[Member],
+        orders: &Orders,
         (tick, now, step_s): (u64, SimTime, f64),
         thinking: u64,
     ) -> Self {
-        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, before);
-        let gate_x_m = leader.leading.ledger.sets().last().map_or(f64::NEG_INFINITY, |set| set.routes.gate_x_m());
-        Self {
+        let ledger = leader.united_ledger(now);
+        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, &ledger);
+        let mut stage = Self {
             params: leader.params.clone(),
             step_s,
             start: now,
             now,
             tick,
             thinking,
-            gate_x_m,
-            pilots: members.iter().map(understudy).collect(),
-            bodies: members.iter().map(|member| (member.position, member.velocity)).collect(),
+            gate_x_m: f64::NEG_INFINITY,
+            pilots: crew.iter().map(understudy).collect(),
+            bodies: crew.iter().map(|member| (member.position, member.velocity)).collect(),
             said: Vec::new(),
             energy_j: 0.0,
             pass_s: None,
+            way_s: 0.0,
             safe: true,
+        };
+        stage.obey(orders);
+        let sets = stage.pilots.iter().flat_map(|pilot| pilot.leading.ledger.sets());
+        stage.gate_x_m = sets.map(|set| set.routes.gate_x_m()).fold(f64::NEG_INFINITY, f64::max);
+        stage
+    }
+
+    /// All obey these orders at once: what is on the air for a tick or two makes no difference.
+    fn obey(&mut self, orders: &Orders) {
+        let newest = self.pilots.iter().map(|pilot| pilot.leading.ledger.newest()).max().unwrap_or_default();
+        let mut orders = orders.clone();
+        orders.plan.stamp = self.now;
+        orders.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
+        for pilot in &mut self.pilots {
+            pilot.leading.obey(self.now, orders.clone());
         }
     }
 
@@ -95,10 +114,8 @@ impl Stage {
     #[must_use]
     pub fn under(&self, orders: &Orders) -> Self {
         let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
-        let me = self.params.me;
-        if let Some(leader) = stage.pilots.iter_mut().find(|pilot| pilot.params.me == me) {
-            leader.leading.adopt(stage.now, orders.clone());
-        }
+        stage.way_s = orders.parts.values().map(|part| part.arrival_s).sum::<f64>() / orders.parts.len().max(1) as f64;
+        stage.obey(orders);
         stage
     }
 
@@ -176,8 +193,20 @@ impl Stage {
         let cost = objective.cost(energy_j, end_s);
         let good = cruise_s.is_some() && self.safe;
         let pass_s = self.pass_s.unwrap_or(elapsed_s);
-        let over = cruise_s.is_some() || elapsed_s >= HORIZON_S || cost > limit;
-        over.then_some(Forecast { good, cost, energy_j, end_s, pass_s })
+        let least_s = self.least_rest_s();
+        let least = objective.cost(self.energy_j + count * power_w(CHEAPEST_MPS) * least_s, elapsed_s + least_s);
+        let over = cruise_s.is_some() || elapsed_s >= HORIZON_S || least > limit;
+        over.then_some(Forecast { good, cost, energy_j, end_s, pass_s, way_s: self.way_s })
+    }
+
+    /// The swarm cannot be where its mission ends before so long, s: so far has its middle still to go.
+    fn least_rest_s(&self) -> f64 {
+        let planner = &self.params.planner;
+        let fastest_mps = planner.speed_mps.max(self.params.guidance.reform_speed_max_mps);
+        let middle_m = |xs: &mut dyn Iterator<Item = f64>| xs.sum::<f64>() / self.bodies.len().max(1) as f64;
+        let end_m = middle_m(&mut end_slots(planner, self.bodies.len()).into_iter());
+        let here_m = middle_m(&mut self.bodies.iter().map(|(position, _)| position.x));
+        (end_m - here_m).max(0.0) / fastest_mps
     }
 
     /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
@@ -199,16 +228,32 @@ impl Stage {
     }
 }
 
+/// Abscissas of the slots in which so many drones end a mission, m.
+pub(crate) fn end_slots(planner: &PlannerParams, drones: usize) -> Vec<f64> {
+    let front_m = match planner.destination {
+        Destination::Hold { stop_x_m } => stop_x_m,
+        Destination::Goal { front_m } => front_m.x,
+    };
+    planner.shape.slots(drones, planner.spacing_m).iter().map(|slot| front_m + slot.x).collect()
+}
+
 impl SwarmPilot {
-    /// A member of this leader's group as the leader knows it, to be stepped every `dt_s`; it has heard what the ledger
-    /// `before` holds.
-    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, before: &Ledger) -> Self {
+    /// What this leader knows of plans, and of what others fly, as if all were one group.
+    fn united_ledger(&self, now: SimTime) -> Ledger {
+        let living = self.leading.peers.living(now);
+        let places = living.flat_map(|(id, pose)| pose.queue.into_iter().map(move |place| (id, place)));
+        let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
+        self.leading.ledger.united(self.leading.first_term(), &flown)
+    }
+
+    /// A drone as this leader knows it, to be stepped every `dt_s`.
+    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
         let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
         params.safety.dt_s = dt_s;
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // In the mind nothing is rehearsed again.
         params.planner.strategy = Strategy::CongestionAware;
-        let leading = self.leading.of_member(&params.leading(), now, before);
+        let leading = self.leading.of_crew(&params.leading(), now, ledger.of_member(me));
         let mut study = Self::new(params);
         study.leading = leading;
         study

@@ -95,9 +95,7 @@ impl SwarmPilot {
         }
         let alternatives = self.leading.decide(now, &self.silent, say);
         match self.params.planner.strategy {
-            Strategy::Rehearsed(objective)
-                if alternatives.len() > 1 && self.leading.members().len() <= MOST_MEMBERS =>
-            {
+            Strategy::Rehearsed(objective) if alternatives.len() > 1 && self.leading.living().len() <= MOST_MEMBERS => {
                 self.rehearse(Start { tick: own.tick, now, objective }, alternatives);
             }
             // Too many for a rehearsal: the rule's.
@@ -105,16 +103,14 @@ impl SwarmPilot {
         }
     }
 
-    /// Sends all on their shortest ways, in the groups they have, and begins to rehearse what else could be done.
+    /// Sends all on the ways to fly meanwhile, in the groups they have, and begins to rehearse what else could be done.
     fn rehearse(&mut self, start: Start, alternatives: Vec<Orders>) {
-        let before = self.leading.ledger.clone();
-        let members = self.leading.members().to_vec();
-        let mut first = alternatives[0].clone();
-        let scope = self.leading.election.scope();
-        let current = |id| members.iter().find(|m| m.id == id).map(|m| m.group).filter(|group| scope.contains(*group));
-        first.parts.iter_mut().for_each(|(&id, part)| part.group = current(id).unwrap_or(scope));
+        let (members, scope) = (self.leading.members(), self.leading.election.scope());
+        let mut first = alternatives[self.leading.meanwhile()].clone();
+        first.unsplit(members, scope);
+        first.parts.retain(|&id, _| members.iter().any(|m| m.id == id));
+        self.rehearsal = Some(Rehearsal::new(self, start, alternatives));
         self.leading.adopt(start.now, first);
-        self.rehearsal = Some(Rehearsal::new(self, &before, &members, start, alternatives));
     }
 
     /// Where drones that fell silent hang by now: their last beacon, and how far they took to stop.

@@ -2,22 +2,22 @@
 
 use crate::candidates::candidates;
 use crate::cost::{Flight, Trip, shortest, trips};
-use crate::council::{self, arrivals_s};
+use crate::council;
 use crate::ledger::{Ledger, Orders, PlannedSet};
 use crate::planner::{Member, Planner, Situation, Strategy};
 use crate::routes::Routes;
 use crate::split::{Split, Table};
 use skein_protocol::payload::{Arrivals, Assignment, PHASE_AVOID, Plan, set_tag};
-use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime, Vec2};
+use skein_protocol::{GroupId, ObstacleId, Vec2};
 use std::collections::BTreeMap;
 
 /// What a plan for a set is made of.
-struct Survey<'a> {
-    routes: Routes,
+pub(crate) struct Survey<'a> {
+    pub routes: Routes,
     /// The ways of each member, one a route.
     ways: Vec<Vec<Trip>>,
     /// The parts of members who have one already.
-    kept: Vec<Option<&'a Assignment>>,
+    pub kept: Vec<Option<&'a Assignment>>,
 }
 
 impl Survey<'_> {
@@ -44,21 +44,17 @@ impl Survey<'_> {
     }
 }
 
-/// Several groups together cannot rehearse what they do: the rule's grouping has to undercut the shortest ways by this
-/// share of the time that the last drone takes.
-const WORTH_UNREHEARSED: f64 = 0.2;
-
 /// A grouping of the members: the route of each and its place in the queue there, and when the last one passes.
-struct Grouping {
-    chosen: Vec<usize>,
-    ranks: Vec<u16>,
-    predicted_s: f64,
+pub(crate) struct Grouping {
+    pub chosen: Vec<usize>,
+    pub ranks: Vec<u16>,
+    pub predicted_s: f64,
 }
 
 impl Planner {
     /// Divides the members over the routes past a set. Those who fly it already, or are past its gate, keep their way.
-    /// One grouping, or the few that are worth a rehearsal, the shortest ways first, the rule's second; with other groups before the same set, one grouping of all
-    /// of them, once their leaders have said what they know.
+    /// One grouping, or the few that are worth a rehearsal, the shortest ways first, the rule's second; with other groups
+    /// before the same set groupings of all of them, once their leaders have said what they know.
     pub(crate) fn avoid(
         &mut self,
         s: &Situation<'_>,
@@ -67,20 +63,21 @@ impl Planner {
     ) -> Option<Vec<Orders>> {
         let survey = self.survey(s, set)?;
         let others = self.others_before(s, set);
-        let groupings = if others.is_empty() {
-            self.choose(s.members, &survey)?
-        } else {
-            let tag = set_tag(set);
-            let rows = || (0..s.members.len()).map(|i| row(s, &survey, tag, i)).collect();
-            self.council.ask(s.now, tag, rows, say);
-            let table = self.council.answer(s.now, &others, survey.routes.count(), s.delay_s)?;
-            self.council.close(s.now, say);
-            vec![self.choose_jointly(s, &table, &survey)?]
-        };
-        Some(groupings.iter().map(|grouping| self.orders(s, set, &survey, grouping)).collect())
+        self.meanwhile = 0;
+        if others.is_empty() {
+            let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
+            let groupings = self.choose(s.members, &survey)?;
+            return Some(groupings.iter().map(|grouping| self.orders(s, set, &survey, grouping, replan)).collect());
+        }
+        let tag = set_tag(set);
+        let rows = || (0..s.members.len()).map(|i| row(s, &survey, tag, i)).collect();
+        self.council.ask(s.now, tag, rows, say);
+        let table = self.council.answer(s.now, &others, survey.routes.count(), s.delay_s)?;
+        self.council.close(s.now, say);
+        self.together(s, set, table, &survey)
     }
 
-    fn survey<'a>(&self, s: &Situation<'a>, set: &[ObstacleId]) -> Option<Survey<'a>> {
+    pub(crate) fn survey<'a>(&self, s: &Situation<'a>, set: &[ObstacleId]) -> Option<Survey<'a>> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &self.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
         let flight = Flight { speed_mps: self.params.speed_mps, course_y_m: self.params.course_y_m };
@@ -96,9 +93,16 @@ impl Planner {
         (0..s.members.len()).map(|i| row(s, &survey, planned.tag, i)).collect()
     }
 
-    fn orders(&self, s: &Situation<'_>, set: &[ObstacleId], survey: &Survey<'_>, grouping: &Grouping) -> Orders {
+    /// Orders for the members; `replan`: the set was planned for before.
+    pub(crate) fn orders(
+        &self,
+        s: &Situation<'_>,
+        set: &[ObstacleId],
+        survey: &Survey<'_>,
+        grouping: &Grouping,
+        replan: bool,
+    ) -> Orders {
         let Grouping { chosen, ranks, predicted_s } = grouping;
-        let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
         let groups = groups(s, chosen, &survey.kept, replan);
         let plan = Plan {
             predicted_s: *predicted_s,
@@ -154,36 +158,8 @@ impl Planner {
         splits.into_iter().map(grouping).collect()
     }
 
-    /// The one grouping of all drones in `table`, of which the members' part is taken: every leader that knows the same
-    /// rows comes to the same.
-    fn choose_jointly(&self, s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>) -> Option<Grouping> {
-        let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
-        let union = self.table(&arrivals, survey.routes.count())?;
-        let shortest = union.shortest();
-        // Without a rehearsal the rule has to save so much that waiting and detours cannot undo it.
-        let start_s = table.iter().map(|row| row.stamp.since(SimTime::ZERO)).fold(f64::INFINITY, f64::min);
-        let worth =
-            |rule: &Split| rule.makespan_s - start_s <= (1.0 - WORTH_UNREHEARSED) * (shortest.makespan_s - start_s);
-        let split = match self.params.strategy {
-            Strategy::ShortestPath => shortest,
-            Strategy::Rehearsed(_) => Some(union.split()).filter(worth).unwrap_or(shortest),
-            Strategy::CongestionAware | Strategy::Fixed { .. } => union.split(),
-        };
-        let own = |drone: DroneId| s.members.binary_search_by_key(&drone, |m| m.id).ok();
-        let kept: Vec<Option<u16>> =
-            table.iter().map(|row| own(row.drone).and_then(|i| survey.kept[i]).map(|part| part.rank)).collect();
-        let places = ranks(&split.routes, &arrivals, &kept);
-        let (mut chosen, mut ranks) = (vec![0; s.members.len()], vec![0; s.members.len()]);
-        for (row, (route, rank)) in table.iter().zip(split.routes.iter().zip(places)) {
-            if let Some(i) = own(row.drone) {
-                (chosen[i], ranks[i]) = (*route, rank);
-            }
-        }
-        Some(Grouping { chosen, ranks, predicted_s: split.makespan_s - s.now.since(SimTime::ZERO) })
-    }
-
     /// `None` only for arrivals that are no numbers, which finite positions do not have.
-    fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
+    pub(crate) fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
         Table::new(arrivals, &vec![self.params.headway_s; routes]).ok()
     }
 }
@@ -205,7 +181,7 @@ fn earlier_legs<'a>(ledger: &'a Ledger, member: &Member, routes: &Routes) -> Vec
 }
 
 /// Place of each member in the queue of its route: those with a place keep their order, the others follow by arrival.
-fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<u16>]) -> Vec<u16> {
+pub(crate) fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<u16>]) -> Vec<u16> {
     let mut order: Vec<usize> = (0..chosen.len()).collect();
     let place = |i: usize| kept[i].unwrap_or(u16::MAX);
     let arrival = |i: usize| arrivals[i][chosen[i]];

@@ -2,12 +2,23 @@
 //! applies the part about its own members.
 
 use crate::split::NEVER_S;
-use skein_protocol::payload::{ARRIVALS_ASK, Arrivals, MAX_ROUTES};
+use skein_protocol::payload::{ARRIVALS_ASK, ARRIVALS_CHOSEN, Arrivals, MAX_ROUTES};
 use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
 
 /// A leader that hears nothing of the others for so long plans alone, s; the air's delay comes on top, both ways.
 pub const PATIENCE_S: f64 = 0.3;
+
+/// What was chosen for other groups is repeated for so long, s.
+const ANNOUNCE_S: f64 = 1.0;
+
+/// What is said again and again for a while.
+#[derive(Clone, Debug, PartialEq)]
+struct Announcement {
+    until: SimTime,
+    next_said: SimTime,
+    rows: Vec<Arrivals>,
+}
 
 /// A question that is open: this drone waits for the rows of others.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +35,9 @@ pub struct Council {
     drones: u32,
     repeat_s: f64,
     heard: BTreeMap<DroneId, Arrivals>,
+    /// What one leader chose for all.
+    chosen: BTreeMap<DroneId, Arrivals>,
+    announced: Option<Announcement>,
     question: Option<Question>,
     /// The set that somebody else asked about last, and when this drone may answer again.
     asked: Option<u32>,
@@ -34,7 +48,16 @@ impl Council {
     /// Nothing heard, in a swarm of `drones`; what has to be repeated is repeated every `repeat_s`.
     #[must_use]
     pub fn new(drones: u32, repeat_s: f64) -> Self {
-        Self { drones, repeat_s, heard: BTreeMap::new(), question: None, asked: None, next_answer: SimTime::ZERO }
+        Self {
+            drones,
+            repeat_s,
+            heard: BTreeMap::new(),
+            chosen: BTreeMap::new(),
+            announced: None,
+            question: None,
+            asked: None,
+            next_answer: SimTime::ZERO,
+        }
     }
 
     /// Hears a row. One that is older than what is known, from the future, of nobody in the swarm, or of a drone that
@@ -47,7 +70,8 @@ impl Council {
         if row.flags & ARRIVALS_ASK != 0 {
             self.asked = Some(row.set);
         }
-        let known = self.heard.entry(row.drone).or_insert(*row);
+        let rows = if row.flags & ARRIVALS_CHOSEN != 0 { &mut self.chosen } else { &mut self.heard };
+        let known = rows.entry(row.drone).or_insert(*row);
         if row.stamp >= known.stamp {
             *known = *row;
         }
@@ -90,6 +114,28 @@ impl Council {
             self.asked = None;
             say.extend(question.rows);
         }
+    }
+
+    /// Says for a while what was chosen for all.
+    pub fn announce(&mut self, now: SimTime, rows: Vec<Arrivals>) {
+        self.announced = Some(Announcement { until: now.after(ANNOUNCE_S), next_said: now, rows });
+    }
+
+    /// Says again what is due.
+    pub fn repeat(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
+        let Some(announcement) = self.announced.as_mut().filter(|one| now <= one.until) else { return };
+        if now >= announcement.next_said {
+            announcement.next_said = now.after(self.repeat_s);
+            say.extend(&announcement.rows);
+        }
+    }
+
+    /// The route past a set that this leader has chosen for a drone since then, if it was heard.
+    #[must_use]
+    pub fn chosen(&self, drone: DroneId, set: u32, leader: DroneId, since: SimTime) -> Option<usize> {
+        let row = self.chosen.get(&drone)?;
+        let meant = row.set == set && row.ballot.claimant == leader && row.stamp >= since;
+        row.gate_s.iter().take(row.routes as usize).position(|s| s.is_finite()).filter(|_| meant)
     }
 
     /// The set that another leader asked about, if an answer is due.
@@ -177,6 +223,36 @@ mod tests {
         assert_eq!(council.asked(at(1.0)), Some(7));
         council.hear(at(1.1), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.1, 7) });
         assert_eq!((council.asked(at(1.1)), council.asked(at(1.2))), (None, Some(7)));
+    }
+
+    #[test]
+    fn a_choice_counts_from_the_one_who_thinks_for_all_and_not_if_it_is_older() {
+        let mut council = Council::new(4, 0.2);
+        let choice =
+            |stamp_s| Arrivals { flags: ARRIVALS_CHOSEN, gate_s: one_of(1), routes: 3, ..row_of(2, stamp_s, 7) };
+        council.hear(at(1.1), &choice(1.0));
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
+        assert_eq!(council.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
+        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
+        assert!(council.heard.is_empty(), "a choice is no row of the table");
+    }
+
+    #[test]
+    fn a_choice_is_repeated_for_a_while() {
+        let mut council = Council::new(4, 0.2);
+        council.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
+        let mut said = Vec::new();
+        for tick in 0..100 {
+            council.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
+        }
+        assert!((5..=7).contains(&said.len()), "{}", said.len());
+    }
+
+    fn one_of(route: usize) -> [f32; MAX_ROUTES] {
+        let mut gate_s = [f32::INFINITY; MAX_ROUTES];
+        gate_s[route] = 3.0;
+        gate_s
     }
 
     #[test]

@@ -99,22 +99,26 @@ impl Leading {
         }
     }
 
-    /// The machine that a member would have, had it heard what this leader has heard, but of plans only what the ledger
-    /// `before` holds; of this drone itself the machine as it is.
+    /// The term in which this drone would lead all, had nobody led before.
     #[must_use]
-    pub fn of_member(&self, params: &LeadingParams, now: SimTime, before: &Ledger) -> Self {
+    pub fn first_term(&self) -> Ballot {
+        Ballot { round: 1, incarnation: self.incarnation, claimant: self.me }
+    }
+
+    /// The machine of a drone that knows what this one knows, and of plans this ledger, were all drones one group that
+    /// this one leads in its [`Self::first_term`].
+    #[must_use]
+    pub fn of_crew(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
         let mut study = Self::new(params);
         study.obstacles = self.obstacles.clone();
         study.peers = self.peers.clone();
         study.peers.forget(params.me);
-        if params.me == self.me {
-            study.ledger = self.ledger.clone();
-            study.election = self.election.clone();
-        } else {
-            study.ledger = before.of_member(params.me);
-            let (ballot, scope) = (self.election.obeyed(), self.election.scope());
-            study.election.handle(now, 0, Input::Sign { ballot, scope, named: true });
-        }
+        study.peers.unite(ledger.stamp());
+        study.ledger = ledger;
+        let (ballot, scope) = (self.first_term(), GroupId::ALL);
+        let leads = Input::Claim(scope);
+        let follows = Input::Sign { ballot, scope, named: true };
+        study.election.handle(now, 0, if params.me == self.me { leads } else { follows });
         study.join(now);
         study
     }
@@ -247,14 +251,21 @@ impl Leading {
         }
         let mine = (self.impaired, self.key(own.position, self.me));
         let (scope, suspect) = (self.election.scope(), self.election.obeyed());
-        let rivals =
-            self.living(now).filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
+        let rivals = self
+            .living_peers(now)
+            .filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
         rivals.filter(|m| (!self.is_sound(m.id), self.key(m.position, m.id)) < mine).count()
     }
 
     /// Order of claims: by distance to the destination, ties by id.
     pub(crate) fn key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
         (self.planner.params.destination.distance_m(position), id)
+    }
+
+    /// Which of the alternatives decided on last is to be flown while this leader thinks.
+    #[must_use]
+    pub fn meanwhile(&self) -> usize {
+        self.planner.meanwhile
     }
 
     /// What a leader decides now: nothing, orders, or alternatives. `silent`: where drones that fell silent may hang, m.
@@ -276,8 +287,16 @@ impl Leading {
         orders
     }
 
-    /// Takes up orders of one's own making, and tells them at once.
-    pub fn adopt(&mut self, now: SimTime, orders: Orders) {
+    /// Takes up orders of one's own making, and tells them at once; what they say of other groups, to their leaders.
+    pub fn adopt(&mut self, now: SimTime, mut orders: Orders) {
+        let members = &self.members;
+        let own = |id: DroneId| members.iter().any(|m| m.id == id);
+        self.planner.tell_chosen(now, &mut orders, own);
+        self.obey(now, orders);
+    }
+
+    /// Takes up orders that it obeys, whoever made them.
+    pub fn obey(&mut self, now: SimTime, orders: Orders) {
         self.ledger.adopt(orders, &self.obstacles);
         self.join(now);
         self.talk.hurry();

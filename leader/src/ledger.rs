@@ -2,10 +2,12 @@
 //! ledger serves the one who obeys and the one who plans; a new leader continues from its own.
 
 use crate::obstacles::{Obstacles, set_ids};
+use crate::planner::Member;
 use crate::routes::{RouteParams, Routes};
+use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, set_tag};
-use skein_protocol::{DroneId, GroupId, ObstacleId, PlanStamp};
+use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, QueuePlace, set_tag};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use std::collections::BTreeMap;
 
 /// A plan and everybody's part in it, as its leader made it.
@@ -15,6 +17,24 @@ pub struct Orders {
     pub plan: Plan,
     /// One part a member, by id.
     pub parts: BTreeMap<DroneId, Assignment>,
+}
+
+impl Orders {
+    /// Leaves the members in the groups they have; who is of none within the scope, in that one.
+    pub fn unsplit(&mut self, members: &[Member], scope: GroupId) {
+        for member in members {
+            let group = if scope.contains(member.group) { member.group } else { scope };
+            self.parts.entry(member.id).and_modify(|part| part.group = group);
+        }
+    }
+
+    /// Makes these orders some for all drones as one group, under this stamp.
+    pub fn unite(&mut self, stamp: PlanStamp) {
+        (self.plan.id, self.plan.group) = (stamp, GroupId::ALL);
+        for part in self.parts.values_mut() {
+            (part.id, part.scope, part.group) = (stamp, GroupId::ALL, GroupId::ALL);
+        }
+    }
 }
 
 /// An obstacle set that is being passed: its routes, and who flies which.
@@ -75,6 +95,26 @@ impl Ledger {
         let mut ledger = Self { me, ..self.clone() };
         ledger.part_hash = ledger.hash_part();
         ledger
+    }
+
+    /// The ledger as if all drones were one group, and everything known had been planned in one term. `places`: what
+    /// drones are known to fly; it counts for those whose parts the newest plan does not give.
+    #[must_use]
+    pub fn united(&self, ballot: Ballot, places: &[(DroneId, QueuePlace)]) -> Self {
+        let mut all = Self { origin: None, ..self.clone() };
+        let given = |id: DroneId| self.parts.contains_key(&id);
+        for set in &mut all.sets {
+            (set.stamp.ballot, set.scope) = (ballot, GroupId::ALL);
+            for &(drone, place) in places.iter().filter(|(id, place)| place.set == set.tag && !given(*id)) {
+                let part = set.parts.entry(drone).or_insert(Assignment { drone, ..Assignment::zeroed() });
+                (part.route, part.rank) = (place.route, place.rank);
+            }
+        }
+        if let Some(orders) = &mut all.obeyed {
+            orders.unite(PlanStamp { ballot, ..orders.plan.id });
+        }
+        all.stamp.ballot = ballot;
+        all
     }
 
     /// The plan this drone obeys, with the parts it has heard of.

@@ -7,6 +7,7 @@ pub mod council;
 pub mod election;
 mod exchange;
 pub mod geometry;
+mod joint;
 pub mod leading;
 pub mod ledger;
 pub mod membership;

@@ -2,7 +2,7 @@
 
 use crate::rhythm::Rhythm;
 use skein_protocol::payload::Pose;
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
 
 /// Weight of a new delay in the running mean.
 const NOVELTY: f64 = 0.1;
@@ -86,6 +86,13 @@ impl Peers {
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.last.remove(place);
+        }
+    }
+
+    /// As if all peers were one group and obeyed this plan.
+    pub fn unite(&mut self, stamp: PlanStamp) {
+        for Peer { pose, .. } in &mut self.last {
+            (pose.group, pose.term, pose.obeyed) = (GroupId::ALL, stamp.ballot, stamp);
         }
     }
 

@@ -55,7 +55,7 @@ impl Leading {
     fn first_sound(&self, now: SimTime) -> Option<DroneId> {
         let scope = self.election.scope();
         let follows = |m: &Member| scope.contains(m.group) && self.term_of(m.id) == self.election.obeyed();
-        let sound = self.living(now).filter(|m| follows(m) && self.is_sound(m.id));
+        let sound = self.living_peers(now).filter(|m| follows(m) && self.is_sound(m.id));
         sound
             .map(|m| self.key(m.position, m.id))
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
@@ -71,7 +71,7 @@ impl Leading {
         let (mine_m, spacing_m) = (distance_m(own.position), self.planner.params.spacing_m);
         let slot_m = distance_m(anchor + Vec2::from(part.slot_m));
         let scope = self.election.scope();
-        let members = self.living(now).filter(|m| scope.contains(m.group));
+        let members = self.living_peers(now).filter(|m| scope.contains(m.group));
         if !self.ledger.sets().is_empty()
             || mine_m - slot_m <= spacing_m
             || !members.clone().all(|m| distance_m(m.position) < mine_m)
@@ -114,7 +114,7 @@ impl Leading {
 
     /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
     /// its beacon shows that it is on already or will not obey it.
-    pub(crate) fn living(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
+    pub(crate) fn living_peers(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
             let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
@@ -130,7 +130,7 @@ impl Leading {
     /// Living peers in this drone's part.
     fn kin(&self, now: SimTime, me: &Member) -> impl Iterator<Item = Member> + Clone {
         let group = me.group;
-        self.living(now).filter(move |m| group.contains(m.group))
+        self.living_peers(now).filter(move |m| group.contains(m.group))
     }
 
     /// Whether this drone has an obstacle ahead, or is to lead a part of which somebody has.
@@ -141,7 +141,7 @@ impl Leading {
     }
 
     fn all_have_ahead(&self, now: SimTime, me: &Member) -> bool {
-        self.planner.has_ahead(&self.obstacles, self.living(now).chain([*me]))
+        self.planner.has_ahead(&self.obstacles, self.living_peers(now).chain([*me]))
     }
 
     /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
@@ -167,7 +167,7 @@ impl Leading {
         members.clear();
         others.clear();
         members.push(self.myself(own));
-        for peer in self.living(now) {
+        for peer in self.living_peers(now) {
             if scope.contains(peer.group) {
                 members.push(peer);
             } else if peer.group.contains(scope) && self.term_of(peer.id) <= self.election.obeyed() {
@@ -195,6 +195,14 @@ impl Leading {
     /// The term that a peer obeys, by its last beacon.
     fn term_of(&self, peer: DroneId) -> Ballot {
         self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
+    }
+
+    /// All living drones, by id, as of the last [`Self::muster`].
+    #[must_use]
+    pub fn living(&self) -> Vec<Member> {
+        let mut all: Vec<Member> = self.members.iter().chain(&self.others).copied().collect();
+        all.sort_by_key(|member| member.id);
+        all
     }
 
     /// The living members, by id, as of the last [`Self::muster`].

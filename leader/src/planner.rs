@@ -2,6 +2,7 @@
 //! senses or by messages.
 
 use crate::council::Council;
+use crate::joint::Joint;
 use crate::ledger::{Ledger, Orders, PlannedSet};
 use crate::obstacles::{Obstacles, set_array};
 use crate::reform::Reform;
@@ -145,6 +146,9 @@ pub struct Planner {
     pub(crate) params: PlannerParams,
     pub(crate) reform: Reform,
     pub(crate) council: Council,
+    pub(crate) joint: Option<Joint>,
+    /// Which of the alternatives decided on last is flown while a leader thinks.
+    pub(crate) meanwhile: usize,
 }
 
 /// What is to be decided.
@@ -161,7 +165,7 @@ impl Planner {
     /// A planner that has decided nothing yet, in a swarm of `drones`; questions are repeated every `repeat_s`.
     #[must_use]
     pub fn new(params: PlannerParams, drones: u32, repeat_s: f64) -> Self {
-        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s) }
+        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s), joint: None, meanwhile: 0 }
     }
 
     /// Hears when a drone of another group can be where.
@@ -175,6 +179,10 @@ impl Planner {
     pub fn decide(&mut self, s: &Situation<'_>, say: &mut Vec<Arrivals>) -> Vec<Orders> {
         if let Some(planned) = self.council.asked(s.now).and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag)) {
             say.extend(self.standing(s, planned));
+        }
+        self.council.repeat(s.now, say);
+        if let Some(orders) = self.chosen(s) {
+            return vec![orders];
         }
         match self.need(s) {
             Need::Plan(set) => {

@@ -18,6 +18,9 @@ const SOLIDITY: f64 = 0.05;
 /// Area of the rotor disc, m².
 const DISC_M2: f64 = 0.503;
 
+/// The speed of least power, m/s.
+pub const CHEAPEST_MPS: f64 = 10.21;
+
 /// Power at an airspeed (P1), W. Speed in m/s, not negative.
 #[must_use]
 pub fn power_w(speed_mps: f64) -> f64 {
@@ -44,7 +47,7 @@ mod tests {
     fn the_cheapest_speed_is_the_papers() {
         let (speed, power) =
             (0..3000).map(|i| f64::from(i) * 0.01).map(|v| (v, power_w(v))).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-        assert!((speed - 10.21).abs() < 0.015, "{speed}");
+        assert!((speed - CHEAPEST_MPS).abs() < 0.015, "{speed}");
         assert!((power - 126.0).abs() < 0.01, "{power}");
     }
 }

@@ -183,6 +183,8 @@ pub const NO_ROUTE: u16 = u16::MAX;
 
 /// [`Arrivals::flags`]: the source waits for the rows of the other groups before it decides.
 pub const ARRIVALS_ASK: u32 = 1;
+/// [`Arrivals::flags`]: a decision of the one leader who thinks for several groups: the only route in use is the drone's.
+pub const ARRIVALS_CHOSEN: u32 = 2;
 
 /// When one member of the source's group can be at the gate of an obstacle set, for the leaders of the groups that have
 /// the same set ahead: all of them split the union of the rows.
@@ -201,7 +203,7 @@ pub struct Arrivals {
     pub set: u32,
     /// Routes in use below, from right to left, at most [`MAX_ROUTES`].
     pub routes: u32,
-    /// [`ARRIVALS_ASK`].
+    /// [`ARRIVALS_ASK`], [`ARRIVALS_CHOSEN`].
     pub flags: u32,
     /// Along each route, seconds from the stamp to the gate in free flight; infinite: not that way; negative past it.
     pub gate_s: [f32; MAX_ROUTES],

@@ -4,6 +4,7 @@
 use skein_protocol::record::{Happening, Outcome, RecordSink, RecordView, RunEvent};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, Source};
+use std::collections::BTreeMap;
 
 /// The leader thinks for so long, s.
 const THINKING_S: f64 = 1.0;
@@ -17,6 +18,8 @@ struct Watch {
     end_s: f64,
     energy_j: f64,
     outcome: Option<Outcome>,
+    /// The group of each drone.
+    groups: BTreeMap<u32, String>,
     digest: u64,
 }
 
@@ -31,6 +34,9 @@ impl RecordSink for Watch {
             match event.what {
                 Happening::Grouping { predicted_s: Some(predicted_s), .. } => {
                     self.plans.push((event.t_s, predicted_s));
+                }
+                Happening::Assigned { drone, group, route: Some(_), .. } => {
+                    self.groups.insert(drone.0, group.to_string());
                 }
                 Happening::Passed { .. } => self.passed_s = event.t_s,
                 Happening::End { outcome, .. } => (self.outcome, self.end_s) = (Some(outcome), event.t_s),
@@ -84,6 +90,23 @@ fn it_costs_less_than_the_shortest_ways_everywhere_and_than_the_rule_on_average(
         sums[1] += rule;
     }
     assert!(sums[0] < sums[1], "{} J, the rule {} J", sums[0], sums[1]);
+}
+
+/// In the forest both halves of the swarm come before the second set: the leader of one thinks for both.
+#[test]
+fn groups_that_meet_rehearse_together() {
+    let [best, rule] = ["congestion-aware", "congestion-aware-paper"].map(|strategy| fly("forest", strategy));
+    let count = |group: &str| best.groups.values().filter(|name| *name == group).count();
+    assert_eq!(["N11", "N12", "N21", "N22"].map(count), [2; 4], "{:?}", best.groups);
+    assert!(best.energy_j <= 1.01 * rule.energy_j, "{} J, the rule {} J", best.energy_j, rule.energy_j);
+}
+
+/// How much is rehearsed is a matter of time, not of how many ticks it has.
+#[test]
+fn shorter_ticks_come_to_the_same_choice() {
+    let [usual, short] = ["0.02", "0.0025"].map(|dt_s| fly_with("s2-right", &[("time.dt_s", dt_s)]));
+    assert_eq!(usual.groups, short.groups);
+    assert!((usual.plans[1].1 - short.plans[1].1).abs() < 0.2, "{:?}, {:?}", usual.plans, short.plans);
 }
 
 #[test]
