@@ -144,9 +144,12 @@ impl Floor {
     /// A drone's part until it is closed, or `alive` says that nobody is there: reads its share of what goes down, writes its slot.
     pub fn serve(&self, drone: usize, alive: impl Fn() -> bool) {
         let words = self.words();
+        if drone >= self.drones {
+            return;
+        }
         words.here.fetch_add(1, Ordering::AcqRel);
         let mut last = 0;
-        while drone < self.drones {
+        loop {
             let seen = words.tick.load(Ordering::SeqCst);
             if seen == STOP {
                 return;

@@ -4,10 +4,7 @@
 use skein_protocol::formation::Shape;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::payload::{Assignment, MAX_SET, PHASE_AVOID, PHASE_REFORM, Plan};
-use skein_protocol::record::{
-    DroneRow, FaultKind, Happening, Outcome, ROW_ALIVE, ROW_LEADS, ROW_QUEUED, RecordHead, RecordSink, RecordView,
-    RunEvent, Spread, Totals, ViolationKind,
-};
+use skein_protocol::record::*;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
 use skein_report::{Ending, Manifest, MissionEnd, Recorder, RunFacts, RunFolder, Summary};
@@ -368,8 +365,7 @@ fn files_that_cannot_be_written_do_not_cost_the_summary() {
         assert!(recorder.ready());
         let (summary, files) = recorder.finish(&ending());
         assert_eq!(summary.ticks, 100);
-        let error = files.unwrap_err().to_string();
-        assert!(error.contains(name), "{error}");
+        assert!(files.unwrap_err().to_string().contains(name), "{name} is not named");
         assert!(!folder.path().join("flight.spool").exists());
     }
 }

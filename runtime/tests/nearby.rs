@@ -32,19 +32,15 @@ fn said(leads: bool) -> Message {
 }
 
 fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
-    let mut down = Downlink::default();
-    down.drones =
-        points.iter().map(|&(position_m, _)| SenseHead { position_m, alive: 1, ..SenseHead::default() }).collect();
-    down.frames = points
-        .iter()
-        .zip(0..)
-        .map(|(&(position_m, leads), id)| AirFrame {
-            source: DroneId(id),
-            position_m,
-            frame: said(leads).encode(),
-            ..bytemuck::Zeroable::zeroed()
-        })
-        .collect();
+    let sense = |&(position_m, _): &([f64; 2], bool)| SenseHead { position_m, alive: 1, ..SenseHead::default() };
+    let frame = |(&(position_m, leads), id): (&([f64; 2], bool), u32)| AirFrame {
+        source: DroneId(id),
+        position_m,
+        frame: said(leads).encode(),
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let (drones, frames) = (points.iter().map(sense).collect(), points.iter().zip(0..).map(frame).collect());
+    let mut down = Downlink { drones, frames, ..Downlink::default() };
     down.seal(1, SimTime(20_000_000));
     down
 }

@@ -79,7 +79,7 @@ fn timed(rounds: u32, parts: f64, mut work: impl FnMut()) -> f64 {
 
 fn scenario(drones: u32, more: &str) -> Result<Scenario, Failure> {
     let head = format!("[formation]\nshape = \"grid\"\ndrones = {drones}\nspacing_m = 65\n");
-    let rest = "[drone]\nsafe_distance_m = 37\n[mission]\nstop_x_m = 1000000\n[time]\ntimeout_s = 100000\n";
+    let rest = "[drone]\nsafe_distance_m = 37\n[mission]\nstop_x_m = 1000000\n[time]\ntimeout_s = 36000\n";
     let text = head + rest + more;
     Scenario::parse(&text, Source { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
 }

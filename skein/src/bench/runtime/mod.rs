@@ -35,6 +35,9 @@ pub struct RuntimeArgs {
     /// Another transport to compare with
     #[arg(long, value_enum)]
     pub compare: Option<Compare>,
+    /// Draw the cost of an agent-step against the size of the swarm here (SVG)
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
     /// Print one JSON object instead of the table
     #[arg(long)]
     pub json: bool,
@@ -46,7 +49,7 @@ pub struct RuntimeArgs {
 impl Default for RuntimeArgs {
     fn default() -> Self {
         let drones = vec![1, 8, 64, 256, 1000];
-        Self { drones, rounds: 7, quick: false, compare: None, json: false, out: None }
+        Self { drones, rounds: 7, quick: false, compare: None, plot: None, json: false, out: None }
     }
 }
 
@@ -115,10 +118,11 @@ pub fn runtime(args: &RuntimeArgs) -> Result<Exit, Failure> {
     }
     eprintln!();
     let json = serde_json::to_string_pretty(&bench).map_err(Failure::environment)?;
-    if let Some(path) = &args.out {
-        std::fs::write(path, &json)
-            .map_err(|error| Failure::environment(format!("writing {}: {error}", path.display())))?;
-    }
+    let write = |path: &PathBuf, text: &str| {
+        std::fs::write(path, text).map_err(|error| Failure::environment(format!("writing {}: {error}", path.display())))
+    };
+    args.out.iter().try_for_each(|path| write(path, &json))?;
+    args.plot.iter().try_for_each(|path| write(path, &table::plot(&bench).map_err(Failure::environment)?))?;
     println!("{}", if args.json { json } else { table::text(&bench) });
     Ok(Exit::Reached)
 }

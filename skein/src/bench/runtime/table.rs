@@ -1,6 +1,8 @@
 //! The bench as a table.
 
+use super::cases::Case;
 use super::{Bench, Row};
+use skein_report::plot::sweep::{Lines, Point, Series};
 use std::fmt::Write;
 
 /// The table and the ratios.
@@ -26,6 +28,26 @@ pub(super) fn text(bench: &Bench) -> String {
             writeln!(out, "{:>6} {pair:<48} {what:<11} {:>6.2}  ({low:.2} to {high:.2})", ratio.drones, ratio.median);
     }
     out
+}
+
+/// CPU time of an agent-step against the size of the swarm, an SVG.
+pub(super) fn plot(bench: &Bench) -> Result<String, String> {
+    let cases = [Case::Floor, Case::BlockBeacon, Case::Inline, Case::Block, Case::Yield, Case::Packed];
+    let series = cases.map(|case| {
+        let of_case = bench.rows.iter().filter(|row| row.case == case);
+        let point = |row: &Row| {
+            let us = row.median.cpu_us_per_step?;
+            Some(Point { x: f64::from(row.drones).log2(), mean: us, low: us, high: us })
+        };
+        Series { label: case.name().to_owned(), points: of_case.filter_map(point).collect() }
+    });
+    let lines = Lines {
+        title: "CPU time of an agent-step, the world's share included: medians".to_owned(),
+        x_label: "drones, as a power of two".to_owned(),
+        y_label: "CPU time of an agent-step, µs".to_owned(),
+        series: series.into_iter().filter(|series| !series.points.is_empty()).collect(),
+    };
+    lines.draw().map_err(|error| error.to_string())
 }
 
 fn line(out: &mut String, row: &Row) {
