@@ -111,7 +111,7 @@ fn eight_in_formation() {
 }
 
 #[test]
-fn a_hundred_with_a_short_radio() {
+fn a_hundred_in_range_of_each_other() {
     steady(&scenario(100, "[radio]\nrange_m = 1000\n"), 1500);
 }
 
