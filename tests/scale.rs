@@ -125,9 +125,14 @@ fn the_bench_tells_each_case_and_its_ratio_to_the_floor() {
     let ratios = bench["ratios"].as_array().unwrap();
     let floor = ratios.iter().filter(|ratio| ratio["to"] == "floor").count();
     assert_eq!((ratios.len(), floor), (6, 3), "{ratios:?}");
-    for part in ["radio", "grouping", "sense"] {
+    for part in ["radio", "grouping", "sense", "record"] {
         let done = place.run(&["bench", part, "--drones", "8", "--rounds", "1", "--json"]);
         let figures: Value = serde_json::from_str(&done.stdout).unwrap();
-        assert!(figures.as_array().unwrap().iter().all(|figure| figure["value"].as_f64().unwrap() > 0.0), "{figures}");
+        let values: Vec<f64> = figures.as_array().unwrap().iter().map(|f| f["value"].as_f64().unwrap()).collect();
+        assert!(values.len() >= 2 && values.iter().all(|&value| value > 0.0), "{figures}");
     }
+    let done = place.run(&["bench", "clock", "--drones", "3", "--rates", "50", "--seconds", "2", "--freeze", "--json"]);
+    let rows: Value = serde_json::from_str(&done.stdout).unwrap_or_else(|_| panic!("{done:?}"));
+    assert_eq!((rows[0]["ticks"].as_u64(), rows[0]["drones"].as_u64()), (Some(100), Some(3)), "{rows}");
+    assert!(rows[0]["lateness_us_p99"].as_f64().unwrap() >= rows[0]["lateness_us_p50"].as_f64().unwrap());
 }

@@ -10,6 +10,7 @@
 //! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
 //! | [`sides`] | who is cut off from whom by script |
 //! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
+//! | [`histogram`] | mean and quantiles of what is counted in equal steps |
 //! | [`nearby`] | the frames of a tick by where they were sent |
 //! | [`record`] | what the world tells the recorder |
 //! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
@@ -20,6 +21,7 @@ pub mod downlink;
 pub mod energy;
 pub mod formation;
 pub mod frame;
+pub mod histogram;
 pub mod ids;
 pub mod message;
 pub mod nearby;

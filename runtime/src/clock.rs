@@ -1,5 +1,6 @@
 //! Lockstep and wall clock.
 
+use skein_protocol::histogram;
 use skein_protocol::record::Spread;
 use std::fmt;
 use std::str::FromStr;
@@ -62,8 +63,7 @@ pub struct Pacer {
 pub struct Lateness {
     /// The last bin holds all that is longer.
     bins: Vec<u32>,
-    sum_s: f64,
-    max_s: f64,
+    max_us: u64,
 }
 
 /// Bins of [`Lateness`].
@@ -71,35 +71,21 @@ const LATE_BINS: usize = 20_000;
 
 impl Default for Lateness {
     fn default() -> Self {
-        Self { bins: vec![0; LATE_BINS], sum_s: 0.0, max_s: 0.0 }
+        Self { bins: vec![0; LATE_BINS], max_us: 0 }
     }
 }
 
 impl Lateness {
     fn note(&mut self, late: Duration) {
-        self.bins[(late.as_micros() as usize).min(LATE_BINS - 1)] += 1;
-        self.sum_s += late.as_secs_f64();
-        self.max_s = self.max_s.max(late.as_secs_f64());
+        let late_us = late.as_micros() as u64;
+        self.bins[(late_us as usize).min(LATE_BINS - 1)] += 1;
+        self.max_us = self.max_us.max(late_us);
     }
 
     /// Mean, median, 99th percentile and maximum, s.
     #[must_use]
     pub fn spread(&self) -> Spread {
-        let count: u64 = self.bins.iter().map(|&n| u64::from(n)).sum();
-        if count == 0 {
-            return Spread::default();
-        }
-        let quantile = |share: f64| {
-            let rank = (share * count as f64).ceil() as u64;
-            let mut seen = 0;
-            let reached = self.bins.iter().position(|&n| {
-                seen += u64::from(n);
-                seen >= rank
-            });
-            reached.filter(|&bin| bin + 1 < LATE_BINS).map_or(self.max_s, |bin| bin as f64 * 1e-6)
-        };
-        let mean = self.sum_s / count as f64;
-        Spread { mean: Some(mean), p50: Some(quantile(0.5)), p99: Some(quantile(0.99)), max: Some(self.max_s) }
+        histogram::spread(&self.bins, self.max_us, 1e-6)
     }
 }
 

@@ -1,13 +1,14 @@
 //! Counters of a whole mission.
 
-use skein_protocol::record::{Spread, Totals};
-use skein_protocol::slot::{LinkStats, STAT_BINS, Slot};
+use skein_protocol::histogram;
+use skein_protocol::record::Totals;
+use skein_protocol::slot::{LinkStats, Slot};
 
 /// The totals of the world's own counters; `stats` are those of all radios together, `dt_s` is the width of a bin.
 pub(crate) fn close(counted: &Totals, stats: &LinkStats, dt_s: f64, wall_s: f64) -> Totals {
     Totals {
-        delay_s: spread(&stats.delay_bins, stats.delay_max, dt_s),
-        age_s: spread(&stats.age_bins, stats.age_max, dt_s),
+        delay_s: histogram::spread(&stats.delay_bins, stats.delay_max, dt_s),
+        age_s: histogram::spread(&stats.age_bins, stats.age_max, dt_s),
         wall_s,
         ..counted.clone()
     }
@@ -20,34 +21,10 @@ pub(crate) fn tally(counted: &mut Totals, slot: &Slot) {
     counted.dropped.iter_mut().zip(slot.dropped).for_each(|(sum, dropped)| *sum += u64::from(dropped));
 }
 
-/// A histogram of ticks as seconds. The last bin holds all that is longer too: it counts as the maximum.
-fn spread(bins: &[u32; STAT_BINS], max: u64, dt_s: f64) -> Spread {
-    let count: u64 = bins.iter().map(|&n| u64::from(n)).sum();
-    if count == 0 {
-        return Spread::default();
-    }
-    let ticks = |bin: usize| if bin + 1 == STAT_BINS { max as f64 } else { bin as f64 };
-    let mean = bins.iter().enumerate().map(|(bin, &n)| ticks(bin) * f64::from(n)).sum::<f64>() / count as f64;
-    let quantile = |share: f64| {
-        let rank = (share * count as f64).ceil() as u64;
-        let mut seen = 0;
-        let reached = bins.iter().position(|&n| {
-            seen += u64::from(n);
-            seen >= rank
-        });
-        ticks(reached.unwrap_or(STAT_BINS - 1)) * dt_s
-    };
-    Spread {
-        mean: Some(mean * dt_s),
-        p50: Some(quantile(0.5)),
-        p99: Some(quantile(0.99)),
-        max: Some(max as f64 * dt_s),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_protocol::record::Spread;
 
     #[test]
     fn nothing_counted_has_no_spread() {

@@ -1,10 +1,11 @@
 //! Swarms by the wall clock: how late ticks open, and how many answers come too late.
 
+use super::Scratch;
 use crate::exit::{Exit, Failure};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// Arguments of `bench clock`.
 #[derive(Clone, Debug, Args)]
@@ -40,15 +41,13 @@ struct Row {
 
 /// Flies them one after the other.
 pub fn clock(args: &ClockArgs) -> Result<Exit, Failure> {
-    let folder = std::env::temp_dir().join(format!("skein-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(Failure::environment)?;
+    let folder = Scratch::new()?;
     let mut rows = Vec::new();
     for &drones in &args.drones {
         for &rate in &args.rates {
-            rows.push(fly(args, drones, rate, &folder)?);
+            rows.push(fly(args, drones, rate, &folder.0)?);
         }
     }
-    std::fs::remove_dir_all(&folder).map_err(Failure::environment)?;
     if args.json {
         println!("{}", serde_json::to_string_pretty(&rows).map_err(Failure::environment)?);
         return Ok(Exit::Reached);
@@ -75,14 +74,16 @@ fn fly(args: &ClockArgs, drones: u32, rate: u32, folder: &Path) -> Result<Row, F
         args.seconds
     );
     if args.freeze {
-        text += &format!("[[fault]]\nkind = \"freeze\"\ndrone = 1\nat_s = {}\n", args.seconds / 2.0);
+        text += &format!("[[fault]]\nkind = \"freeze\"\ndrone = 1\nat_s = {0}\nfor_s = {0}\n", args.seconds / 2.0);
     }
     std::fs::write(&file, text).map_err(Failure::environment)?;
     let mut command = Command::new(std::env::current_exe().map_err(Failure::environment)?);
     command.arg("run").arg(&file).args(["--clock", "realtime", "--json", "--no-record", "--force", "--out"]);
-    let output = command.arg(folder.join("run")).stderr(Stdio::null()).output().map_err(Failure::environment)?;
-    let summary: serde_json::Value = serde_json::from_slice(&output.stdout)
-        .map_err(|error| Failure::environment(format!("the flight of {drones} at {rate}/s: {error}")))?;
+    let output = command.arg(folder.join("run")).output().map_err(Failure::environment)?;
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| {
+        let said = String::from_utf8_lossy(&output.stderr);
+        Failure::environment(format!("the flight of {drones} at {rate}/s gave no summary: {said}"))
+    })?;
     let number = |name: &str| summary.pointer(name).and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN);
     let (ticks, late) = (number("/ticks"), number("/deadline_misses"));
     Ok(Row {

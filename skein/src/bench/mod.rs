@@ -11,6 +11,7 @@ pub use clock::ClockArgs;
 pub use failover::FailoverArgs;
 use parts::{Part, PartArgs};
 pub use runtime::{FloorArgs, RuntimeArgs, peer};
+use std::path::PathBuf;
 
 /// The benches.
 #[derive(Debug, Subcommand)]
@@ -29,6 +30,24 @@ pub enum BenchCommand {
     Sense(PartArgs),
     /// What recording costs
     Record(PartArgs),
+}
+
+/// A folder of one bench's own, gone with it.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, Failure> {
+        let folder = std::env::temp_dir().join(format!("skein-bench-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).map_err(Failure::environment)?;
+        Ok(Self(folder))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What is left lies where temporary files are cleaned anyway.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
 }
 
 /// Runs one of them.

@@ -1,5 +1,6 @@
 //! The parts of a tick that grow with the swarm, each alone: radio, grouping, senses, record.
 
+use super::Scratch;
 use super::runtime::median;
 use crate::exit::{Exit, Failure};
 use clap::Args;
@@ -176,8 +177,8 @@ fn sense(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Fail
 
 /// Recorded flights against unrecorded ones, in pairs.
 fn record(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Failure> {
-    let folder = std::env::temp_dir().join(format!("skein-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(Failure::environment)?;
+    let scratch = Scratch::new()?;
+    let folder = &scratch.0;
     let file = folder.join("record.toml");
     let ticks = (80_000 / drones.max(8)).max(100);
     let mut flown = scenario(drones, "")?;
@@ -201,7 +202,7 @@ fn record(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Fai
         let what = format!("ticks/s recorded over unrecorded, {runtime}");
         figures.push(Figure { drones, what, value: median(ratios.into_iter()), unit: "" });
     }
-    std::fs::remove_dir_all(&folder).map_err(Failure::environment)
+    Ok(())
 }
 
 /// Wall time of a flight from the first tick to the last, s.

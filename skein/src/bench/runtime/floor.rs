@@ -3,6 +3,7 @@
 
 use super::cases::Size;
 use super::probe::{Measured, Spent, memory_mib};
+use crate::bench::Scratch;
 use crate::exit::{Exit, Failure};
 use clap::Args;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
@@ -136,8 +137,8 @@ pub(super) fn measure(size: &Size, transport: Transport) -> Result<Measured, Fai
 }
 
 fn datagrams(size: &Size, started: Instant) -> Result<Measured, Box<dyn std::error::Error>> {
-    let folder = std::env::temp_dir().join(format!("skein-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
+    let scratch = Scratch::new().map_err(|_| "no folder for sockets could be made")?;
+    let folder = &scratch.0;
     let world = UnixDatagram::bind(folder.join("world"))?;
     world.set_read_timeout(Some(START_LIMIT))?;
     let peers = Peers::start(size, &["--sockets".to_owned(), folder.display().to_string()])
@@ -159,7 +160,6 @@ fn datagrams(size: &Size, started: Instant) -> Result<Measured, Box<dyn std::err
         world.send_to(&[], address)?;
     }
     peers.end();
-    std::fs::remove_dir_all(&folder)?;
     Ok(measured)
 }
 

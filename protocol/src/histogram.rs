@@ -1,0 +1,30 @@
+//! Histograms of what comes in equal steps.
+
+use crate::record::Spread;
+
+/// Mean, quantiles (nearest ranks) and maximum of a histogram whose bins are `width_s` wide, s. The last bin holds all that is
+/// longer too: it counts as the maximum, `max` bins.
+#[must_use]
+pub fn spread(bins: &[u32], max: u64, width_s: f64) -> Spread {
+    let count: u64 = bins.iter().map(|&n| u64::from(n)).sum();
+    if count == 0 {
+        return Spread::default();
+    }
+    let steps = |bin: usize| if bin + 1 == bins.len() { max as f64 } else { bin as f64 };
+    let mean = bins.iter().enumerate().map(|(bin, &n)| steps(bin) * f64::from(n)).sum::<f64>() / count as f64;
+    let quantile = |share: f64| {
+        let rank = (share * count as f64).ceil() as u64;
+        let mut seen = 0;
+        let reached = bins.iter().position(|&n| {
+            seen += u64::from(n);
+            seen >= rank
+        });
+        steps(reached.unwrap_or(bins.len() - 1)) * width_s
+    };
+    Spread {
+        mean: Some(mean * width_s),
+        p50: Some(quantile(0.5)),
+        p99: Some(quantile(0.99)),
+        max: Some(max as f64 * width_s),
+    }
+}
