@@ -21,6 +21,9 @@ const BEAT: f64 = 0.75;
 /// A drone that was started again listens for so many time-outs before it claims.
 const NEWCOMER_TIMEOUTS: f64 = 4.0;
 
+/// A drone whose group was split without it waits for so many time-outs to be taken in, and then claims its group.
+const PARTED_TIMEOUTS: f64 = 4.0;
+
 /// Periods and time-outs.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectionParams {
@@ -79,6 +82,8 @@ pub struct Election {
     heard: SimTime,
     /// Of the leaders' own signs.
     rhythm: Rhythm,
+    /// Since when only leaders of parts of its group are heard.
+    parted: Option<SimTime>,
     next_heartbeat: SimTime,
     /// When it asked who has heard of the leader it misses.
     probed: Option<SimTime>,
@@ -101,6 +106,7 @@ impl Election {
             leads: false,
             heard: now,
             rhythm: Rhythm::expecting(now, params.heartbeat_period_s),
+            parted: None,
             next_heartbeat: now,
             probed: None,
         }
@@ -230,12 +236,18 @@ impl Election {
             self.leads = false;
         }
         if ballot == self.obeyed {
+            self.parted = None;
             self.rhythm.hear(now, BEAT * self.heartbeat_period_s, self.patience_s());
         }
-        if ballot == self.obeyed || parted {
+        if ballot == self.obeyed || (parted && self.may_be_taken_in(now)) {
             self.heard = now;
             self.probed = None;
         }
+    }
+
+    /// Whether the leaders of parts have not had their time yet to take this drone in.
+    fn may_be_taken_in(&mut self, now: SimTime) -> bool {
+        now.since(*self.parted.get_or_insert(now)) < PARTED_TIMEOUTS * self.leader_timeout_s
     }
 
     fn tick(&mut self, now: SimTime, epoch: u32, closer: usize, delay_s: f64) -> Option<Leadership> {
@@ -262,6 +274,7 @@ impl Election {
         self.obeyed = Ballot { round, incarnation: self.incarnation, claimant: self.me };
         self.scope = scope;
         self.leads = true;
+        self.parted = None;
         self.heard = now;
         self.probed = None;
         self.next_heartbeat = now.after(self.heartbeat_period_s);

@@ -189,8 +189,10 @@ impl Leading {
         if ballot.claimant.0 >= self.drones {
             return false;
         }
-        // Repeated by somebody else it is no sign that the leader lives, nor that there is such a term.
-        if ballot.claimant == source {
+        // Repeated by somebody else it is no sign that the leader lives, nor that there is such a term; repeated by one
+        // who leads another term by now, it is none that this one goes on.
+        let over = ballot == self.election.obeyed() && self.term_of(source) > ballot;
+        if ballot.claimant == source && !over {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named });
         }
         ballot == self.election.obeyed() && !self.election.leads()

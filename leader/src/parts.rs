@@ -193,7 +193,7 @@ impl Leading {
     }
 
     /// The term that a peer obeys, by its last beacon.
-    fn term_of(&self, peer: DroneId) -> Ballot {
+    pub(crate) fn term_of(&self, peer: DroneId) -> Ballot {
         self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
     }
 

@@ -58,12 +58,13 @@ fn set() -> impl Strategy<Value = ([ObstacleId; payload::MAX_SET], u32)> {
     (ids, prop_oneof![0..4u32, any::<u32>()]).prop_map(|(ids, count)| (ids.try_into().unwrap(), count))
 }
 
+/// What is no shape becomes a disc.
 fn shape() -> impl Strategy<Value = ConvexShape> {
-    let disc = (number(), number(), number())
-        .prop_filter_map("a disc", |(x, y, r)| ConvexShape::circle(Vec2::new(x, y), r).ok());
+    let disc = (number(), number(), number()).prop_map(|(x, y, r)| ConvexShape::circle(Vec2::new(x, y), r));
     let bar = (number(), number(), number(), number())
-        .prop_filter_map("a bar", |(x, y, a, b)| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(a, b), 0.3).ok());
-    prop_oneof![disc, bar]
+        .prop_map(|(x, y, a, b)| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(a, b), 0.3));
+    let other = ConvexShape::circle(Vec2::new(70.0, 20.0), 5.0).unwrap();
+    prop_oneof![disc, bar].prop_map(move |shape| shape.unwrap_or(other))
 }
 
 fn pose() -> impl Strategy<Value = Pose> {
@@ -159,8 +160,18 @@ fn message() -> impl Strategy<Value = Message> {
     ]
 }
 
+/// A frame that prints as the message a drone takes it for.
+#[derive(Clone, Copy)]
+struct Noise(Frame);
+
+impl std::fmt::Debug for Noise {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Message::decode(&self.0).fmt(f)
+    }
+}
+
 /// A frame: a message, a message with a few bytes changed, or random bytes.
-fn frame() -> impl Strategy<Value = Frame> {
+fn frame() -> impl Strategy<Value = Noise> {
     let changed =
         (message(), prop::collection::vec((0..FRAME_PAYLOAD, any::<u8>()), 1..4)).prop_map(|(message, bytes)| {
             let mut frame = message.encode();
@@ -174,7 +185,7 @@ fn frame() -> impl Strategy<Value = Frame> {
             len,
             payload: bytes.try_into().unwrap(),
         });
-    prop_oneof![6 => message().prop_map(|m| m.encode()), 2 => changed, 1 => random]
+    prop_oneof![6 => message().prop_map(|m| m.encode()), 2 => changed, 1 => random].prop_map(Noise)
 }
 
 /// A swarm in flight whose last drone says nothing by itself, with a wall ahead.
@@ -187,9 +198,9 @@ fn swarm(seed: u64, ticks: u64) -> Swarm {
 }
 
 /// What a radio hands on of a frame; a frame is said by `source`, whatever it claims.
-fn hear(swarm: &mut Swarm, source: DroneId, frame: &Frame) {
+fn hear(swarm: &mut Swarm, source: DroneId, noise: &Noise) {
     let now = swarm.now();
-    let Ok(message) = Message::decode(frame) else { return };
+    let Ok(message) = Message::decode(&noise.0) else { return };
     for leading in swarm.drones.iter_mut().flatten() {
         leading.hear(now, source, &message, &mut Vec::new());
     }

@@ -178,12 +178,19 @@ fn whoever_missed_the_split_waits_to_be_taken_in_and_leads_no_more() {
     claim(&mut leader, 0.0, 0);
     sign(&mut leader, 0.5, ballot(4, 2), N.child(1), false);
     assert!(!leader.leads());
-    for i in 1..50 {
-        let now = 0.5 + 0.2 * f64::from(i);
-        assert!(tick(&mut leader, now, 0).is_none());
-        sign(&mut leader, now, ballot(4, 2), N.child(1), false);
-    }
-    assert!(claim(&mut leader, 10.4, 0).1.ballot.round > 4, "with nobody left it leads itself");
+    // While it hears the part's leader: when it leads all the same.
+    let until_leads = |leader: &mut Election, from_s: f64| {
+        let times_s = (0..100).map(|i| from_s + 0.2 * f64::from(i));
+        times_s.into_iter().find(|&now_s| {
+            sign(leader, now_s, ballot(4, 2), N.child(1), false);
+            tick(leader, now_s, 0).is_some_and(|said| said.kind == LEADERSHIP_CLAIM)
+        })
+    };
+    let mut alone = leader.clone();
+    let waits_s = until_leads(&mut leader, 0.7).expect("it is not taken in for ever");
+    assert!(waits_s > PARTED_TIMEOUTS * PARAMS.leader_timeout_s && leader.obeyed().round > 4, "{waits_s}");
+    let left_s = claim(&mut alone, 0.7, 0).0;
+    assert!(left_s < 0.5 * waits_s, "with nobody left it leads itself: {left_s}");
 }
 
 #[test]
