@@ -125,15 +125,13 @@ impl Stage {
         let mut accelerations = Vec::with_capacity(self.pilots.len());
         let mut said = Vec::new();
         let mut words: Vec<Message> = Vec::new();
-        let mut heard: Vec<Heard> = Vec::new();
         for i in 0..self.pilots.len() {
             let (obstacles, neighbours) = self.surroundings(i, shapes);
             let senses = Senses::new((self.tick, self.now), self.bodies[i], &obstacles, &neighbours, shapes);
             let source = self.pilots[i].params.me;
-            heard.clear();
-            heard.extend(self.said.iter().filter(|heard| heard.source != source));
             words.clear();
-            accelerations.push(self.pilots[i].step(&senses, &heard, &mut words).acceleration);
+            // Nobody minds to hear itself.
+            accelerations.push(self.pilots[i].step(&senses, &self.said, &mut words).acceleration);
             said.extend(words.iter().map(|&message| Heard { source, message }));
         }
         self.said = said;
