@@ -31,6 +31,8 @@ pub struct SafetyParams {
 const OBSTACLE_REACH_M: f64 = 60.0;
 /// Added to the obstacle clearance against the length of a tick, and for [`TANGENT_M`], m.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
+/// Who does so much less than its share, m/s², is not counted upon.
+const FAILING_MPS2: f64 = 2.0;
 /// The speed limit behind another drone is not taken lower than this, m/s: it would be arbitrarily steep.
 const LEAST_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration counted upon for braking before an obstacle; the rest turns.
@@ -121,25 +123,31 @@ impl Safety {
         trusting.clear();
         let due = self.trusted.len().checked_sub(lag + 1).and_then(|i| self.trusted.get(i));
         let last = self.trusted.back();
-        // Whoever cannot evade is kept clear of like an obstacle: first, and whatever the others do.
-        let (helpless, others) = (neighbours.clone().filter(|n| n.share >= 1.0), neighbours.filter(|n| n.share < 1.0));
+        let of = |trusts: Option<&Vec<Trust>>, neighbour: &Neighbour| -> Option<Trust> {
+            trusts.filter(|_| neighbour.sensed)?.iter().find(|trust| trust.id == neighbour.id).copied()
+        };
+        let braking = |neighbour: &Neighbour| {
+            let before = of(last, neighbour).map(|trust| trust.velocity);
+            before.map_or_else(Vec2::zeros, |before| (velocity + neighbour.velocity_mps - before) / params.dt_s)
+        };
+        let missing = |neighbour: &Neighbour| of(due, neighbour).map_or(0.0, |trust| trust.missing(braking(neighbour)));
+        // Whoever cannot evade, or has precedence and fails to, is kept clear of like an obstacle: first, and whatever the
+        // others do. Those behind this drone have to see to it that there is room.
+        let helpless = |n: &Neighbour| n.share >= 1.0 || (n.share > 0.5 && missing(n) > FAILING_MPS2);
+        let (helpless, others) = (neighbours.clone().filter(|n| helpless(n)), neighbours.filter(|n| !helpless(n)));
         let mut hard = self.planes.len();
-        for neighbour in helpless.chain(others) {
+        let first = helpless.clone().count();
+        for (i, neighbour) in helpless.chain(others).enumerate() {
             let barrier = params.neighbour_barrier(&neighbour);
-            let theirs = velocity + neighbour.velocity_mps;
-            let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
-                trusts.filter(|_| neighbour.sensed)?.iter().find(|trust| trust.id == neighbour.id).copied()
-            };
-            let braking = of(last).map_or_else(Vec2::zeros, |trust| (theirs - trust.velocity) / params.dt_s);
-            let missing = of(due).map_or(0.0, |trust| trust.missing(braking));
-            self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking));
-            self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
-            if neighbour.share >= 1.0 {
+            self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking(&neighbour)));
+            let bound = missing(&neighbour) - barrier.share * barrier.slack;
+            self.planes.push(HalfPlane { normal: barrier.normal, bound });
+            if i < first {
                 hard = self.planes.len();
             }
             trusting.push(Trust {
                 id: neighbour.id,
-                velocity: theirs,
+                velocity: velocity + neighbour.velocity_mps,
                 normal: barrier.normal,
                 owed: (barrier.share - 1.0) * barrier.slack,
             });
