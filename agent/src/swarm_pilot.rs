@@ -170,10 +170,18 @@ impl SwarmPilot {
         match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
             (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID => {
                 let (anchor, velocity) = anchor(&orders.plan, senses.now);
-                guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity)
+                let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
+                self.on_sight(wanted, senses.now)
             }
             _ => cruise,
         }
+    }
+
+    /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
+    fn on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
+        let (speed, limit) = (wanted.norm(), self.safety.params().speed_on_sight_mps());
+        let unheard = speed > limit && self.leading.peers.silent(now).next().is_some();
+        if unheard { wanted * (limit / speed) } else { wanted }
     }
 
     fn queue_speed(&mut self, now: SimTime, places: &[QueuePlace; MAX_PLACES]) -> f64 {

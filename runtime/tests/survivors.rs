@@ -65,3 +65,11 @@ fn who_follows_one_that_stops_dead_is_not_pushed_into_it_by_those_behind() {
     let kill = vec![r#"{ kind = "kill", at_s = 38, target = "first-in-queue" }"#.to_owned()];
     all_get_there("paper/forest", std::iter::once(kill));
 }
+
+#[test]
+fn halves_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
+    for sides in ["[[0], [1, 2, 3, 4, 5, 6, 7]]", "[[0, 1], [2, 3], [4, 5], [6, 7]]"] {
+        let cut = format!(r#"{{ kind = "partition", on = "reforming", after_s = 1, for_s = 10, sides = {sides} }}"#);
+        all_get_there("paper/forest", std::iter::once(vec![cut]));
+    }
+}
