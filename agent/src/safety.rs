@@ -8,6 +8,9 @@ use crate::program::{HalfPlane, Program};
 use skein_protocol::{DroneId, Vec2};
 use std::collections::VecDeque;
 
+/// Neighbours are sensed within so many safe distances.
+pub const RANGING: f64 = 2.0;
+
 /// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SafetyParams {
@@ -31,6 +34,10 @@ pub struct SafetyParams {
 const OBSTACLE_REACH_M: f64 = 60.0;
 /// Added to the obstacle clearance against the length of a tick, and for [`TANGENT_M`], m.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
+/// Who does so much less than its share, m/s², is not counted upon.
+const FAILING_MPS2: f64 = 2.0;
+/// A drone that is this part of the margin nearer than it should is kept clear of first.
+const PRESSED: f64 = 0.5;
 /// The speed limit behind another drone is not taken lower than this, m/s: it would be arbitrarily steep.
 const LEAST_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration counted upon for braking before an obstacle; the rest turns.
@@ -87,13 +94,20 @@ pub struct Safety {
     program: Program,
     /// What neighbours were counted upon for, the newest last: one entry a tick, until it has taken effect.
     trusted: VecDeque<Vec<Trust>>,
+    counted: Vec<Counted>,
 }
 
 impl Safety {
     /// A filter with these constants.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        Self { params, planes: Vec::new(), program: Program::default(), trusted: VecDeque::new() }
+        Self { params, planes: Vec::new(), program: Program::default(), trusted: VecDeque::new(), counted: Vec::new() }
+    }
+
+    /// Its constants as they are now.
+    #[must_use]
+    pub fn params(&self) -> &SafetyParams {
+        &self.params
     }
 
     /// Margins for another t_c from now on, s.
@@ -108,7 +122,7 @@ impl Safety {
         wanted: Vec2,
         velocity: Vec2,
         obstacles: impl Iterator<Item = NearObstacle>,
-        neighbours: impl Iterator<Item = Neighbour> + Clone,
+        neighbours: impl Iterator<Item = Neighbour>,
     ) -> Vec2 {
         let params = self.params;
         self.planes.clear();
@@ -119,34 +133,65 @@ impl Safety {
             false => Vec::new(),
         };
         trusting.clear();
-        let due = self.trusted.len().checked_sub(lag + 1).and_then(|i| self.trusted.get(i));
-        let last = self.trusted.back();
-        // Whoever cannot evade is kept clear of like an obstacle: first, and whatever the others do.
-        let (helpless, others) = (neighbours.clone().filter(|n| n.share >= 1.0), neighbours.filter(|n| n.share < 1.0));
+        let mut counted = std::mem::take(&mut self.counted);
+        counted.clear();
+        counted.extend(neighbours.map(|neighbour| self.count(neighbour, velocity, lag)));
+        // Of those who come first the nearest before all.
+        counted.sort_by(|a, b| match (a.first, b.first) {
+            (true, true) => a.barrier.beyond_m.total_cmp(&b.barrier.beyond_m),
+            _ => b.first.cmp(&a.first),
+        });
         let mut hard = self.planes.len();
-        for neighbour in helpless.chain(others) {
-            let barrier = params.neighbour_barrier(&neighbour);
-            let theirs = velocity + neighbour.velocity_mps;
-            let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
-                trusts.filter(|_| neighbour.sensed)?.iter().find(|trust| trust.id == neighbour.id).copied()
-            };
-            let braking = of(last).map_or_else(Vec2::zeros, |trust| (theirs - trust.velocity) / params.dt_s);
-            let missing = of(due).map_or(0.0, |trust| trust.missing(braking));
-            self.planes.extend(params.following_plane(&neighbour, &barrier, velocity, braking));
+        for Counted { neighbour, barrier, braking, missing, first } in &counted {
+            self.planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));
             self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
-            if neighbour.share >= 1.0 {
+            if *first {
                 hard = self.planes.len();
             }
             trusting.push(Trust {
                 id: neighbour.id,
-                velocity: theirs,
+                velocity: velocity + neighbour.velocity_mps,
                 normal: barrier.normal,
                 owed: (barrier.share - 1.0) * barrier.slack,
             });
         }
+        self.counted = counted;
         self.trusted.push_back(trusting);
         self.program.solve(&self.planes, hard, params.acceleration_max_mps2, wanted)
     }
+
+    /// What is to be made of a neighbour. Whoever cannot evade, or has precedence and fails to, is kept clear of like an
+    /// obstacle: first, and whatever the others do; those behind this drone have to see to it that there is room. So is
+    /// whoever has been pushed deep into the margin.
+    fn count(&self, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Counted {
+        let params = &self.params;
+        let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
+            trusts.filter(|_| neighbour.sensed)?.iter().find(|trust| trust.id == neighbour.id).copied()
+        };
+        let due = self.trusted.len().checked_sub(lag + 1).and_then(|i| self.trusted.get(i));
+        let theirs = velocity + neighbour.velocity_mps;
+        let change = |trust: Trust| (theirs - trust.velocity) / params.dt_s;
+        let braking = of(self.trusted.back()).map_or_else(Vec2::zeros, change);
+        let missing = of(due).map_or(0.0, |trust| trust.missing(braking));
+        let barrier = params.neighbour_barrier(&neighbour);
+        let first = neighbour.share >= 1.0
+            || (neighbour.share > 0.5 && missing > FAILING_MPS2)
+            || (neighbour.sensed && barrier.beyond_m < -PRESSED * params.margin_m());
+        Counted { neighbour, barrier, braking, missing, first }
+    }
+}
+
+/// A neighbour and what is made of it.
+#[derive(Clone, Copy, Debug)]
+struct Counted {
+    neighbour: Neighbour,
+    barrier: Barrier,
+    /// Its acceleration as sensed, m/s².
+    braking: Vec2,
+    /// What it did less than its share, m/s².
+    missing: f64,
+    /// Whether it comes before others.
+    first: bool,
 }
 
 impl Trust {
@@ -158,6 +203,7 @@ impl Trust {
 }
 
 /// The barrier between this drone and a neighbour.
+#[derive(Clone, Copy, Debug)]
 struct Barrier {
     /// From the neighbour to this drone.
     normal: Vec2,
@@ -170,6 +216,24 @@ struct Barrier {
 }
 
 impl SafetyParams {
+    fn margin_m(&self) -> f64 {
+        (self.safe_distance_m * self.margin).max(LEAST_MARGIN_M)
+    }
+
+    /// Distance to keep from a drone whose state is known, or answered, so much too late, m.
+    fn keep_m(&self, late_s: f64) -> f64 {
+        self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
+    }
+
+    /// The speed at which two drones that fly at each other, and know of each other only once they are in ranging
+    /// distance, can both stop in time, m/s.
+    #[must_use]
+    pub fn speed_on_sight_mps(&self) -> f64 {
+        let (late_s, brake) = (self.reaction_time_s, self.acceleration_max_mps2);
+        let room_m = (RANGING * self.safe_distance_m - self.keep_m(late_s)).max(0.0);
+        (brake * late_s).hypot((brake * room_m).sqrt()) - brake * late_s
+    }
+
     fn obstacle_plane(&self, obstacle: &NearObstacle, velocity: Vec2) -> Option<HalfPlane> {
         if obstacle.distance_m > self.clearance_m + OBSTACLE_REACH_M {
             return None;
@@ -188,10 +252,8 @@ impl SafetyParams {
         let velocity = -neighbour.velocity_mps;
         // What is known is old, and the answer comes late: meanwhile the other may have turned.
         let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
-        let margin_m = (self.safe_distance_m * self.margin).max(LEAST_MARGIN_M);
-        let keep = self.safe_distance_m + margin_m + late_s * (1.0 + self.acceleration_max_mps2 * late_s);
         let alpha = self.acceleration_max_mps2;
-        let beyond_m = distance - keep;
+        let beyond_m = distance - self.keep_m(late_s);
         let (root, slope) = root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
         let turning = (velocity.norm_squared() - speed * speed) / distance;
@@ -231,101 +293,4 @@ fn root(alpha: f64, x: f64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const PARAMS: SafetyParams = SafetyParams {
-        safe_distance_m: 30.0,
-        clearance_m: 15.0,
-        acceleration_max_mps2: 5.0,
-        gain_per_s: 1.5,
-        margin: 0.02,
-        reaction_time_s: 0.0,
-        dt_s: DT,
-    };
-    const DT: f64 = 0.02;
-
-    /// Flies two drones, each wanting to fly with its velocity for ever; returns their least distance.
-    fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
-        let wanted = v;
-        let mut filters = [Safety::new(PARAMS), Safety::new(PARAMS)];
-        let mut least = f64::INFINITY;
-        for _ in 0..1500 {
-            let accelerations = [0, 1].map(|i| {
-                let other = 1 - i;
-                let (position_m, velocity_mps) = (p[other] - p[i], v[other] - v[i]);
-                let id = DroneId(other as u32);
-                let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, sensed: true, share: shares[i] };
-                let want = (wanted[i] - v[i]) * 2.0;
-                filters[i].filter(want, v[i], std::iter::empty(), std::iter::once(neighbour))
-            });
-            for i in 0..2 {
-                let next = v[i] + accelerations[i] * DT;
-                p[i] += (v[i] + next) * (DT / 2.0);
-                v[i] = next;
-            }
-            least = least.min((p[0] - p[1]).norm());
-        }
-        least
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(60))]
-        #[test]
-        fn two_drones_on_any_crossing_keep_their_distance(angle in 0.3..std::f64::consts::PI, offset in -40.0..40.0, share in 0.1..0.9) {
-            let other = Vec2::new(f64::cos(angle), f64::sin(angle)) * 10.0;
-            let start = -other * 15.0 + Vec2::new(0.0, offset);
-            let (p, v) = ([Vec2::new(-150.0, 0.0), start], [Vec2::new(10.0, 0.0), other]);
-            prop_assume!((p[0] - p[1]).norm() > 45.0);
-            let least = fly_pair(p, v, [share, 1.0 - share]);
-            prop_assert!(least >= PARAMS.safe_distance_m, "{least}");
-        }
-    }
-
-    #[test]
-    fn one_that_takes_all_is_safe_from_one_that_takes_nothing() {
-        let least = fly_pair([Vec2::zeros(), Vec2::new(90.0, 5.0)], [Vec2::new(10.0, 0.0), Vec2::zeros()], [1.0, 0.0]);
-        assert!(least >= PARAMS.safe_distance_m, "{least}");
-    }
-
-    #[test]
-    fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
-        for share in [0.1, 0.5, 0.9] {
-            let (mut ahead, mut behind) = ((31.0, 10.0), (0.0, 10.0));
-            let mut filter = Safety::new(PARAMS);
-            for _ in 0..1500 {
-                let neighbour = Neighbour {
-                    id: DroneId(0),
-                    position_m: Vec2::new(ahead.0 - behind.0, 0.0),
-                    velocity_mps: Vec2::new(ahead.1 - behind.1, 0.0),
-                    age_s: 0.0,
-                    sensed: true,
-                    share,
-                };
-                let (velocity, wanted) = (Vec2::new(behind.1, 0.0), Vec2::new((10.0 - behind.1) * 2.0, 0.0));
-                let a = filter.filter(wanted, velocity, std::iter::empty(), std::iter::once(neighbour));
-                let brake = -f64::min(PARAMS.acceleration_max_mps2, ahead.1 / DT);
-                for (body, a) in [(&mut ahead, brake), (&mut behind, a.x)] {
-                    *body = (body.0 + body.1 * DT + a * DT * DT / 2.0, body.1 + a * DT);
-                }
-                assert!(ahead.0 - behind.0 >= PARAMS.safe_distance_m, "{} with share {share}", ahead.0 - behind.0);
-            }
-        }
-    }
-
-    #[test]
-    fn a_drone_stops_before_a_wall() {
-        let mut filter = Safety::new(PARAMS);
-        let (mut x, mut v) = (-80.0, Vec2::new(10.0, 0.0));
-        for _ in 0..2000 {
-            let wall = NearObstacle { nearest_m: Vec2::new(-x, 0.0), distance_m: -x };
-            let a = filter.filter((Vec2::new(10.0, 0.0) - v) * 2.0, v, std::iter::once(wall), std::iter::empty());
-            let next = v + a * DT;
-            x += (v.x + next.x) * DT / 2.0;
-            v = next;
-            assert!(x <= -PARAMS.clearance_m, "{x}");
-        }
-        assert!(x > -PARAMS.clearance_m - 1.0, "it comes close: {x}");
-    }
-}
+mod tests;

@@ -15,7 +15,7 @@ use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
 use skein_leader::ledger::Orders;
 use skein_leader::planner::Strategy;
-use skein_leader::routes::Routes;
+use skein_leader::routes::{Body, Routes};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, QueuePlace, set_tag};
 use skein_protocol::{Message, SimTime, Vec2};
@@ -26,6 +26,9 @@ const DEAD_BERTH: f64 = 1.1;
 /// A drone that does not get on waits so long before it gives way, s; in formation the leader opens ranks before.
 const PATIENCE_ON_THE_WAY_S: f64 = 3.0;
 const PATIENCE_IN_FORMATION_S: f64 = 8.0;
+
+/// Out of a gap that a body bars a drone flies back at this part of its speed.
+const CORNERED: f64 = 0.5;
 
 /// One drone's mind, and what it remembers.
 #[derive(Clone, Debug)]
@@ -113,15 +116,17 @@ impl SwarmPilot {
         self.leading.adopt(start.now, first);
     }
 
-    /// Where drones that fell silent hang by now: their last beacon, and how far they took to stop.
+    /// Where drones that say nothing hang by now: those ranged, where they are, heard before or not; of the others the last
+    /// beacon, and how far they took to stop.
     fn find_silent(&mut self, senses: &Senses<'_>) {
         let braking = 2.0 * self.params.safety.acceleration_max_mps2;
+        let peers = &self.leading.peers;
+        let mute = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
         self.silent.clear();
-        for (id, pose) in self.leading.peers.silent(senses.now) {
-            let sensed = senses.neighbours.iter().find(|n| n.drone == id).map(|n| Vec2::from(n.position_m));
+        self.silent.extend(mute.map(|n| senses.position + Vec2::from(n.position_m)));
+        for (_, pose) in peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id)) {
             let velocity = Vec2::from(pose.velocity_mps);
-            let guess = || Vec2::from(pose.position_m) + velocity * (velocity.norm() / braking);
-            self.silent.push(sensed.map_or_else(guess, |offset| senses.position + offset));
+            self.silent.push(Vec2::from(pose.position_m) + velocity * (velocity.norm() / braking));
         }
     }
 
@@ -156,16 +161,27 @@ impl SwarmPilot {
     fn wanted_velocity(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) -> Vec2 {
         let guidance = self.params.guidance;
         let cruise = Vec2::new(guidance.speed_mps, 0.0);
+        if self.way.is_cornered() {
+            return Vec2::new(-CORNERED * guidance.speed_mps, 0.0);
+        }
         if let Some(pull) = self.way.pull(senses.position) {
             return pull.direction * self.queue_speed(senses.now, places);
         }
         match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
             (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID => {
                 let (anchor, velocity) = anchor(&orders.plan, senses.now);
-                guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity)
+                let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
+                self.on_sight(wanted, senses.now)
             }
             _ => cruise,
         }
+    }
+
+    /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
+    fn on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
+        let (speed, limit) = (wanted.norm(), self.safety.params().speed_on_sight_mps());
+        let unheard = speed > limit && self.leading.peers.silent(now).next().is_some();
+        if unheard { wanted * (limit / speed) } else { wanted }
     }
 
     fn queue_speed(&mut self, now: SimTime, places: &[QueuePlace; MAX_PLACES]) -> f64 {
@@ -243,8 +259,9 @@ impl Pilot for SwarmPilot {
         self.find_silent(senses);
         self.lead(senses, &own, say);
         self.fend_for_itself(senses);
-        let berth_m = DEAD_BERTH * self.params.safety.safe_distance_m;
-        self.way.update(&self.leading.ledger, senses.position, &self.silent, berth_m);
+        let radius_m = DEAD_BERTH * self.params.safety.safe_distance_m;
+        let bodies: Vec<Body> = self.silent.iter().map(|&centre_m| Body { centre_m, radius_m }).collect();
+        self.way.update(&self.leading.ledger, senses.position, &bodies);
         for set in self.leading.ledger.sets().iter().filter(|set| senses.position.x >= set.routes.exit_x_m()) {
             self.leading.obstacles.note_passed(self.params.me, &set.ids);
         }

@@ -42,9 +42,10 @@ pub struct Way {
     legs: Vec<Leg>,
     lane: Option<Lane>,
     drawn: Option<(PlanStamp, bool, usize)>,
-    /// Routes taken instead of those assigned, by set: an obstacle abreast shut the other one off.
+    /// Routes taken instead of those assigned, by set: an obstacle abreast or a body in the gap shut the other one off.
     detours: Vec<(u32, usize)>,
-    bodies: Vec<Vec2>,
+    bodies: Vec<Body>,
+    cornered: bool,
     /// Taken when an obstacle is dangerously near and no leader said anything.
     pub own: Option<OwnWay>,
 }
@@ -61,32 +62,32 @@ impl Way {
             drawn: None,
             detours: Vec::new(),
             bodies: Vec::new(),
+            cornered: false,
             own: None,
         }
     }
 
-    /// Follows the ledger: takes up new parts, closes legs that are left, evades `bodies` (drones that hang dead in the
-    /// air, m) by `body_radius_m`.
-    pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Vec2], body_radius_m: f64) {
+    /// Follows the ledger: takes up new parts, closes legs that are left, evades `bodies`, drones that hang dead in the air.
+    pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) {
         if self.own.as_ref().is_some_and(|own| {
             position.x >= own.routes.exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains_key(&self.me))
         }) {
             self.own = None;
         }
         let moved = self.bodies.len() != bodies.len()
-            || self.bodies.iter().zip(bodies).any(|(old, new)| (old - new).norm() > DRIFT_M);
+            || self.bodies.iter().zip(bodies).any(|(old, new)| (old.centre_m - new.centre_m).norm() > DRIFT_M);
         let left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
         let key = (ledger.stamp(), self.own.is_some(), left);
         if self.drawn.is_none_or(|drawn| drawn.0 != key.0) {
             self.detours.clear();
         }
-        let detoured = self.detour(ledger, position);
+        let detoured = self.detour(ledger, position, bodies);
         if self.drawn == Some(key) && !moved && !detoured {
             return;
         }
         self.bodies.clear();
         self.bodies.extend_from_slice(bodies);
-        self.draw(ledger, position, body_radius_m);
+        self.draw(ledger, position);
         let left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
         self.drawn = Some((ledger.stamp(), self.own.is_some(), left));
     }
@@ -101,26 +102,40 @@ impl Way {
         })
     }
 
-    /// A drone that was driven to the wrong side of an obstacle takes the shortest of the routes still open to it.
-    fn detour(&mut self, ledger: &Ledger, position: Vec2) -> bool {
-        let flight = Flight { speed_mps: 1.0, course_y_m: self.course_y_m };
-        let mut detoured = false;
+    /// A drone that was driven to the wrong side of an obstacle, or whose route a body bars, takes the shortest of the
+    /// routes still open to it.
+    fn detour(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) -> bool {
+        let (mut detoured, course_y_m) = (false, self.course_y_m);
+        self.cornered = false;
         for set in ledger.sets().iter().filter(|set| position.x < set.routes.exit_x_m()) {
             let Some(route) = self.place(set).map(|place| usize::from(place.route)) else { continue };
-            if set.routes.is_open(route, position) {
-                continue;
+            match way_round(&set.routes, route, course_y_m, position, bodies) {
+                Outlook::Free => {}
+                Outlook::Behind => self.cornered = true,
+                Outlook::Round(open) => {
+                    self.detours.retain(|(tag, _)| *tag != set.tag);
+                    self.detours.push((set.tag, open));
+                    detoured = true;
+                }
             }
-            let open = shortest(&trips(&[], &set.routes, position, &flight));
-            if open != route && set.routes.is_open(open, position) {
-                self.detours.retain(|(tag, _)| *tag != set.tag);
-                self.detours.push((set.tag, open));
-                detoured = true;
+        }
+        if let Some(own) = &mut self.own {
+            match way_round(&own.routes, own.route, course_y_m, position, bodies) {
+                Outlook::Free => {}
+                Outlook::Behind => self.cornered = true,
+                Outlook::Round(open) => (own.route, detoured) = (open, true),
             }
         }
         detoured
     }
 
-    fn draw(&mut self, ledger: &Ledger, position: Vec2, body_radius_m: f64) {
+    /// Whether a body bars the way, and every other one begins farther back.
+    #[must_use]
+    pub fn is_cornered(&self) -> bool {
+        self.cornered
+    }
+
+    fn draw(&mut self, ledger: &Ledger, position: Vec2) {
         let mut legs: Vec<(QueuePlace, &Routes)> =
             ledger.sets().iter().filter_map(|set| self.place(set).map(|place| (place, &set.routes))).collect();
         if let Some(own) = &self.own {
@@ -142,13 +157,11 @@ impl Way {
             .filter(|(_, routes)| position.x < routes.exit_x_m())
             .map(|&(place, routes)| (routes, usize::from(place.route)))
             .collect();
-        let bodies: Vec<Body> =
-            self.bodies.iter().map(|&centre_m| Body { centre_m, radius_m: body_radius_m }).collect();
         self.lane = open
             .iter()
             .map(|(routes, _)| routes.exit_x_m())
             .reduce(f64::max)
-            .map(|exit_x_m| Lane::new(&open, &bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
+            .map(|exit_x_m| Lane::new(&open, &self.bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
     }
 
     /// The next step along the way; `None` if nothing lies ahead.
@@ -190,5 +203,31 @@ impl Way {
     #[must_use]
     pub fn is_open_set(&self, set: u32) -> bool {
         self.legs.iter().any(|leg| leg.open && leg.place.set == set)
+    }
+}
+
+/// What becomes of a drone on its route.
+enum Outlook {
+    /// It goes on, or there is nothing better.
+    Free,
+    /// It takes this route instead.
+    Round(usize),
+    /// It has to go back first.
+    Behind,
+}
+
+/// How a drone on `route` goes on: by the shortest of the routes that are open to it and not barred, if its own is none.
+fn way_round(routes: &Routes, route: usize, course_y_m: f64, position: Vec2, bodies: &[Body]) -> Outlook {
+    let barred = |route: usize| routes.is_barred(route, position, bodies);
+    let free = |route: usize| routes.is_open(route, position) && !barred(route);
+    if free(route) {
+        return Outlook::Free;
+    }
+    let mut ways = trips(&[], routes, position, &Flight { speed_mps: 1.0, course_y_m });
+    (0..ways.len()).filter(|&way| !free(way)).for_each(|way| ways[way].total_s = f64::INFINITY);
+    match shortest(&ways) {
+        way if free(way) => Outlook::Round(way),
+        _ if barred(route) && (0..ways.len()).any(|way| !barred(way)) => Outlook::Behind,
+        _ => Outlook::Free,
     }
 }

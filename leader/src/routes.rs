@@ -151,6 +151,26 @@ impl Routes {
         !right.iter().flatten().any(above) && !left.iter().flatten().any(below)
     }
 
+    /// Whether bodies ahead of a drone at `position` bar a route: whether they leave no way between the walls on its
+    /// right and those on its left.
+    #[must_use]
+    pub fn is_barred(&self, route: usize, position: Vec2, bodies: &[Body]) -> bool {
+        let mut ahead: Vec<&Body> = bodies.iter().filter(|body| body.centre_m.x > position.x).collect();
+        let walls = self.route(route).walls();
+        let touches = |body: &Body, side: Side| {
+            walls.iter().any(|wall| wall.side == side && wall.distance_m(body.centre_m) < body.radius_m)
+        };
+        // What the walls on the right reach by way of bodies.
+        let mut reached: Vec<&Body> = Vec::new();
+        let near = |a: &Body, b: &Body| (a.centre_m - b.centre_m).norm() < a.radius_m + b.radius_m;
+        while let Some(i) =
+            ahead.iter().position(|body| touches(body, Side::Above) || reached.iter().any(|other| near(body, other)))
+        {
+            reached.push(ahead.swap_remove(i));
+        }
+        reached.iter().any(|body| touches(body, Side::Below))
+    }
+
     /// Number of routes: obstacles, those enveloped as one counting once, plus one (paper, E5).
     #[must_use]
     pub fn count(&self) -> usize {

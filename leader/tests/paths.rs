@@ -179,6 +179,19 @@ fn in_a_gap_a_body_counts_to_the_nearer_wall() {
 }
 
 #[test]
+fn bodies_ahead_bar_a_gap_if_they_leave_no_way_beside_them() {
+    let routes = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
+    let body = |x: f64, y: f64| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 };
+    let barred = |bodies: &[Body]| [0, 1, 2].map(|route| routes.is_barred(route, Vec2::new(600.0, 0.0), bodies));
+    assert_eq!(barred(&[]), [false; 3]);
+    assert_eq!(barred(&[body(640.0, 0.0)]), [false, true, false]);
+    assert_eq!(barred(&[body(640.0, 35.0)]), [false; 3], "there is room on one side");
+    assert_eq!(barred(&[body(640.0, 35.0), body(640.0, -20.0)]), [false, true, false], "two bar it together");
+    assert_eq!(barred(&[body(710.0, 0.0)]), [false; 3], "beyond the gap");
+    assert!(!routes.is_barred(1, Vec2::new(650.0, 0.0), &[body(640.0, 0.0)]), "it is behind");
+}
+
+#[test]
 fn a_lane_past_two_sets_keeps_both() {
     let (first, second) = (routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]), routes(&[rectangle(220.0, 0.0, 10.0, 40.0)]));
     let target = Vec2::new(second.exit_x_m() + RUN_OUT_M, 0.0);

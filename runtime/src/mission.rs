@@ -5,7 +5,7 @@ use crate::cockpit::Cockpit;
 use crate::{RuntimeError, plan};
 use skein_agent::danger::Braking;
 use skein_agent::guidance::GuidanceParams;
-use skein_agent::safety::SafetyParams;
+use skein_agent::safety::{RANGING, SafetyParams};
 use skein_agent::{PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
 use skein_leader::planner::{Destination, Objective, PlannerParams, Strategy};
@@ -14,9 +14,6 @@ use skein_leader::slots::Reformation;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use skein_scenario::{End, Failsafe, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
-
-/// Neighbours are sensed within this many safe distances.
-const RANGING: f64 = 2.0;
 
 /// Number of drones in a scenario.
 #[must_use]

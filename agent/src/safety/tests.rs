@@ -1,0 +1,110 @@
+use super::*;
+use proptest::prelude::*;
+
+const PARAMS: SafetyParams = SafetyParams {
+    safe_distance_m: 30.0,
+    clearance_m: 15.0,
+    acceleration_max_mps2: 5.0,
+    gain_per_s: 1.5,
+    margin: 0.02,
+    reaction_time_s: 0.0,
+    dt_s: DT,
+};
+const DT: f64 = 0.02;
+
+/// Flies two drones, each wanting to fly with its velocity for ever; returns their least distance.
+fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
+    let wanted = v;
+    let mut filters = [Safety::new(PARAMS), Safety::new(PARAMS)];
+    let mut least = f64::INFINITY;
+    for _ in 0..1500 {
+        let accelerations = [0, 1].map(|i| {
+            let other = 1 - i;
+            let (position_m, velocity_mps) = (p[other] - p[i], v[other] - v[i]);
+            let id = DroneId(other as u32);
+            let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, sensed: true, share: shares[i] };
+            let want = (wanted[i] - v[i]) * 2.0;
+            filters[i].filter(want, v[i], std::iter::empty(), std::iter::once(neighbour))
+        });
+        for i in 0..2 {
+            let next = v[i] + accelerations[i] * DT;
+            p[i] += (v[i] + next) * (DT / 2.0);
+            v[i] = next;
+        }
+        least = least.min((p[0] - p[1]).norm());
+    }
+    least
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn two_drones_on_any_crossing_keep_their_distance(angle in 0.3..std::f64::consts::PI, offset in -40.0..40.0, share in 0.1..0.9) {
+        let other = Vec2::new(f64::cos(angle), f64::sin(angle)) * 10.0;
+        let start = -other * 15.0 + Vec2::new(0.0, offset);
+        let (p, v) = ([Vec2::new(-150.0, 0.0), start], [Vec2::new(10.0, 0.0), other]);
+        prop_assume!((p[0] - p[1]).norm() > 45.0);
+        let least = fly_pair(p, v, [share, 1.0 - share]);
+        prop_assert!(least >= PARAMS.safe_distance_m, "{least}");
+    }
+}
+
+#[test]
+fn one_that_takes_all_is_safe_from_one_that_takes_nothing() {
+    let least = fly_pair([Vec2::zeros(), Vec2::new(90.0, 5.0)], [Vec2::new(10.0, 0.0), Vec2::zeros()], [1.0, 0.0]);
+    assert!(least >= PARAMS.safe_distance_m, "{least}");
+}
+
+#[test]
+fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
+    for share in [0.1, 0.5, 0.9] {
+        let (mut ahead, mut behind) = ((31.0, 10.0), (0.0, 10.0));
+        let mut filter = Safety::new(PARAMS);
+        for _ in 0..1500 {
+            let neighbour = Neighbour {
+                id: DroneId(0),
+                position_m: Vec2::new(ahead.0 - behind.0, 0.0),
+                velocity_mps: Vec2::new(ahead.1 - behind.1, 0.0),
+                age_s: 0.0,
+                sensed: true,
+                share,
+            };
+            let (velocity, wanted) = (Vec2::new(behind.1, 0.0), Vec2::new((10.0 - behind.1) * 2.0, 0.0));
+            let a = filter.filter(wanted, velocity, std::iter::empty(), std::iter::once(neighbour));
+            let brake = -f64::min(PARAMS.acceleration_max_mps2, ahead.1 / DT);
+            for (body, a) in [(&mut ahead, brake), (&mut behind, a.x)] {
+                *body = (body.0 + body.1 * DT + a * DT * DT / 2.0, body.1 + a * DT);
+            }
+            assert!(ahead.0 - behind.0 >= PARAMS.safe_distance_m, "{} with share {share}", ahead.0 - behind.0);
+        }
+    }
+}
+
+#[test]
+fn who_flies_on_sight_stops_for_whoever_comes_into_sight() {
+    let speed = PARAMS.speed_on_sight_mps();
+    let (apart, towards) = (Vec2::new(RANGING * PARAMS.safe_distance_m, 0.0), Vec2::new(speed, 0.0));
+    for offset in [0.0, 0.1, 8.0] {
+        let least = fly_pair([Vec2::zeros(), apart + Vec2::new(0.0, offset)], [towards, -towards], [1.0, 1.0]);
+        assert!(least >= PARAMS.safe_distance_m, "{least}");
+    }
+    let least = fly_pair([Vec2::zeros(), apart], [towards * 1.1, -towards * 1.1], [1.0, 1.0]);
+    assert!(least < PARAMS.safe_distance_m, "the speed is not lower than it has to be: {least}");
+    let slow = SafetyParams { reaction_time_s: 0.5, ..PARAMS }.speed_on_sight_mps();
+    assert!(slow < speed - 1.0 && slow > 0.0, "{slow}");
+}
+
+#[test]
+fn a_drone_stops_before_a_wall() {
+    let mut filter = Safety::new(PARAMS);
+    let (mut x, mut v) = (-80.0, Vec2::new(10.0, 0.0));
+    for _ in 0..2000 {
+        let wall = NearObstacle { nearest_m: Vec2::new(-x, 0.0), distance_m: -x };
+        let a = filter.filter((Vec2::new(10.0, 0.0) - v) * 2.0, v, std::iter::once(wall), std::iter::empty());
+        let next = v + a * DT;
+        x += (v.x + next.x) * DT / 2.0;
+        v = next;
+        assert!(x <= -PARAMS.clearance_m, "{x}");
+    }
+    assert!(x > -PARAMS.clearance_m - 1.0, "it comes close: {x}");
+}

@@ -1,0 +1,75 @@
+//! Whatever goes wrong, those who still fly keep their distances and get there.
+#![allow(clippy::unwrap_used)]
+
+use skein_protocol::record::{Happening, Outcome, RecordSink, RecordView};
+use skein_runtime::inline;
+use skein_scenario::{Scenario, Source};
+
+/// How a mission ended, and why.
+#[derive(Default)]
+struct Ending(Option<(Outcome, String)>);
+
+impl RecordSink for Ending {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+        for event in record
+            .parse_events(|line| serde_json::from_slice(line))
+            .map_err(|error: serde_json::Error| error.to_string())?
+        {
+            if let Happening::End { outcome, reason, .. } = event.what {
+                self.0 = Some((outcome, reason));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn fly(name: &str, keys: &[(&str, &str)]) -> (Outcome, String) {
+    let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap();
+    let keys: Vec<(String, String)> = keys.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+    let scenario = Scenario::parse(&text, Source { name: &path, stem: "flight" }, &keys).unwrap();
+    let mut ending = Ending::default();
+    inline::run(&scenario, &mut ending, || None).unwrap();
+    ending.0.unwrap()
+}
+
+/// Flies each set of faults; all have to get there safely.
+fn all_get_there(name: &str, faults: impl Iterator<Item = Vec<String>>) {
+    let mut failed = Vec::new();
+    for plan in faults {
+        let names: Vec<String> = (0..plan.len()).map(|i| format!("fault.{i}")).collect();
+        let keys: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(plan.iter().map(String::as_str)).collect();
+        let (outcome, reason) = fly(name, &keys);
+        if outcome != Outcome::Reached {
+            failed.push(format!("{plan:?}: {outcome:?}, {reason}"));
+        }
+    }
+    assert!(failed.is_empty(), "{name}, {} failed:\n{}", failed.len(), failed.join("\n"));
+}
+
+#[test]
+fn a_newcomer_goes_round_a_body_that_it_never_heard() {
+    let kill = r#"{ kind = "kill", at_s = 10, target = "leader" }"#;
+    let restart = |at_s: u32| format!(r#"{{ kind = "restart", at_s = {at_s}, for_s = 5, target = "member" }}"#);
+    all_get_there("paper/s2-right", (11..25).step_by(3).map(|at_s| vec![kill.to_owned(), restart(at_s)]));
+}
+
+#[test]
+fn a_body_in_a_gap_sends_the_queue_behind_it_another_way() {
+    let kill = |at_s: u32| vec![format!(r#"{{ kind = "kill", at_s = {at_s}, target = "first-in-queue" }}"#)];
+    all_get_there("narrow/gap", (14..=34).step_by(4).map(kill));
+}
+
+#[test]
+fn who_follows_one_that_stops_dead_is_not_pushed_into_it_by_those_behind() {
+    let kill = vec![r#"{ kind = "kill", at_s = 38, target = "first-in-queue" }"#.to_owned()];
+    all_get_there("paper/forest", std::iter::once(kill));
+}
+
+#[test]
+fn halves_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
+    for sides in ["[[0], [1, 2, 3, 4, 5, 6, 7]]", "[[0, 1], [2, 3], [4, 5], [6, 7]]"] {
+        let cut = format!(r#"{{ kind = "partition", on = "reforming", after_s = 1, for_s = 10, sides = {sides} }}"#);
+        all_get_there("paper/forest", std::iter::once(vec![cut]));
+    }
+}
