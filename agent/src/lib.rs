@@ -24,6 +24,7 @@ mod reaction;
 pub mod rehearsal;
 pub mod safety;
 pub mod stage;
+mod stray;
 pub mod swarm_pilot;
 pub mod way;
 

@@ -10,6 +10,7 @@ use crate::queue::{Ahead, ahead_of, queue_speed};
 use crate::reaction::Reaction;
 use crate::rehearsal::{MOST_MEMBERS, Rehearsal, Start};
 use crate::safety::{NearObstacle, Neighbour, Safety};
+use crate::stray::Stray;
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
@@ -40,6 +41,7 @@ pub struct SwarmPilot {
     reaction: Reaction,
     foresight: Foresight,
     escape: Escape,
+    stray: Stray,
     rehearsal: Option<Rehearsal>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
@@ -57,6 +59,7 @@ impl SwarmPilot {
             reaction: Reaction::new(params.braking.reaction_time_s, params.dt_s),
             foresight: Foresight::default(),
             escape: Escape::default(),
+            stray: Stray::default(),
             rehearsal: None,
             silent: Vec::new(),
             ahead: Vec::new(),
@@ -167,6 +170,11 @@ impl SwarmPilot {
         if let Some(pull) = self.way.pull(senses.position) {
             return pull.direction * self.queue_speed(senses.now, places);
         }
+        let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
+        let unfollowed = self.leading.is_unfollowed(senses.now);
+        if let Some((slot, velocity)) = self.stray.slot(senses.now, unfollowed, shape, spacing_m) {
+            return self.on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
+        }
         match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
             (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID => {
                 let (anchor, velocity) = anchor(&orders.plan, senses.now);
@@ -253,6 +261,7 @@ impl Pilot for SwarmPilot {
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for Heard { source, message } in heard {
             self.leading.hear(senses.now, *source, message, say);
+            self.stray.hear(message);
         }
         self.leading.feel(senses.broken != 0);
         self.sense(senses);
