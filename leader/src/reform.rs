@@ -114,25 +114,26 @@ impl Planner {
         let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
         let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
         let mut anchor = Vec2::new(x, self.params.course_y_m);
-        let mut steps = 0;
-        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && self.is_blocked(s, shape, anchor) {
+        let (mut steps, is_blocked) = (0, self.blocker(s));
+        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && is_blocked(shape, anchor) {
             anchor.x += ANCHOR_STEP_M;
             steps += 1;
         }
         anchor
     }
 
-    /// Whether a slot is too near to an obstacle or to a dead drone.
-    fn is_blocked(&self, s: &Situation<'_>, shape: &[Vec2], anchor: Vec2) -> bool {
+    /// Tells whether a slot of a shape with its front slot somewhere is too near to an obstacle or to a dead drone.
+    fn blocker<'a>(&self, s: &Situation<'a>) -> impl Fn(&[Vec2], Vec2) -> bool + use<'a> {
         let keep_m = DEAD_BERTH * self.params.safe_distance_m;
         let clear_m = self.params.routes.planning_distance_m;
         let shapes: Vec<(Vec<Vec2>, f64)> =
             s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
-        let shut = |slot: Vec2| {
-            s.silent.iter().any(|dead| (slot - dead).norm() < keep_m)
+        let silent = s.silent;
+        let shut = move |slot: Vec2| {
+            silent.iter().any(|dead| (slot - dead).norm() < keep_m)
                 || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
         };
-        shape.iter().any(|slot| shut(slot + anchor))
+        move |shape, front| shape.iter().any(|slot| shut(slot + front))
     }
 
     /// Where the front slot goes so that a member that goes its own way has a slot, and which one: the one it stands in, or
@@ -151,10 +152,11 @@ impl Planner {
             let here = nearest_of(&mut (0..shape.len())).filter(|slot| off(slot) <= self.params.arrival_error_m);
             return (usual, Some((member, here.unwrap_or(0))));
         };
+        let is_blocked = self.blocker(s);
         let free = |slot: &usize| {
             let (anchor, mut others) = (stands - shape[*slot], shape.to_vec());
             others.remove(*slot);
-            anchor.x >= stop_x_m && !self.is_blocked(s, &others, anchor)
+            anchor.x >= stop_x_m && !is_blocked(&others, anchor)
         };
         match nearest_of(&mut (0..shape.len()).filter(free)) {
             Some(slot) => (stands - shape[slot], Some((member, slot))),

@@ -94,3 +94,13 @@ fn who_never_hears_again_is_given_the_place_where_it_stands() {
     all_get_there("paper/s2-right", to_the_end("deaf"));
     all_get_there("narrow/door", to_the_end("deaf"));
 }
+
+#[test]
+fn who_was_cut_off_does_not_stay_in_the_way_once_it_hears_the_others_again() {
+    let cut = r#"{ kind = "partition", on = "queued", after_s = 1, for_s = 30, sides = [[0], [1, 2, 3, 4, 5, 6, 7]] }"#;
+    for seed in ["1", "3", "4"] {
+        let (outcome, reason) =
+            fly("paper/s1-right", &[("seed", seed), ("formation.start_jitter_m", "1"), ("fault.0", cut)]);
+        assert_eq!(outcome, Outcome::Reached, "seed {seed}: {reason}");
+    }
+}
