@@ -7,6 +7,7 @@
 //! | [`danger`] | detection distances (equations 1–4) |
 //! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
 //! | [`escape`] | out of a corner |
+//! | `stray` | into the others' formation, though none of them hears this drone |
 //! | [`rehearsal`], [`stage`] | a leader flies its alternatives ahead |
 //! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
 //! | [`talk`] | what is said, and when |
@@ -24,6 +25,7 @@ mod reaction;
 pub mod rehearsal;
 pub mod safety;
 pub mod stage;
+mod stray;
 pub mod swarm_pilot;
 pub mod way;
 

@@ -136,11 +136,13 @@ impl Safety {
         let mut counted = std::mem::take(&mut self.counted);
         counted.clear();
         counted.extend(neighbours.map(|neighbour| self.count(neighbour, velocity, lag)));
-        // Of those who come first the nearest before all.
-        counted.sort_by(|a, b| match (a.first, b.first) {
-            (true, true) => a.barrier.beyond_m.total_cmp(&b.barrier.beyond_m),
-            _ => b.first.cmp(&a.first),
-        });
+        // Of those who come first the nearest before all; the order of the others stays.
+        if counted.iter().any(|c| c.first) {
+            counted.sort_by(|a, b| match (a.first, b.first) {
+                (true, true) => a.barrier.beyond_m.total_cmp(&b.barrier.beyond_m),
+                _ => b.first.cmp(&a.first),
+            });
+        }
         let mut hard = self.planes.len();
         for Counted { neighbour, barrier, braking, missing, first } in &counted {
             self.planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));

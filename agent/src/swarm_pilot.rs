@@ -10,6 +10,7 @@ use crate::queue::{Ahead, ahead_of, queue_speed};
 use crate::reaction::Reaction;
 use crate::rehearsal::{MOST_MEMBERS, Rehearsal, Start};
 use crate::safety::{NearObstacle, Neighbour, Safety};
+use crate::stray::Stray;
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
@@ -17,7 +18,7 @@ use skein_leader::ledger::Orders;
 use skein_leader::planner::Strategy;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::downlink::Senses;
-use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, QueuePlace, set_tag};
+use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, PHASE_REFORM, QueuePlace, set_tag};
 use skein_protocol::{Message, SimTime, Vec2};
 
 /// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
@@ -26,6 +27,9 @@ const DEAD_BERTH: f64 = 1.1;
 /// A drone that does not get on waits so long before it gives way, s; in formation the leader opens ranks before.
 const PATIENCE_ON_THE_WAY_S: f64 = 3.0;
 const PATIENCE_IN_FORMATION_S: f64 = 8.0;
+
+/// A formation of another term than the leader's is given up after so long, s.
+const OLD_FORMATION_S: f64 = 5.0;
 
 /// Out of a gap that a body bars a drone flies back at this part of its speed.
 const CORNERED: f64 = 0.5;
@@ -40,6 +44,9 @@ pub struct SwarmPilot {
     reaction: Reaction,
     foresight: Foresight,
     escape: Escape,
+    stray: Stray,
+    /// Since when it obeys a formation of another term than its leader's.
+    old_formation: Option<SimTime>,
     rehearsal: Option<Rehearsal>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
@@ -57,6 +64,8 @@ impl SwarmPilot {
             reaction: Reaction::new(params.braking.reaction_time_s, params.dt_s),
             foresight: Foresight::default(),
             escape: Escape::default(),
+            stray: Stray::default(),
+            old_formation: None,
             rehearsal: None,
             silent: Vec::new(),
             ahead: Vec::new(),
@@ -167,14 +176,30 @@ impl SwarmPilot {
         if let Some(pull) = self.way.pull(senses.position) {
             return pull.direction * self.queue_speed(senses.now, places);
         }
+        let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
+        let unfollowed = self.leading.is_unfollowed(senses.now);
+        if let Some((slot, velocity)) = self.stray.slot(senses.now, unfollowed, shape, spacing_m) {
+            return self.on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
+        }
+        let over = self.is_formation_over(senses.now);
         match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
-            (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID => {
+            (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID && !over => {
                 let (anchor, velocity) = anchor(&orders.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
                 self.on_sight(wanted, senses.now)
             }
             _ => cruise,
         }
+    }
+
+    /// Whether the formation it obeys was one of another term than that of its leader, who for long has made no new one: the
+    /// others are still on their way, and a drone that kept its slot might bar it.
+    fn is_formation_over(&mut self, now: SimTime) -> bool {
+        let term = self.leading.election.obeyed();
+        let orders = self.leading.ledger.obeyed();
+        let old = orders.is_some_and(|orders| orders.plan.phase == PHASE_REFORM && orders.plan.id.ballot != term);
+        self.old_formation = old.then(|| self.old_formation.unwrap_or(now));
+        self.old_formation.is_some_and(|since| now.since(since) >= OLD_FORMATION_S)
     }
 
     /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
@@ -253,6 +278,7 @@ impl Pilot for SwarmPilot {
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for Heard { source, message } in heard {
             self.leading.hear(senses.now, *source, message, say);
+            self.stray.hear(message);
         }
         self.leading.feel(senses.broken != 0);
         self.sense(senses);

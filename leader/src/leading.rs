@@ -184,6 +184,13 @@ impl Leading {
         self.peers.living(now).take_while(|(id, _)| *id < self.me).filter(before).take(ANSWERS).count()
     }
 
+    /// Whether it leads and hears others, none of whom follows it. Lasts that, nobody hears this drone.
+    #[must_use]
+    pub fn is_unfollowed(&self, now: SimTime) -> bool {
+        let mut peers = self.peers.living(now).peekable();
+        self.election.leads() && peers.peek().is_some() && peers.all(|(_, pose)| pose.term != self.election.obeyed())
+    }
+
     /// Hears something that is said in this term; whether the drone obeys it, and does not lead itself.
     fn sign(&mut self, now: SimTime, source: DroneId, ballot: Ballot, scope: GroupId, named: bool) -> bool {
         if ballot.claimant.0 >= self.drones {

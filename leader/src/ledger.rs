@@ -148,6 +148,13 @@ impl Ledger {
         self.obeyed.as_ref()?.parts.get(&self.me)
     }
 
+    /// Whether this drone has, as far as it heard, no part in the newest plan.
+    #[must_use]
+    pub fn is_left_out(&self) -> bool {
+        let newer = self.plan.as_ref().is_some_and(|plan| plan.id > self.stamp());
+        newer && !self.parts.contains_key(&self.me)
+    }
+
     /// The sets that are being passed, in flight order.
     #[must_use]
     pub fn sets(&self) -> &[PlannedSet] {

@@ -10,6 +10,9 @@ use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, Vec2};
 /// A leader that has been behind for so long asks another one to take over, s.
 const BEHIND_S: f64 = 3.0;
 
+/// A drone that has had no part in its leader's plan for so long takes it that the leader does not hear it, s.
+const LEFT_OUT_S: f64 = 4.0;
+
 /// What a drone waits for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Due {
@@ -19,6 +22,8 @@ pub(crate) struct Due {
     whole: Option<SimTime>,
     /// From when on this leader asks another one to take over, and whether because a sensor is broken.
     heir: Option<(bool, SimTime)>,
+    /// Since when its leader plans without it.
+    left_out: Option<SimTime>,
     /// Somebody obeys what this leader never said: a new term puts an end to that.
     pub belied: bool,
 }
@@ -29,8 +34,27 @@ impl Leading {
         if std::mem::take(&mut self.due.belied) && self.election.leads() {
             return Some(Input::Claim(self.election.scope()));
         }
-        let claim = self.claimable(now, own).map(Input::Claim);
+        let claim = self.claimable(now, own).or_else(|| self.scope_without_leader(now, own)).map(Input::Claim);
         claim.or_else(|| self.heir(now, own).map(Input::Yield))
+    }
+
+    /// The scope that this drone is to lead because its leader, well as it is, plans without it for too long: either that
+    /// one hears nobody, and the others wait as well, those closer to the destination first; or nobody hears this drone,
+    /// and what it claims does not matter.
+    fn scope_without_leader(&mut self, now: SimTime, own: &Own) -> Option<GroupId> {
+        if self.election.leads() || !self.ledger.is_left_out() {
+            self.due.left_out = None;
+            return None;
+        }
+        let waited_s = now.since(*self.due.left_out.get_or_insert(now)) - LEFT_OUT_S;
+        if waited_s < 0.0 {
+            return None;
+        }
+        let (scope, leader) = (self.election.scope(), self.election.obeyed().claimant);
+        let mine = self.key(own.position, self.me);
+        let rivals = self.living_peers(now).filter(|m| m.id != leader && scope.contains(m.group));
+        let rank = rivals.filter(|m| self.key(m.position, m.id) < mine).count();
+        (waited_s >= self.wait_s * rank as f64).then_some(scope)
     }
 
     /// Who is to take over from this leader: at once if a sensor of its own is broken and a member has all of them; or
@@ -109,7 +133,8 @@ impl Leading {
 
     fn myself(&self, own: &Own) -> Member {
         let Own { position, velocity, .. } = *own;
-        Member { id: self.me, position, speed_mps: velocity.norm(), velocity, group: self.ledger.group() }
+        let (speed_mps, group) = (velocity.norm(), self.ledger.group());
+        Member { id: self.me, position, speed_mps, velocity, group, follows: true }
     }
 
     /// Living peers by now. The group is the one the plan puts a peer in, or the plan before that split the group, unless
@@ -123,7 +148,8 @@ impl Leading {
             let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);
             let velocity = Vec2::from(pose.velocity_mps);
-            Member { id, position: extrapolated(pose, now), speed_mps: velocity.norm(), velocity, group }
+            let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());
+            Member { id, position, speed_mps: velocity.norm(), velocity, group, follows }
         })
     }
 

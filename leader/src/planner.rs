@@ -115,6 +115,8 @@ pub struct Member {
     pub velocity: Vec2,
     /// The group it is in.
     pub group: GroupId,
+    /// Whether its last beacon shows that it obeys this leader's term.
+    pub follows: bool,
 }
 
 /// What a leader knows when it decides.

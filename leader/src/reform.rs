@@ -3,7 +3,7 @@
 use crate::geometry::nearest;
 use crate::ledger::Orders;
 use crate::planner::{Destination, Member, Planner, Situation};
-use crate::slots;
+use crate::slots::{self, Reformation};
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
 use skein_protocol::{GroupId, SimTime, Vec2};
 
@@ -29,6 +29,8 @@ pub(crate) struct Reform {
     stalled: Option<SimTime>,
     /// Whether the ranks are open.
     open: bool,
+    /// Whether the formation is made round a member that follows nobody, or that is the only one.
+    round_one: bool,
 }
 
 impl Planner {
@@ -40,7 +42,9 @@ impl Planner {
         if !passed && same {
             self.reform.changed = None;
             return obeyed.filter(|orders| self.stuck(s, orders)).and_then(|orders| {
-                self.reform = Reform { open: !self.reform.open, ..Reform::default() };
+                let round_one = s.members.iter().any(|m| is_alone(m, s));
+                let open = !round_one && !self.reform.open;
+                self.reform = Reform { open, round_one, ..Reform::default() };
                 self.slots(s, orders.plan.phase)
             });
         }
@@ -72,11 +76,15 @@ impl Planner {
 
     fn slots(&self, s: &Situation<'_>, phase: u32) -> Option<Orders> {
         let close = self.params.shape.slots(s.members.len(), self.params.spacing_m);
-        let anchor = self.anchor(s, &close, phase);
+        let pinned = s.members.iter().position(|m| self.reform.round_one && is_alone(m, s));
+        let (anchor, pin) = match pinned {
+            Some(member) => self.anchor_at(s, &close, phase, member),
+            None => (self.anchor(s, &close, phase), None),
+        };
         let shape = if self.reform.open { opened(&close) } else { close };
         let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
-        let taken = slots::assign_by(self.params.reformation, &positions, &places).ok()?;
+        let taken = assign_pinned(self.params.reformation, positions, places, pin)?;
         let plan = self.plan(s, phase, &[], anchor);
         let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, s.members)).collect();
         let part = |(i, m): (usize, &Member)| {
@@ -106,22 +114,79 @@ impl Planner {
         let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
         let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
         let mut anchor = Vec2::new(x, self.params.course_y_m);
-        let keep_m = DEAD_BERTH * self.params.safe_distance_m;
-        let clear_m = self.params.routes.planning_distance_m;
-        let shapes: Vec<(Vec<Vec2>, f64)> =
-            s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
-        let shut = |slot: Vec2| {
-            s.silent.iter().any(|dead| (slot - dead).norm() < keep_m)
-                || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
-        };
-        let blocked = |anchor: Vec2| shape.iter().any(|slot| shut(slot + anchor));
-        let mut steps = 0;
-        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && blocked(anchor) {
+        let (mut steps, is_blocked) = (0, self.blocker(s));
+        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && is_blocked(shape, anchor) {
             anchor.x += ANCHOR_STEP_M;
             steps += 1;
         }
         anchor
     }
+
+    /// Tells whether a slot of a shape with its front slot somewhere is too near to an obstacle or to a dead drone.
+    fn blocker<'a>(&self, s: &Situation<'a>) -> impl Fn(&[Vec2], Vec2) -> bool + use<'a> {
+        let keep_m = DEAD_BERTH * self.params.safe_distance_m;
+        let clear_m = self.params.routes.planning_distance_m;
+        let shapes: Vec<(Vec<Vec2>, f64)> =
+            s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
+        let silent = s.silent;
+        let shut = move |slot: Vec2| {
+            silent.iter().any(|dead| (slot - dead).norm() < keep_m)
+                || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
+        };
+        move |shape, front| shape.iter().any(|slot| shut(slot + front))
+    }
+
+    /// Where the front slot goes so that a member that goes its own way has a slot, and which one: the one it stands in, or
+    /// else the goal's front slot, which is where it goes if it hears nobody.
+    fn anchor_at(
+        &self,
+        s: &Situation<'_>,
+        shape: &[Vec2],
+        phase: u32,
+        member: usize,
+    ) -> (Vec2, Option<(usize, usize)>) {
+        let (usual, stands) = (self.anchor(s, shape, phase), s.members[member].position);
+        let off = |slot: &usize| (stands - shape[*slot] - usual).norm();
+        let nearest_of = |slots: &mut dyn Iterator<Item = usize>| slots.min_by(|a, b| off(a).total_cmp(&off(b)));
+        let Destination::Hold { stop_x_m } = self.params.destination else {
+            let here = nearest_of(&mut (0..shape.len())).filter(|slot| off(slot) <= self.params.arrival_error_m);
+            return (usual, Some((member, here.unwrap_or(0))));
+        };
+        let is_blocked = self.blocker(s);
+        let free = |slot: &usize| {
+            let (anchor, mut others) = (stands - shape[*slot], shape.to_vec());
+            others.remove(*slot);
+            anchor.x >= stop_x_m && !is_blocked(&others, anchor)
+        };
+        match nearest_of(&mut (0..shape.len()).filter(free)) {
+            Some(slot) => (stands - shape[slot], Some((member, slot))),
+            None => (usual, None),
+        }
+    }
+}
+
+/// Whether a member goes its own way: it follows nobody, or there is nobody else.
+fn is_alone(member: &Member, s: &Situation<'_>) -> bool {
+    !member.follows || s.members.len() == 1
+}
+
+/// Who takes which slot; `pin`: a member, by place, and the slot it is in already. `None` without a slot for everybody.
+fn assign_pinned(
+    method: Reformation,
+    mut positions: Vec<Vec2>,
+    mut places: Vec<Vec2>,
+    pin: Option<(usize, usize)>,
+) -> Option<Vec<usize>> {
+    if let Some((member, slot)) = pin {
+        positions.remove(member);
+        places.remove(slot);
+    }
+    let mut taken = slots::assign_by(method, &positions, &places).ok()?;
+    if let Some((member, slot)) = pin {
+        taken.iter_mut().filter(|other| **other >= slot).for_each(|other| *other += 1);
+        taken.insert(member, slot);
+    }
+    Some(taken)
 }
 
 /// The group a member stays in; an orphan, of no group while others are split, joins the one of the nearest member.
@@ -139,4 +204,20 @@ fn group_of(member: &Member, members: &[Member]) -> GroupId {
 fn opened(shape: &[Vec2]) -> Vec<Vec2> {
     let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
     shape.iter().map(|slot| centre + (slot - centre) * OPEN_RANKS).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pinned_member_keeps_its_slot_and_the_others_share_the_rest() {
+        let line = |xs: &[f64]| -> Vec<Vec2> { xs.iter().map(|&x| Vec2::new(x, 0.0)).collect() };
+        let (drones, slots) = (line(&[0.0, 10.0, 20.0]), line(&[0.0, 10.0, 20.0]));
+        let assign = |pin| assign_pinned(Reformation::Optimal, drones.clone(), slots.clone(), pin);
+        assert_eq!(assign(None), Some(vec![0, 1, 2]));
+        assert_eq!(assign(Some((2, 0))), Some(vec![1, 2, 0]));
+        assert_eq!(assign(Some((0, 1))), Some(vec![1, 0, 2]));
+        assert_eq!(assign_pinned(Reformation::Optimal, drones, line(&[0.0]), Some((0, 0))), None);
+    }
 }

@@ -73,3 +73,34 @@ fn halves_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
         all_get_there("paper/forest", std::iter::once(vec![cut]));
     }
 }
+
+/// A fault to the end, to whoever leads and to a member, at three moments.
+fn to_the_end(kind: &str) -> impl Iterator<Item = Vec<String>> {
+    let moments = ["leader-elected", "queued", "reforming"].into_iter();
+    let cells = moments.flat_map(|on| ["leader", "member"].map(|target| (on, target)));
+    cells.map(move |(on, target)| {
+        vec![format!(r#"{{ kind = "{kind}", on = "{on}", after_s = 1, target = "{target}" }}"#)]
+    })
+}
+
+#[test]
+fn who_is_never_heard_again_joins_the_formation_all_the_same() {
+    all_get_there("paper/s2-right", to_the_end("mute"));
+    all_get_there("narrow/door", to_the_end("mute"));
+}
+
+#[test]
+fn who_never_hears_again_is_given_the_place_where_it_stands() {
+    all_get_there("paper/s2-right", to_the_end("deaf"));
+    all_get_there("narrow/door", to_the_end("deaf"));
+}
+
+#[test]
+fn who_was_cut_off_does_not_stay_in_the_way_once_it_hears_the_others_again() {
+    let cut = r#"{ kind = "partition", on = "queued", after_s = 1, for_s = 30, sides = [[0], [1, 2, 3, 4, 5, 6, 7]] }"#;
+    for seed in ["1", "3", "4"] {
+        let (outcome, reason) =
+            fly("paper/s1-right", &[("seed", seed), ("formation.start_jitter_m", "1"), ("fault.0", cut)]);
+        assert_eq!(outcome, Outcome::Reached, "seed {seed}: {reason}");
+    }
+}
