@@ -153,10 +153,12 @@ impl Planner {
             return (usual, Some((member, here.unwrap_or(0))));
         };
         let is_blocked = self.blocker(s);
+        // Who hears nobody, though there were others, may stand in a slot of theirs, whose front is beyond the stop.
+        let least_x_m = if s.members.len() == 1 && !s.silent.is_empty() { f64::NEG_INFINITY } else { stop_x_m };
         let free = |slot: &usize| {
             let (anchor, mut others) = (stands - shape[*slot], shape.to_vec());
             others.remove(*slot);
-            anchor.x >= stop_x_m && !is_blocked(&others, anchor)
+            anchor.x >= least_x_m && !is_blocked(&others, anchor)
         };
         match nearest_of(&mut (0..shape.len()).filter(free)) {
             Some(slot) => (stands - shape[slot], Some((member, slot))),
