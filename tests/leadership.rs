@@ -88,7 +88,9 @@ fn args(story: &Story, runtime: &str, clock: &str, out: &str) -> Vec<String> {
     let failsafe = format!("faults.failsafe=\"{}\"", story.failsafe);
     let scenario = support::paper(story.scenario);
     let words = ["run", &scenario, "--json", "--no-record", "--strategy", "congestion-aware-paper", "--out", out];
-    let rest = ["--clock", clock, "--runtime", runtime, "--set", &faults, "--set", &failsafe];
+    // Two bodies that hover right before the swarm make a long mission.
+    let time = "time.timeout_s=300";
+    let rest = ["--clock", clock, "--runtime", runtime, "--set", &faults, "--set", &failsafe, "--set", time];
     words.into_iter().chain(rest).map(str::to_owned).collect()
 }
 

@@ -114,8 +114,9 @@ pub fn narrow(study: &Study, results: &Results) -> String {
     };
     let all: Vec<String> = study.firsts().iter().map(one).collect();
     format!(
-        "Where a gap lets one drone through at a time, congestion is real with and without the law; whether a queue or a \
-         crowd is through sooner depends on the gap and on how many come. Where an opening is wide and nobody can avoid \
+        "Where a gap lets one drone through at a time, congestion is real: with the law the rule sends others round, and \
+         without it those who go through crowd. How much a queue is ahead of a crowd depends on the gap and on how many \
+         come. Where an opening is wide and nobody can avoid \
          it, strategies cannot differ, and the law alone makes the difference. All drones are past: {}.",
         all.join("; ")
     )
