@@ -7,7 +7,7 @@ use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, QueuePlace, set_tag};
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime};
 use std::collections::BTreeMap;
 
 /// A plan and everybody's part in it, as its leader made it.
@@ -46,6 +46,10 @@ pub struct PlannedSet {
     pub tag: u32,
     /// Under which plan the parts were given.
     pub stamp: PlanStamp,
+    /// When that plan was made.
+    pub made: SimTime,
+    /// How many have a part in it.
+    pub members: u32,
     /// The group that the plan was for.
     pub scope: GroupId,
     /// The ways past it.
@@ -237,7 +241,8 @@ impl Ledger {
             let routes = Routes::new(&shapes, &self.params);
             self.sets.retain(|set| !set.ids.iter().any(|id| ids.contains(id)));
             let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.clone());
-            self.sets.push(PlannedSet { ids, tag, stamp: plan.id, scope: plan.group, routes, parts });
+            let (stamp, made, members, scope) = (plan.id, plan.stamp, plan.members, plan.group);
+            self.sets.push(PlannedSet { ids, tag, stamp, made, members, scope, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));
         } else {
             self.sets.clear();

@@ -62,6 +62,9 @@ pub enum Destination {
     },
 }
 
+/// The parts of a plan, said and repeated, are heard within so long, s; the air's delay comes on top, both ways.
+const AWAITED_S: f64 = 1.0;
+
 impl Destination {
     /// Distance that decides elections: the smaller, the closer to the destination. m.
     #[must_use]
@@ -225,7 +228,7 @@ impl Planner {
             let others_wait =
                 if planned.is_some() { !waiting.iter().any(homeless) } else { !waiting.iter().all(homeless) };
             let left_to_parts = split && others_wait;
-            if !left_to_parts && !waiting.iter().all(has_part) {
+            if !left_to_parts && !waiting.iter().all(has_part) && !planned.is_some_and(|p| is_awaited(p, s)) {
                 return Need::Plan(set.clone());
             }
             need = Need::Wait;
@@ -279,6 +282,15 @@ impl Planner {
             reserved: 0,
         }
     }
+}
+
+/// Whether some parts of a plan may still be on the air, from its leader to this one: to give them anew would undo the order
+/// of a queue that others already fly in.
+fn is_awaited(planned: &PlannedSet, s: &Situation<'_>) -> bool {
+    let age_s = s.now.since(planned.made);
+    planned.stamp.ballot != s.ballot
+        && planned.parts.len() < planned.members as usize
+        && (0.0..AWAITED_S + 2.0 * s.delay_s).contains(&age_s)
 }
 
 /// Whether a plan for a set was made in this term, or by the leader of the group that this one was split from.

@@ -104,3 +104,11 @@ fn who_was_cut_off_does_not_stay_in_the_way_once_it_hears_the_others_again() {
         assert_eq!(outcome, Outcome::Reached, "seed {seed}: {reason}");
     }
 }
+
+/// Planned anew by a part's leader who does not know yet how all of it fly, the queue would lose its order: 64 s.
+#[test]
+fn a_queue_keeps_its_order_while_parts_are_on_the_air() {
+    let keys =
+        [("seed", "9"), ("formation.start_jitter_m", "5"), ("radio.preset", "\"lte\""), ("time.timeout_s", "58")];
+    assert_eq!(fly("paper/s2-right", &keys).0, Outcome::Reached);
+}
