@@ -3,6 +3,7 @@
 use crate::guidance::anchor;
 use crate::params::PilotParams;
 use crate::pilot::{Heard, Pilot};
+use crate::safety::RANGING;
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::geometry::nearest;
 use skein_leader::ledger::{Ledger, Orders};
@@ -16,8 +17,6 @@ use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
 const HORIZON_S: f64 = 200.0;
 /// Obstacles farther away are not sensed, m.
 const OBSTACLE_REACH_M: f64 = 90.0;
-/// Neighbours within so many safe distances are sensed.
-const RANGING: f64 = 2.0;
 /// A formation that is held moves no faster, m/s.
 const HOLD_SPEED_MPS: f64 = 1.0;
 
