@@ -1,9 +1,9 @@
 //! Who is near, and who evades whom.
 
-use crate::safety::Neighbour;
+use crate::safety::{Neighbour, RANGING};
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::membership::extrapolated;
-use skein_protocol::downlink::Senses;
+use skein_protocol::downlink::{BROKEN_RANGING, Senses};
 use skein_protocol::payload::{MAX_PLACES, QueuePlace};
 use skein_protocol::{DroneId, SimTime, Vec2};
 
@@ -24,10 +24,13 @@ impl SwarmPilot {
                 velocity_mps: sensed.velocity_mps.into(),
                 age_s: 0.0,
                 sensed: true,
+                least_m: 0.0,
                 share: self.share(now, sensed.drone, places),
             });
         }
         let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
+        let ranges = self.params.ranging && senses.broken & BROKEN_RANGING == 0;
+        let least_m = if ranges { RANGING * self.params.safety.safe_distance_m } else { 0.0 };
         for (id, pose) in self.leading.peers.living(now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
@@ -35,7 +38,7 @@ impl SwarmPilot {
             }
             let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
             let (age_s, share) = (senses.now.since(pose.stamp), self.share(now, id, places));
-            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, share });
+            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
         }
     }
 

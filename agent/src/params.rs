@@ -25,6 +25,8 @@ pub struct PilotParams {
     pub guidance: GuidanceParams,
     /// The safety filter.
     pub safety: SafetyParams,
+    /// Whether it has a sensor that ranges neighbours.
+    pub ranging: bool,
     /// Stopping distances.
     pub braking: Braking,
     /// Planning, should it lead; also headway, routes and course for everybody.

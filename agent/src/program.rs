@@ -6,6 +6,7 @@
 //! far is cut off, the new one lies on the border just added. No allocation once its memory has grown.
 
 use skein_protocol::Vec2;
+use std::ops::Range;
 
 /// The half-plane `normal · a ≥ bound`; `normal` has length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,10 +25,17 @@ impl HalfPlane {
 
 /// Below this, two borders are parallel.
 const PARALLEL: f64 = 1e-9;
+/// A border that is missed by less is kept, m/s²: two that are nearly one must not contradict each other.
+const KEPT_MPS2: f64 = 1e-9;
+
+/// Where not everything can be kept, this much more than has to be is given up, m/s²: at the very least, a
+/// direction that hardly matters would be taken to the utmost.
+const GIVE_MPS2: f64 = 0.1;
 
 /// Memory for [`Program::solve`], kept from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
+    relaxed: Vec<HalfPlane>,
     projected: Vec<HalfPlane>,
 }
 
@@ -39,26 +47,41 @@ enum Goal {
 }
 
 impl Program {
-    /// The acceleration nearest to `wanted` within `limit` that keeps all `planes`. The first `hard` of them weigh
-    /// more: if not all can be kept, the greatest violation among the rest is made least.
-    pub fn solve(&mut self, planes: &[HalfPlane], hard: usize, limit: f64, wanted: Vec2) -> Vec2 {
-        match optimum(planes, limit, Goal::Nearest(wanted)) {
-            Ok(a) => a,
-            Err((failed, a)) => self.least_violation(planes, hard, limit, failed, a),
+    /// The acceleration nearest to `wanted` within `limit` that keeps all `planes`. If not all can be kept, those of
+    /// one tier, `tiers` being where they end, come before those of the next: within a tier the greatest violation is
+    /// made least.
+    pub fn solve(&mut self, planes: &[HalfPlane], tiers: [usize; 2], limit: f64, wanted: Vec2) -> Vec2 {
+        let goal = Goal::Nearest(wanted);
+        if let Ok(a) = optimum(planes, limit, goal) {
+            return a;
         }
+        self.relaxed.clear();
+        self.relaxed.extend_from_slice(planes);
+        let mut from = 0;
+        for to in tiers.into_iter().chain([planes.len()]) {
+            if let Err((failed, a)) = optimum(&self.relaxed[..to], limit, goal) {
+                let a = self.least_violation(from..to, limit, (failed, a));
+                let tier = &mut self.relaxed[from..to];
+                let worst = tier.iter().map(|plane| plane.violation(a)).fold(0.0, f64::max);
+                tier.iter_mut().for_each(|plane| plane.bound -= worst + GIVE_MPS2);
+            }
+            from = to;
+        }
+        optimum(&self.relaxed, limit, goal).unwrap_or_else(|(_, a)| a)
     }
 
-    /// From plane `failed` on, moves along: each plane that is broken by more than those before is made as little
-    /// broken as the earlier ones allow.
-    fn least_violation(&mut self, planes: &[HalfPlane], hard: usize, limit: f64, failed: usize, start: Vec2) -> Vec2 {
+    /// From plane `failed` on, moves along: each plane of the tier that is broken by more than those before is made as
+    /// little broken as the earlier ones allow; those before the tier are kept.
+    fn least_violation(&mut self, tier: Range<usize>, limit: f64, (failed, start): (usize, Vec2)) -> Vec2 {
         let (mut best, mut worst) = (start, 0.0);
-        for (i, plane) in planes.iter().enumerate().skip(failed) {
+        for i in failed.max(tier.start)..tier.end {
+            let plane = self.relaxed[i];
             if plane.violation(best) <= worst {
                 continue;
             }
             self.projected.clear();
-            self.projected.extend_from_slice(&planes[..hard.min(i)]);
-            for earlier in &planes[hard.min(i)..i] {
+            self.projected.extend_from_slice(&self.relaxed[..tier.start]);
+            for earlier in &self.relaxed[tier.start..i] {
                 // Where `earlier` is broken no more than `plane`.
                 let difference = earlier.normal - plane.normal;
                 let length = difference.norm();
@@ -84,7 +107,7 @@ fn optimum(planes: &[HalfPlane], limit: f64, goal: Goal) -> Result<Vec2, (usize,
         Goal::Farthest(direction) => direction * limit,
     };
     for (i, plane) in planes.iter().enumerate() {
-        if plane.violation(best) > 0.0 {
+        if plane.violation(best) > KEPT_MPS2 {
             best = on_border(planes, i, limit, goal).ok_or((i, best))?;
         }
     }
@@ -105,7 +128,7 @@ fn on_border(planes: &[HalfPlane], i: usize, limit: f64, goal: Goal) -> Option<V
         let slope = plane.normal.dot(&along);
         let missing = plane.violation(foot);
         if slope.abs() <= PARALLEL {
-            if missing > 0.0 {
+            if missing > KEPT_MPS2 {
                 return None;
             }
         } else if slope > 0.0 {
@@ -156,14 +179,14 @@ mod tests {
         ) {
             let planes: Vec<_> = raw.iter().map(|&(angle, bound)| plane(angle, bound)).collect();
             let (limit, wanted) = (5.0, Vec2::new(wanted.0, wanted.1));
-            let a = Program::default().solve(&planes, 0, limit, wanted);
+            let a = Program::default().solve(&planes, [0; 2], limit, wanted);
             prop_assert!(a.norm() <= limit + 1e-9);
             if worst(&planes, a) <= 1e-9 {
                 let nearest = grid(limit).filter(|&p| worst(&planes, p) <= 0.0).map(|p| (p - wanted).norm());
                 prop_assert!((a - wanted).norm() <= nearest.fold(f64::INFINITY, f64::min) + 1e-9);
             } else {
                 let least = grid(limit).map(|p| worst(&planes, p)).fold(f64::INFINITY, f64::min);
-                prop_assert!(worst(&planes, a) <= least + 1e-6, "{} against {least}", worst(&planes, a));
+                prop_assert!(worst(&planes, a) <= least + GIVE_MPS2 + 1e-6, "{} against {least}", worst(&planes, a));
             }
         }
     }
@@ -171,7 +194,7 @@ mod tests {
     #[test]
     fn hard_planes_are_kept_when_soft_ones_contradict() {
         let planes = [plane(0.0, 1.0), plane(std::f64::consts::PI, 1.0)];
-        let a = Program::default().solve(&planes, 1, 5.0, Vec2::zeros());
+        let a = Program::default().solve(&planes, [1; 2], 5.0, Vec2::zeros());
         assert!(planes[0].violation(a) <= 1e-9, "{a}");
     }
 }

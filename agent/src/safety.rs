@@ -70,6 +70,8 @@ pub struct Neighbour {
     pub age_s: f64,
     /// Whether it is sensed, not told.
     pub sensed: bool,
+    /// It is at least so far away, or it would be sensed, m.
+    pub least_m: f64,
     /// Share of an evasion that this drone takes, 0 to 1.
     pub share: f64,
 }
@@ -115,8 +117,8 @@ impl Safety {
         self.params.reaction_time_s = reaction_time_s;
     }
 
-    /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles and
-    /// neighbours that cannot evade come first.
+    /// The acceleration nearest to `wanted` that is safe, m/s². If not everything can be kept, obstacles come first, then
+    /// neighbours that cannot evade.
     pub fn filter(
         &mut self,
         wanted: Vec2,
@@ -136,19 +138,13 @@ impl Safety {
         let mut counted = std::mem::take(&mut self.counted);
         counted.clear();
         counted.extend(neighbours.map(|neighbour| self.count(neighbour, velocity, lag)));
-        // Of those who come first the nearest before all; the order of the others stays.
-        if counted.iter().any(|c| c.first) {
-            counted.sort_by(|a, b| match (a.first, b.first) {
-                (true, true) => a.barrier.beyond_m.total_cmp(&b.barrier.beyond_m),
-                _ => b.first.cmp(&a.first),
-            });
-        }
-        let mut hard = self.planes.len();
-        for Counted { neighbour, barrier, braking, missing, first } in &counted {
+        let mut tiers = [self.planes.len(); 2];
+        let in_order = counted.iter().filter(|c| c.first).chain(counted.iter().filter(|c| !c.first));
+        for Counted { neighbour, barrier, braking, missing, first } in in_order {
             self.planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));
             self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
             if *first {
-                hard = self.planes.len();
+                tiers[1] = self.planes.len();
             }
             trusting.push(Trust {
                 id: neighbour.id,
@@ -159,12 +155,13 @@ impl Safety {
         }
         self.counted = counted;
         self.trusted.push_back(trusting);
-        self.program.solve(&self.planes, hard, params.acceleration_max_mps2, wanted)
+        self.program.solve(&self.planes, tiers, params.acceleration_max_mps2, wanted)
     }
 
-    /// What is to be made of a neighbour. Whoever cannot evade, or has precedence and fails to, is kept clear of like an
-    /// obstacle: first, and whatever the others do; those behind this drone have to see to it that there is room. So is
-    /// whoever has been pushed deep into the margin.
+    /// What is to be made of a neighbour. Whoever cannot evade, or has precedence and fails to, is kept clear of first, and
+    /// whatever the others do; those behind this drone have to see to it that there is room. So is whoever has been pushed
+    /// deep into the margin. Who is silent, but flies at this drone faster than this drone at it, is no body that hangs in
+    /// the air, and has to brake itself: pressed from behind, nobody flies into what is ahead.
     fn count(&self, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Counted {
         let params = &self.params;
         let of = |trusts: Option<&Vec<Trust>>| -> Option<Trust> {
@@ -176,9 +173,11 @@ impl Safety {
         let braking = of(self.trusted.back()).map_or_else(Vec2::zeros, change);
         let missing = of(due).map_or(0.0, |trust| trust.missing(braking));
         let barrier = params.neighbour_barrier(&neighbour);
-        let first = neighbour.share >= 1.0
+        let chased = barrier.normal.dot(&(velocity + theirs)) > 0.0;
+        let pressed_m = params.keep_m(0.0) - PRESSED * params.margin_m();
+        let first = (neighbour.share >= 1.0 && !chased)
             || (neighbour.share > 0.5 && missing > FAILING_MPS2)
-            || (neighbour.sensed && barrier.beyond_m < -PRESSED * params.margin_m());
+            || (neighbour.sensed && neighbour.position_m.norm() < pressed_m);
         Counted { neighbour, barrier, braking, missing, first }
     }
 }
@@ -255,7 +254,8 @@ impl SafetyParams {
         // What is known is old, and the answer comes late: meanwhile the other may have turned.
         let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
         let alpha = self.acceleration_max_mps2;
-        let beyond_m = distance - self.keep_m(late_s);
+        let unsensed_m = neighbour.least_m - self.keep_m(self.reaction_time_s);
+        let beyond_m = (distance - self.keep_m(late_s)).max(unsensed_m);
         let (root, slope) = root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
         let turning = (velocity.norm_squared() - speed * speed) / distance;

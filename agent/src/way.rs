@@ -10,8 +10,6 @@ use skein_protocol::{DroneId, PlanStamp, Vec2};
 
 /// A dead drone that drifts by more than this makes the string be drawn anew, m.
 const DRIFT_M: f64 = 1.0;
-/// The rank of a drone that nobody gave a place: behind all others.
-const NO_RANK: u16 = u16::MAX;
 
 /// One set on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +95,7 @@ impl Way {
         let part = set.parts.get(&self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
         let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
         Some(match self.detours.iter().find(|(tag, _)| *tag == set.tag) {
-            Some((_, route)) => QueuePlace { route: *route as u16, rank: NO_RANK, ..place },
+            Some((_, route)) => QueuePlace { route: *route as u16, rank: QueuePlace::NO_RANK, ..place },
             None => place,
         })
     }
@@ -140,7 +138,7 @@ impl Way {
             ledger.sets().iter().filter_map(|set| self.place(set).map(|place| (place, &set.routes))).collect();
         if let Some(own) = &self.own {
             let route = own.route as u16;
-            legs.push((QueuePlace { remaining_m: 0.0, set: own.tag, route, rank: NO_RANK }, &own.routes));
+            legs.push((QueuePlace { remaining_m: 0.0, set: own.tag, route, rank: QueuePlace::NO_RANK }, &own.routes));
         }
         legs.sort_by(|a, b| a.1.gate_x_m().total_cmp(&b.1.gate_x_m()));
         self.legs = legs

@@ -155,6 +155,7 @@ impl Leading {
 
     fn hear_pose(&mut self, now: SimTime, source: DroneId, pose: &Pose) {
         self.peers.hear(now, source, *pose);
+        self.ledger.hear_place(source, pose);
         let ballot = self.election.obeyed();
         if pose.flags & POSE_LEADS != 0 && pose.term == ballot && ballot.claimant == source {
             let scope = self.election.scope();

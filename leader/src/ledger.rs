@@ -6,7 +6,7 @@ use crate::planner::Member;
 use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, QueuePlace, set_tag};
+use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, Pose, QueuePlace, set_tag};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime};
 use std::collections::BTreeMap;
 
@@ -206,6 +206,19 @@ impl Ledger {
             }
         } else {
             self.settle(obstacles);
+        }
+    }
+
+    /// Takes what another drone says that it flies for its part in a set, if that was not heard.
+    pub fn hear_place(&mut self, drone: DroneId, pose: &Pose) {
+        for place in pose.queue.iter().filter(|place| place.rank != QueuePlace::NO_RANK) {
+            let (route, rank) = (place.route, place.rank);
+            for set in self.sets.iter_mut().filter(|set| set.tag == place.set && pose.obeyed >= set.stamp) {
+                let (id, scope, group) = (set.stamp, set.scope, pose.group);
+                let part =
+                    Assignment { id, scope, group, drone, leader: DroneId::NONE, route, rank, ..Assignment::zeroed() };
+                set.parts.entry(drone).or_insert(part);
+            }
         }
     }
 

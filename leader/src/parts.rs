@@ -121,9 +121,11 @@ impl Leading {
             (false, true) => self.rank_of_leaders(now, &me),
             (false, false) => 0,
         };
+        // Plans and claims of those before it have to be heard.
+        let step_s = self.wait_s.max(2.0 * self.peers.delay_s());
         let due = |since: &mut Option<SimTime>, condition: bool| {
             *since = condition.then(|| since.unwrap_or(now));
-            since.is_some_and(|since| now.since(since) >= self.wait_s * rank as f64)
+            since.is_some_and(|since| now.since(since) >= step_s * rank as f64)
         };
         let mut since = self.due;
         let (claim_part, claim_whole) = (due(&mut since.part, part), due(&mut since.whole, whole && !part));
@@ -170,12 +172,15 @@ impl Leading {
         self.planner.has_ahead(&self.obstacles, self.living_peers(now).chain([*me]))
     }
 
-    /// Members of this drone's part that should lead it rather: the one the plan names, and those closer to the
-    /// destination.
+    /// Members of this drone's part that should lead it rather: the one the plan names, even if its own part in it was
+    /// not heard, and those closer to the destination.
     fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
         let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
         let mine = (me.id != named, self.key(me.position, me.id));
-        self.kin(now, me).filter(|m| (m.id != named, self.key(m.position, m.id)) < mine).count()
+        let unheard = |id: DroneId| self.ledger.obeyed().is_some_and(|orders| !orders.parts.contains_key(&id));
+        let before = |m: &Member| (m.id != named, self.key(m.position, m.id)) < mine;
+        let kin = |m: &Member| me.group.contains(m.group) || (m.id == named && unheard(named));
+        self.living_peers(now).filter(|m| kin(m) && before(m)).count()
     }
 
     /// Leaders closer to the destination.

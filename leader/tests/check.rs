@@ -24,7 +24,7 @@ fn nothing_goes_wrong() {
 
 #[test]
 fn a_message_is_lost_late_or_doubled() {
-    explore(3, 2, 16, Faults { messages: 1, ..Faults::default() }, 2702);
+    explore(3, 2, 16, Faults { messages: 1, ..Faults::default() }, 2696);
 }
 
 #[test]

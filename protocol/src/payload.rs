@@ -34,6 +34,11 @@ pub struct QueuePlace {
     pub rank: u16,
 }
 
+impl QueuePlace {
+    /// The rank of a drone that nobody gave a place: behind all others.
+    pub const NO_RANK: u16 = u16::MAX;
+}
+
 /// Sets that a beacon can tell a place for: the one a drone is passing and the next.
 pub const MAX_PLACES: usize = 2;
 

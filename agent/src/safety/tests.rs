@@ -22,7 +22,8 @@ fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
             let other = 1 - i;
             let (position_m, velocity_mps) = (p[other] - p[i], v[other] - v[i]);
             let id = DroneId(other as u32);
-            let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.0, sensed: true, share: shares[i] };
+            let neighbour =
+                Neighbour { id, position_m, velocity_mps, age_s: 0.0, sensed: true, least_m: 0.0, share: shares[i] };
             let want = (wanted[i] - v[i]) * 2.0;
             filters[i].filter(want, v[i], std::iter::empty(), std::iter::once(neighbour))
         });
@@ -67,6 +68,7 @@ fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
                 velocity_mps: Vec2::new(ahead.1 - behind.1, 0.0),
                 age_s: 0.0,
                 sensed: true,
+                least_m: 0.0,
                 share,
             };
             let (velocity, wanted) = (Vec2::new(behind.1, 0.0), Vec2::new((10.0 - behind.1) * 2.0, 0.0));
@@ -107,4 +109,40 @@ fn a_drone_stops_before_a_wall() {
         assert!(x <= -PARAMS.clearance_m, "{x}");
     }
     assert!(x > -PARAMS.clearance_m - 1.0, "it comes close: {x}");
+}
+
+fn neighbour(position_m: Vec2, velocity_mps: Vec2, share: f64) -> Neighbour {
+    Neighbour { id: DroneId(7), position_m, velocity_mps, age_s: 0.0, sensed: true, least_m: 0.0, share }
+}
+
+fn filtered(wanted: Vec2, velocity: Vec2, neighbours: &[Neighbour]) -> Vec2 {
+    Safety::new(PARAMS).filter(wanted, velocity, std::iter::empty(), neighbours.iter().copied())
+}
+
+#[test]
+fn an_old_beacon_of_a_drone_that_would_be_sensed_if_it_were_near_drives_nobody_away() {
+    let told = Neighbour { age_s: 4.0, sensed: false, ..neighbour(Vec2::new(65.0, 0.0), Vec2::zeros(), 0.5) };
+    assert!(filtered(Vec2::zeros(), Vec2::zeros(), &[told]).x < -1.0, "without ranging it may be anywhere");
+    let unsensed = Neighbour { least_m: RANGING * PARAMS.safe_distance_m, ..told };
+    assert_eq!(filtered(Vec2::zeros(), Vec2::zeros(), &[unsensed]), Vec2::zeros());
+}
+
+#[test]
+fn a_drone_squeezed_from_two_sides_does_not_bolt_to_the_third() {
+    // Both a little too near and not quite opposite: across nothing is won by full acceleration.
+    let distance_m = PARAMS.safe_distance_m + 0.3;
+    let squeezed = [Vec2::new(distance_m, 0.0), Vec2::new(-distance_m, -0.6)].map(|p| neighbour(p, Vec2::zeros(), 1.0));
+    let a = filtered(Vec2::zeros(), Vec2::zeros(), &squeezed);
+    assert!(a.norm() < 1.0, "{a}");
+}
+
+#[test]
+fn nobody_is_chased_into_a_body_by_a_silent_drone() {
+    let body = neighbour(Vec2::new(34.0, 0.0), Vec2::new(-6.0, 0.0), 1.0);
+    let chaser = neighbour(Vec2::new(-33.0, 0.0), Vec2::new(3.0, 0.0), 1.0);
+    let own = Vec2::new(6.0, 0.0);
+    let alone = filtered(Vec2::zeros(), own, &[body]);
+    assert!(alone.x < -2.0, "{alone}");
+    let chased = filtered(Vec2::zeros(), own, &[body, chaser]);
+    assert!((chased - alone).norm() < 0.2, "{chased} is not {alone}");
 }

@@ -119,7 +119,10 @@ const SCALE: [[f64; 3]; 11] = [
     [229.0, 207.0, 82.0],
     [254.0, 232.0, 56.0],
 ];
+/// Least room for the rows' values.
 const LEFT: usize = 110;
+/// Of a letter, about.
+const LETTER: usize = 7;
 const TOP: usize = 60;
 const BELOW: usize = 70;
 const ROW: usize = 54;
@@ -129,8 +132,10 @@ impl HeatMap {
     #[must_use]
     pub fn draw(&self) -> String {
         let (columns, rows) = (self.x.1.len().max(1), self.y.1.len().max(1));
-        let column = (960 / columns).clamp(56, 120);
-        let (width, height) = (LEFT + column * columns + 20, TOP + ROW * rows + BELOW);
+        let longest = |values: &[String]| values.iter().map(|value| value.chars().count()).max().unwrap_or(0);
+        let column = (960 / columns).clamp(56, 120).max(LETTER * longest(&self.x.1) + 8);
+        let left = LEFT.max(LETTER * longest(&self.y.1) + 30);
+        let (width, height) = (left + column * columns + 20, TOP + ROW * rows + BELOW);
         let shown = width.max(40 + 9 * self.title.chars().count());
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{shown}\" height=\"{height}\" viewBox=\"0 0 {shown} \
@@ -141,27 +146,27 @@ impl HeatMap {
         );
         let (low, high) = bounds(self.cells.iter().flatten().map(|cell| cell.0));
         for (i, cell) in self.cells.iter().enumerate().take(columns * rows) {
-            let at = (LEFT + i % columns * column, TOP + (rows - 1 - i / columns) * ROW);
+            let at = (left + i % columns * column, TOP + (rows - 1 - i / columns) * ROW);
             draw_cell(&mut svg, at, column, *cell, (low, high));
         }
-        self.draw_axes(&mut svg, column);
+        self.draw_axes(&mut svg, left, column);
         svg.push_str("</svg>\n");
         svg
     }
 
-    fn draw_axes(&self, svg: &mut String, column: usize) {
+    fn draw_axes(&self, svg: &mut String, left: usize, column: usize) {
         let bottom = TOP + ROW * self.y.1.len();
         let mut label = |x: usize, y: usize, anchor: &str, text: &str| {
             // Writing to a string cannot fail.
             let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>", escaped(text));
         };
         for (i, value) in self.x.1.iter().enumerate() {
-            label(LEFT + i * column + column / 2, bottom + 20, "middle", value);
+            label(left + i * column + column / 2, bottom + 20, "middle", value);
         }
         for (i, value) in self.y.1.iter().enumerate() {
-            label(LEFT - 10, bottom - i * ROW - ROW / 2 + 5, "end", value);
+            label(left - 10, bottom - i * ROW - ROW / 2 + 5, "end", value);
         }
-        label(LEFT + column * self.x.1.len() / 2, bottom + 48, "middle", &format!("{} →", self.x.0));
+        label(left + column * self.x.1.len() / 2, bottom + 48, "middle", &format!("{} →", self.x.0));
         label(20, TOP - 8, "start", &format!("{} ↑", self.y.0));
     }
 }

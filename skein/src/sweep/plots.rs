@@ -1,15 +1,16 @@
-//! Which plots a sweep has: lines over one key that varies, a heat map over two.
+//! Which plots a sweep has: lines over one key that varies, heat maps over more.
 
 use super::cells::Cell;
 use super::experiment::Experiment;
 use super::metrics::{METRICS, SUCCESS, label, metric};
 use super::statistics::Estimate;
 use skein_report::plot::sweep::{HeatMap, Lines, Point, Series};
+use std::collections::BTreeSet;
 
 /// A plot's file name and its SVG.
 pub type Plot = (String, String);
 
-/// All plots, by metric; none if no key varies, or more than two.
+/// All plots, by metric; none if no key varies.
 ///
 /// # Errors
 /// What cannot be drawn.
@@ -23,9 +24,65 @@ pub fn plots(experiment: &Experiment, cells: &[Cell]) -> Result<Vec<Plot>, Strin
             let plots = scenarios().flat_map(|of| wanted.iter().filter_map(move |name| lines(experiment, of, x, name)));
             plots.collect()
         }
-        [y, x] => Ok(wanted.iter().flat_map(|name| maps(experiment, cells, (x, y), name)).collect()),
-        _ => Ok(Vec::new()),
+        [] => Ok(Vec::new()),
+        _ => {
+            let (columns, rows) = sides(experiment, varying);
+            Ok(wanted.iter().flat_map(|name| maps(experiment, cells, &columns, &rows, name)).collect())
+        }
     }
+}
+
+/// A side of a heat map: keys, by their places in the grid, and all their values with each other.
+struct Side {
+    keys: Vec<usize>,
+    name: String,
+    /// Of the keys, and what they are called.
+    values: Vec<(Vec<String>, String)>,
+}
+
+/// Columns and rows: one key, that with the most values, against all others.
+fn sides(experiment: &Experiment, varying: Vec<usize>) -> (Side, Side) {
+    let values = |&key: &usize| experiment.grid[key].values.len();
+    let widest = varying.iter().copied().max_by_key(values).unwrap_or(0);
+    let (columns, rows) = varying.into_iter().partition(|&key| key == widest);
+    (side(experiment, columns), side(experiment, rows))
+}
+
+fn side(experiment: &Experiment, keys: Vec<usize>) -> Side {
+    let mut values = vec![(Vec::new(), String::new())];
+    for &key in &keys {
+        let of_key = &experiment.grid[key].values;
+        let longer = |(before, called): &(Vec<String>, String)| {
+            let (before, called) = (before.clone(), called.clone());
+            let joined = move |(value, short): (&String, String)| {
+                let comma = if called.is_empty() { "" } else { ", " };
+                (before.iter().chain([value]).cloned().collect(), format!("{called}{comma}{short}"))
+            };
+            of_key.iter().zip(brief(of_key)).map(joined).collect::<Vec<_>>()
+        };
+        values = values.iter().flat_map(longer).collect();
+    }
+    let name: Vec<&str> = keys.iter().map(|&key| experiment.grid[key].key.as_str()).collect();
+    Side { name: name.join(", "), keys, values }
+}
+
+/// TOML values as they are called in a plot: texts without quotes, and tables by their first key that tells them apart.
+fn brief(values: &[String]) -> Vec<String> {
+    let parsed = |value: &String| toml::from_str::<toml::Table>(&format!("value = {value}")).ok()?.remove("value");
+    let parsed: Vec<Option<toml::Value>> = values.iter().map(parsed).collect();
+    let plain = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let by = |key: &str| -> Option<Vec<String>> {
+        let found = parsed.iter().map(|value| Some(plain(value.as_ref()?.get(key)?)));
+        let found: Vec<String> = found.collect::<Option<_>>()?;
+        let distinct = found.iter().collect::<BTreeSet<_>>().len() == found.len();
+        distinct.then_some(found)
+    };
+    let first = parsed.first().and_then(|value| value.as_ref()?.as_table());
+    let told_apart = first.and_then(|table| table.keys().find_map(|key| by(key)));
+    let text = |(value, parsed): (&String, &Option<toml::Value>)| {
+        parsed.as_ref().and_then(toml::Value::as_str).unwrap_or(value).to_owned()
+    };
+    told_apart.unwrap_or_else(|| values.iter().zip(&parsed).map(text).collect())
 }
 
 /// The lines of one scenario, one a strategy.
@@ -57,20 +114,23 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     Some(lines.draw().map(|svg| (file(experiment, metric, &cells[0].scenario, None), svg)))
 }
 
-fn maps(experiment: &Experiment, cells: &[Cell], (x, y): (usize, usize), metric: &str) -> Vec<Plot> {
+fn maps(experiment: &Experiment, cells: &[Cell], columns: &Side, rows: &Side, metric: &str) -> Vec<Plot> {
     let map = |of: &[Cell]| {
-        let at = |column: &String, row: &String| {
-            let cell = of.iter().find(|cell| cell.values[x] == *column && cell.values[y] == *row)?;
+        let has = |cell: &Cell, side: &Side, wanted: &[String]| {
+            side.keys.iter().zip(wanted).all(|(&key, value)| cell.values[key] == *value)
+        };
+        let at = |column: &[String], row: &[String]| {
+            let cell = of.iter().find(|cell| has(cell, columns, column) && has(cell, rows, row))?;
             let Estimate { mean, low, high, .. } = cell.estimate(metric)?;
             Some((mean, low, high))
         };
-        let (columns, rows) = (&experiment.grid[x], &experiment.grid[y]);
-        let values = rows.values.iter().flat_map(|row| columns.values.iter().map(move |column| at(column, row)));
+        let values = rows.values.iter().flat_map(|row| columns.values.iter().map(|column| at(&column.0, &row.0)));
         let (scenario, strategy) = (&of[0].scenario, &of[0].strategy);
+        let axis = |side: &Side| (side.name.clone(), side.values.iter().map(|(_, called)| called.clone()).collect());
         let map = HeatMap {
             title: format!("{}, {strategy}", title(experiment, scenario, metric)),
-            x: (columns.key.clone(), columns.values.clone()),
-            y: (rows.key.clone(), rows.values.clone()),
+            x: axis(columns),
+            y: axis(rows),
             cells: values.collect(),
         };
         (file(experiment, metric, scenario, Some(strategy)), map.draw())
@@ -154,5 +214,21 @@ mod tests {
         let svg = &plots(&two, &cells).unwrap()[0].1;
         assert_eq!((svg.matches(">0.5</text>").count(), svg.matches(">–</text>").count()), (3, 2), "{svg}");
         assert_eq!(names(&experiment(&[]), &cells), Vec::<String>::new());
+    }
+
+    #[test]
+    fn more_keys_make_a_map_of_the_longest_against_all_others() {
+        let kinds = ["{ kind = \"kill\", for_s = 5 }", "{ kind = \"deaf\", for_s = 5 }", "{ kind = \"mute\" }"];
+        let three =
+            experiment(&[("fault.0", &kinds), ("on", &["\"gate\"", "\"queued\""]), ("radio.loss", &["0", "0.5"])]);
+        let cells = [cell("a", &[kinds[1], "\"queued\"", "0.5"])];
+        assert_eq!(names(&three, &cells), ["success-a.svg", "mission_s-a.svg"]);
+        let svg = &plots(&three, &cells).unwrap()[0].1;
+        for text in
+            [">kill<", ">deaf<", ">gate, 0<", ">gate, 0.5<", ">queued, 0.5<", ">on, radio.loss ↑<", ">fault.0 →<"]
+        {
+            assert!(svg.contains(text), "{text} is not in {svg}");
+        }
+        assert_eq!(svg.matches(">–</text>").count(), 3 * 4 - 1);
     }
 }
