@@ -120,7 +120,7 @@ impl SwarmPilot {
         let (members, scope) = (self.leading.members(), self.leading.election.scope());
         let mut first = alternatives[self.leading.meanwhile()].clone();
         first.unsplit(members, scope);
-        first.parts.retain(|&id, _| members.iter().any(|m| m.id == id));
+        first.parts.retain(|id| members.iter().any(|m| m.id == id));
         self.rehearsal = Some(Rehearsal::new(self, start, alternatives));
         self.leading.adopt(start.now, first);
     }
@@ -144,9 +144,8 @@ impl SwarmPilot {
         let clearance_m = self.params.safety.clearance_m;
         let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
-        let planned = |id| {
-            self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains_key(&self.params.me))
-        };
+        let planned =
+            |id| self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(self.params.me));
         let past = |id| self.leading.obstacles.has_passed(self.params.me, id);
         let urgent = near.filter(|(detection, id)| detection.danger && !planned(*id) && !past(*id));
         let sooner = |a: &(Detection, _), b: &(Detection, _)| a.0.time_to_impact_s.total_cmp(&b.0.time_to_impact_s);
