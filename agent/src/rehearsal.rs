@@ -194,7 +194,7 @@ fn restamped(mut orders: Orders, decision: SimTime) -> Orders {
     id.epoch = id.epoch.saturating_add(1);
     let id = *id;
     orders.plan.stamp = decision;
-    orders.parts.values_mut().for_each(|part| part.id = id);
+    orders.parts.iter_mut().for_each(|part| part.id = id);
     orders
 }
 

@@ -113,7 +113,7 @@ impl Stage {
     #[must_use]
     pub fn under(&self, orders: &Orders) -> Self {
         let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
-        stage.way_s = orders.parts.values().map(|part| part.arrival_s).sum::<f64>() / orders.parts.len().max(1) as f64;
+        stage.way_s = orders.parts.iter().map(|part| part.arrival_s).sum::<f64>() / orders.parts.len().max(1) as f64;
         stage.obey(orders);
         stage
     }

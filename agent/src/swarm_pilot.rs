@@ -47,7 +47,8 @@ pub struct SwarmPilot {
     stray: Stray,
     /// Since when it obeys a formation of another term than its leader's.
     old_formation: Option<SimTime>,
-    rehearsal: Option<Rehearsal>,
+    /// Apart: only a leader that thinks has one, and all others would carry the room for it through every tick.
+    rehearsal: Option<Box<Rehearsal>>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
     pub(crate) neighbours: Vec<Neighbour>,
@@ -120,8 +121,8 @@ impl SwarmPilot {
         let (members, scope) = (self.leading.members(), self.leading.election.scope());
         let mut first = alternatives[self.leading.meanwhile()].clone();
         first.unsplit(members, scope);
-        first.parts.retain(|&id, _| members.iter().any(|m| m.id == id));
-        self.rehearsal = Some(Rehearsal::new(self, start, alternatives));
+        first.parts.retain(|id| members.iter().any(|m| m.id == id));
+        self.rehearsal = Some(Box::new(Rehearsal::new(self, start, alternatives)));
         self.leading.adopt(start.now, first);
     }
 
@@ -144,9 +145,8 @@ impl SwarmPilot {
         let clearance_m = self.params.safety.clearance_m;
         let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
-        let planned = |id| {
-            self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains_key(&self.params.me))
-        };
+        let planned =
+            |id| self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(self.params.me));
         let past = |id| self.leading.obstacles.has_passed(self.params.me, id);
         let urgent = near.filter(|(detection, id)| detection.danger && !planned(*id) && !past(*id));
         let sooner = |a: &(Detection, _), b: &(Detection, _)| a.0.time_to_impact_s.total_cmp(&b.0.time_to_impact_s);
@@ -204,9 +204,11 @@ impl SwarmPilot {
 
     /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
     fn on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
+        if self.leading.peers.silent(now).next().is_none() {
+            return wanted;
+        }
         let (speed, limit) = (wanted.norm(), self.safety.params().speed_on_sight_mps());
-        let unheard = speed > limit && self.leading.peers.silent(now).next().is_some();
-        if unheard { wanted * (limit / speed) } else { wanted }
+        if speed > limit { wanted * (limit / speed) } else { wanted }
     }
 
     fn queue_speed(&mut self, now: SimTime, places: &[QueuePlace; MAX_PLACES]) -> f64 {

@@ -68,7 +68,7 @@ impl Way {
     /// Follows the ledger: takes up new parts, closes legs that are left, evades `bodies`, drones that hang dead in the air.
     pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) {
         if self.own.as_ref().is_some_and(|own| {
-            position.x >= own.routes.exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains_key(&self.me))
+            position.x >= own.routes.exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains(self.me))
         }) {
             self.own = None;
         }
@@ -92,7 +92,7 @@ impl Way {
 
     /// The route it flies past a set, and its place in the queue.
     fn place(&self, set: &PlannedSet) -> Option<QueuePlace> {
-        let part = set.parts.get(&self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
+        let part = set.parts.get(self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
         let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
         Some(match self.detours.iter().find(|(tag, _)| *tag == set.tag) {
             Some((_, route)) => QueuePlace { route: *route as u16, rank: QueuePlace::NO_RANK, ..place },

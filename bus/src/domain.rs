@@ -40,8 +40,8 @@ pub struct Cleaned {
     pub files: usize,
 }
 
-/// The folder of all runs of this user, made if need be: `$XDG_RUNTIME_DIR/skein`, else `skein-<uid>` in the temporary
-/// folder. Mode 0700, owned by this user.
+/// The folder of all runs of this user, made if need be: `$XDG_RUNTIME_DIR/skein`, else `/dev/shm/skein-<uid>`. Mode 0700,
+/// owned by this user. In memory: a run makes a dozen files a drone, and on a disk that is most of what a start costs.
 ///
 /// # Errors
 /// [`BusError::Folder`] if somebody else owns it or others may enter it.
@@ -51,7 +51,7 @@ pub fn root() -> Result<PathBuf, BusError> {
     let own = |dir: &PathBuf| fs::metadata(dir).is_ok_and(|meta| meta.is_dir() && meta.uid() == uid);
     let root = match runtime.filter(own) {
         Some(dir) => dir.join("skein"),
-        None => std::env::temp_dir().join(format!("skein-{uid}")),
+        None => Path::new(SHARED_MEMORY).join(format!("skein-{uid}")),
     };
     private_folder(&root)?;
     Ok(root)
@@ -191,7 +191,7 @@ fn settings(path: &Path) -> Result<(String, Config), BusError> {
     let folder = |why: &str| BusError::Folder { path: path.to_owned(), why: why.to_owned() };
     let bytes = path.as_os_str().as_bytes();
     if bytes.len() > MAX_FOLDER {
-        let why = format!("its path is longer than {MAX_FOLDER} bytes, set XDG_RUNTIME_DIR or TMPDIR to a shorter one");
+        let why = format!("its path is longer than {MAX_FOLDER} bytes, set XDG_RUNTIME_DIR to a shorter one");
         return Err(folder(&why));
     }
     let tag = tag_of(path).ok_or_else(|| folder("its name is not a run's, `<label>.<pid>_<time>_<count>`"))?;

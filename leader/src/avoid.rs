@@ -83,7 +83,7 @@ impl Planner {
         let flight = Flight { speed_mps: self.params.speed_mps, course_y_m: self.params.course_y_m };
         let ways = |m: &Member| trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight);
         let ways: Vec<Vec<Trip>> = s.members.iter().map(ways).collect();
-        let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(&m.id))).collect();
+        let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(m.id))).collect();
         Some(Survey { routes, ways, kept })
     }
 
@@ -104,26 +104,26 @@ impl Planner {
     ) -> Orders {
         let Grouping { chosen, ranks, predicted_s } = grouping;
         let groups = groups(s, chosen, &survey.kept, replan);
+        let leaders = self.params.fronts(s.members, &groups);
         let plan = Plan {
             predicted_s: *predicted_s,
             routes: survey.routes.count() as u32,
             ..self.plan(s, PHASE_AVOID, set, Vec2::new(f64::INFINITY, 0.0))
         };
         let part = |(i, m): (usize, &Member)| {
-            let mine = s.ledger.obeyed().and_then(|orders| orders.parts.get(&m.id));
-            let assignment = Assignment {
+            let mine = s.ledger.obeyed().and_then(|orders| orders.parts.get(m.id));
+            Assignment {
                 id: plan.id,
                 scope: s.scope,
                 group: groups[i],
                 drone: m.id,
-                leader: self.params.front(s.members, &groups, groups[i]),
+                leader: leaders[i],
                 slot_m: mine.map_or([0.0; 2], |part| part.slot_m),
                 arrival_s: survey.ways[i][chosen[i]].arrival_s,
                 route: chosen[i] as u16,
                 rank: ranks[i],
                 reserved: 0,
-            };
-            (m.id, assignment)
+            }
         };
         Orders { plan, parts: s.members.iter().enumerate().map(part).collect() }
     }
@@ -173,7 +173,7 @@ fn row(s: &Situation<'_>, survey: &Survey<'_>, tag: u32, i: usize) -> Arrivals {
 /// The sets before `routes` that a member has still to leave, with its route past each.
 fn earlier_legs<'a>(ledger: &'a Ledger, member: &Member, routes: &Routes) -> Vec<(&'a Routes, usize)> {
     let leg = |p: &'a PlannedSet| {
-        let route = usize::from(p.parts.get(&member.id)?.route);
+        let route = usize::from(p.parts.get(member.id)?.route);
         let ahead = p.routes.gate_x_m() < routes.gate_x_m() && member.position.x < p.routes.exit_x_m();
         (ahead && route < p.routes.count()).then_some((&p.routes, route))
     };

@@ -104,7 +104,7 @@ impl Planner {
 
     /// Keeps of orders what is about the members; the others' leaders are told what was chosen for all.
     pub(crate) fn tell_chosen(&mut self, now: SimTime, orders: &mut Orders, own: impl Fn(DroneId) -> bool) {
-        if orders.parts.keys().all(|&id| own(id)) {
+        if orders.parts.iter().all(|part| own(part.drone)) {
             return;
         }
         let (plan, set) = (orders.plan, crate::obstacles::set_ids(&orders.plan.set, orders.plan.set_count));
@@ -114,8 +114,8 @@ impl Planner {
             let row = council::row(now, plan.id.ballot, plan.group, part.drone, set_tag(set), &gate_s);
             Arrivals { flags: ARRIVALS_CHOSEN, ..row }
         };
-        self.council.announce(now, orders.parts.values().map(row).collect());
-        orders.parts.retain(|&id, _| own(id));
+        self.council.announce(now, orders.parts.iter().map(row).collect());
+        orders.parts.retain(own);
     }
 }
 
@@ -157,7 +157,7 @@ fn places(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Sp
 fn add_others(orders: &mut Orders, s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Split) {
     let (plan, now_s) = (orders.plan, s.now.since(SimTime::ZERO));
     for (row, (&route, rank)) in table.iter().zip(split.routes.iter().zip(places(s, table, survey, split))) {
-        orders.parts.entry(row.drone).or_insert(Assignment {
+        orders.parts.add(Assignment {
             id: plan.id,
             scope: s.scope,
             group: row.group,

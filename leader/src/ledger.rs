@@ -3,12 +3,12 @@
 
 use crate::obstacles::{Obstacles, set_ids};
 use crate::planner::Member;
+use crate::roster::Roster;
 use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, Pose, QueuePlace, set_tag};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime};
-use std::collections::BTreeMap;
 
 /// A plan and everybody's part in it, as its leader made it.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Orders {
     /// The plan.
     pub plan: Plan,
     /// One part a member, by id.
-    pub parts: BTreeMap<DroneId, Assignment>,
+    pub parts: Roster,
 }
 
 impl Orders {
@@ -24,14 +24,14 @@ impl Orders {
     pub fn unsplit(&mut self, members: &[Member], scope: GroupId) {
         for member in members {
             let group = if scope.contains(member.group) { member.group } else { scope };
-            self.parts.entry(member.id).and_modify(|part| part.group = group);
+            self.parts.get_mut(member.id).into_iter().for_each(|part| part.group = group);
         }
     }
 
     /// Makes these orders some for all drones as one group, under this stamp.
     pub fn unite(&mut self, stamp: PlanStamp) {
         (self.plan.id, self.plan.group) = (stamp, GroupId::ALL);
-        for part in self.parts.values_mut() {
+        for part in self.parts.iter_mut() {
             (part.id, part.scope, part.group) = (stamp, GroupId::ALL, GroupId::ALL);
         }
     }
@@ -55,7 +55,7 @@ pub struct PlannedSet {
     /// The ways past it.
     pub routes: Routes,
     /// Everybody's part, as far as it was heard.
-    pub parts: BTreeMap<DroneId, Assignment>,
+    pub parts: Roster,
 }
 
 /// The ledger of one drone. Bounded by the size of the swarm and of an obstacle set.
@@ -66,8 +66,11 @@ pub struct Ledger {
     params: RouteParams,
     stamp: PlanStamp,
     plan: Option<Plan>,
-    parts: BTreeMap<DroneId, Assignment>,
+    /// Of the newest plan, until it is obeyed: then they are in `obeyed`.
+    parts: Roster,
     obeyed: Option<Orders>,
+    /// This drone's part in it: what is asked for in every tick lies with what else is, not among a thousand others.
+    mine: Option<Assignment>,
     /// The plan that split the group whose leader made the plan it obeys, if that one came from another leader.
     origin: Option<Orders>,
     sets: Vec<PlannedSet>,
@@ -85,8 +88,9 @@ impl Ledger {
             params,
             stamp: PlanStamp::default(),
             plan: None,
-            parts: BTreeMap::new(),
+            parts: Roster::default(),
             obeyed: None,
+            mine: None,
             origin: None,
             sets: Vec::new(),
             part_hash: 0,
@@ -97,6 +101,7 @@ impl Ledger {
     #[must_use]
     pub fn of_member(&self, me: DroneId) -> Self {
         let mut ledger = Self { me, ..self.clone() };
+        ledger.mine = ledger.find_part();
         ledger.part_hash = ledger.hash_part();
         ledger
     }
@@ -106,17 +111,19 @@ impl Ledger {
     #[must_use]
     pub fn united(&self, ballot: Ballot, places: &[(DroneId, QueuePlace)]) -> Self {
         let mut all = Self { origin: None, ..self.clone() };
-        let given = |id: DroneId| self.parts.contains_key(&id);
+        let newest = self.obeyed.as_ref().filter(|orders| orders.plan.id == self.stamp);
+        let given = |id: DroneId| newest.map_or(&self.parts, |orders| &orders.parts).contains(id);
         for set in &mut all.sets {
             (set.stamp.ballot, set.scope) = (ballot, GroupId::ALL);
             for &(drone, place) in places.iter().filter(|(id, place)| place.set == set.tag && !given(*id)) {
-                let part = set.parts.entry(drone).or_insert(Assignment { drone, ..Assignment::zeroed() });
+                let part = set.parts.add(Assignment { drone, ..Assignment::zeroed() });
                 (part.route, part.rank) = (place.route, place.rank);
             }
         }
         if let Some(orders) = &mut all.obeyed {
             orders.unite(PlanStamp { ballot, ..orders.plan.id });
         }
+        all.mine = all.find_part();
         all.stamp.ballot = ballot;
         all
     }
@@ -149,14 +156,18 @@ impl Ledger {
     /// This drone's part in the plan it obeys.
     #[must_use]
     pub fn part(&self) -> Option<&Assignment> {
-        self.obeyed.as_ref()?.parts.get(&self.me)
+        self.mine.as_ref()
+    }
+
+    fn find_part(&self) -> Option<Assignment> {
+        self.obeyed.as_ref()?.parts.get(self.me).copied()
     }
 
     /// Whether this drone has, as far as it heard, no part in the newest plan.
     #[must_use]
     pub fn is_left_out(&self) -> bool {
         let newer = self.plan.as_ref().is_some_and(|plan| plan.id > self.stamp());
-        newer && !self.parts.contains_key(&self.me)
+        newer && !self.parts.contains(self.me)
     }
 
     /// The sets that are being passed, in flight order.
@@ -198,13 +209,11 @@ impl Ledger {
         if part.drone.0 >= self.drones || !self.open(part.id) {
             return;
         }
-        self.parts.entry(part.drone).or_insert(*part);
         if let Some(orders) = self.obeyed.as_mut().filter(|orders| orders.plan.id == part.id) {
-            orders.parts.entry(part.drone).or_insert(*part);
-            for set in self.sets.iter_mut().filter(|set| set.stamp == part.id) {
-                set.parts.entry(part.drone).or_insert(*part);
-            }
+            orders.parts.add(*part);
+            self.sets.iter_mut().filter(|set| set.stamp == part.id).for_each(|set| _ = set.parts.add(*part));
         } else {
+            self.parts.add(*part);
             self.settle(obstacles);
         }
     }
@@ -245,7 +254,7 @@ impl Ledger {
     /// obstacle was learnt.
     pub fn settle(&mut self, obstacles: &Obstacles) {
         let Some(plan) = self.plan.filter(|plan| plan.id > self.stamp()) else { return };
-        if !self.parts.contains_key(&self.me) {
+        if !self.parts.contains(self.me) {
             return;
         }
         if plan.phase == PHASE_AVOID {
@@ -260,7 +269,9 @@ impl Ledger {
         } else {
             self.sets.clear();
         }
-        let before = self.obeyed.replace(Orders { plan, parts: self.parts.clone() });
+        let parts = std::mem::take(&mut self.parts);
+        let before = self.obeyed.replace(Orders { plan, parts });
+        self.mine = self.find_part();
         match before {
             Some(before) if before.plan.group != plan.group => {
                 self.origin = before.plan.group.contains(plan.group).then_some(before);

@@ -16,6 +16,7 @@ mod parts;
 pub mod planner;
 mod reform;
 mod rhythm;
+pub mod roster;
 pub mod routes;
 pub mod slots;
 pub mod split;

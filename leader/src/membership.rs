@@ -12,7 +12,6 @@ const MOST_DELAY_S: f64 = 60.0;
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
-    id: DroneId,
     /// How long it may be silent, s: what its rhythm says.
     patience_s: f64,
     /// Of its beacons, by when they came in, however long they were on the air.
@@ -33,7 +32,9 @@ pub struct Peers {
     timeout_s: f64,
     /// Running mean of the time that beacons were on the air, s.
     delay_s: f64,
-    /// By id: looked through in every tick, and seldom added to.
+    /// Who was heard, ascending: a place among them is found without touching what is known of the others.
+    ids: Vec<DroneId>,
+    /// What is known of each of them: looked through in every tick, and seldom added to.
     last: Vec<Peer>,
 }
 
@@ -41,7 +42,7 @@ impl Peers {
     /// Peers among `drones` drones; one that is silent for `timeout_s`, or much longer than usual, counts as gone.
     #[must_use]
     pub fn new(drones: u32, timeout_s: f64) -> Self {
-        Self { drones, timeout_s, delay_s: 0.0, last: Vec::new() }
+        Self { drones, timeout_s, delay_s: 0.0, ids: Vec::new(), last: Vec::new() }
     }
 
     /// Takes a beacon. One that is older than what is known, from the future, or of nobody in the swarm is ignored.
@@ -55,7 +56,8 @@ impl Peers {
             Err(place) => {
                 let rhythm = Rhythm::new(now);
                 let patience_s = rhythm.patience_s(self.timeout_s);
-                self.last.insert(place, Peer { id: source, patience_s, rhythm, pose });
+                self.ids.insert(place, source);
+                self.last.insert(place, Peer { patience_s, rhythm, pose });
             }
             Ok(place) if pose.stamp > self.last[place].pose.stamp => {
                 let peer = &mut self.last[place];
@@ -69,7 +71,7 @@ impl Peers {
     }
 
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
-        self.last.binary_search_by_key(&peer, |known| known.id)
+        self.ids.binary_search(&peer)
     }
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
@@ -85,6 +87,7 @@ impl Peers {
     /// Forgets a peer.
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
+            self.ids.remove(place);
             self.last.remove(place);
         }
     }
@@ -116,12 +119,16 @@ impl Peers {
 
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
-        self.last.iter().filter(move |known| known.lives(now)).map(|known| (known.id, &known.pose))
+        self.known().filter(move |(_, known)| known.lives(now)).map(|(id, known)| (id, &known.pose))
     }
 
     /// Peers that were heard once and are silent now, by id: they may still hang in the air.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
-        self.last.iter().filter(move |known| !known.lives(now)).map(|known| (known.id, &known.pose))
+        self.known().filter(move |(_, known)| !known.lives(now)).map(|(id, known)| (id, &known.pose))
+    }
+
+    fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
+        self.ids.iter().copied().zip(&self.last)
     }
 }
 

@@ -147,7 +147,7 @@ impl Leading {
             let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
             let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && hears(plan.ballot);
             let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
-            let group = untold.filter_map(|orders| orders.parts.get(&id)).map(|part| part.group).next();
+            let group = untold.filter_map(|orders| orders.parts.get(id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);
             let velocity = Vec2::from(pose.velocity_mps);
             let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());

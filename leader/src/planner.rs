@@ -11,6 +11,7 @@ use crate::slots::Reformation;
 use skein_protocol::formation::Shape;
 use skein_protocol::payload::{Arrivals, PHASE_AVOID, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
+use std::collections::BTreeMap;
 
 /// How a leader chooses among the groupings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -224,7 +225,7 @@ impl Planner {
             // Who is past it all the same joins those who are not.
             let joins = |m: &&Member| planned.is_some() && homeless(m);
             let waiting: Vec<&Member> = s.members.iter().filter(|m| !past(m) || joins(m)).collect();
-            let has_part = |m: &&Member| planned.is_some_and(|p| p.parts.contains_key(&m.id)) && !homeless(m);
+            let has_part = |m: &&Member| planned.is_some_and(|p| p.parts.contains(m.id)) && !homeless(m);
             let others_wait =
                 if planned.is_some() { !waiting.iter().any(homeless) } else { !waiting.iter().all(homeless) };
             let left_to_parts = split && others_wait;
@@ -299,11 +300,16 @@ fn holds(planned: &PlannedSet, s: &Situation<'_>) -> bool {
 }
 
 impl PlannerParams {
-    /// Who leads a group: its member closest to the destination; ties: the lower id.
-    pub(crate) fn front(&self, members: &[Member], groups: &[GroupId], group: GroupId) -> DroneId {
-        let of_group = members.iter().zip(groups).filter(|(_, g)| **g == group).map(|(m, _)| m);
+    /// Who leads the group of each member: the one of it that is closest to the destination; ties: the lower id.
+    pub(crate) fn fronts(&self, members: &[Member], groups: &[GroupId]) -> Vec<DroneId> {
         let distance_m = |m: &Member| self.destination.distance_m(m.position);
-        let first = of_group.reduce(|best, m| if distance_m(m) < distance_m(best) { m } else { best });
-        first.map_or(DroneId::NONE, |m| m.id)
+        let mut first: BTreeMap<GroupId, &Member> = BTreeMap::new();
+        for (member, &group) in members.iter().zip(groups) {
+            let best = first.entry(group).or_insert(member);
+            if distance_m(member) < distance_m(best) {
+                *best = member;
+            }
+        }
+        groups.iter().map(|group| first.get(group).map_or(DroneId::NONE, |m| m.id)).collect()
     }
 }

@@ -38,7 +38,8 @@ impl Planner {
     pub(crate) fn formation(&mut self, s: &Situation<'_>) -> Option<Orders> {
         let obeyed = s.ledger.obeyed().filter(|orders| orders.plan.id.ballot == s.ballot);
         let passed = !s.ledger.sets().is_empty();
-        let same = obeyed.is_some_and(|orders| orders.parts.keys().eq(s.members.iter().map(|m| &m.id)));
+        let same =
+            obeyed.is_some_and(|orders| orders.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
         if !passed && same {
             self.reform.changed = None;
             return obeyed.filter(|orders| self.stuck(s, orders)).and_then(|orders| {
@@ -60,7 +61,7 @@ impl Planner {
     /// Whether nobody has moved for a while although somebody is not in its slot; also once open ranks are taken.
     fn stuck(&mut self, s: &Situation<'_>, orders: &Orders) -> bool {
         let anchor = Vec2::from(orders.plan.anchor_m);
-        let error = |m: &Member| match orders.parts.get(&m.id) {
+        let error = |m: &Member| match orders.parts.get(m.id) {
             Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
             None => 0.0,
         };
@@ -86,21 +87,20 @@ impl Planner {
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let taken = assign_pinned(self.params.reformation, positions, places, pin)?;
         let plan = self.plan(s, phase, &[], anchor);
-        let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, s.members)).collect();
-        let part = |(i, m): (usize, &Member)| {
-            let assignment = Assignment {
-                id: plan.id,
-                scope: s.scope,
-                group: groups[i],
-                drone: m.id,
-                leader: self.params.front(s.members, &groups, groups[i]),
-                slot_m: shape[taken[i]].into(),
-                arrival_s: 0.0,
-                route: NO_ROUTE,
-                rank: 0,
-                reserved: 0,
-            };
-            (m.id, assignment)
+        let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
+        let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
+        let leaders = self.params.fronts(s.members, &groups);
+        let part = |(i, m): (usize, &Member)| Assignment {
+            id: plan.id,
+            scope: s.scope,
+            group: groups[i],
+            drone: m.id,
+            leader: leaders[i],
+            slot_m: shape[taken[i]].into(),
+            arrival_s: 0.0,
+            route: NO_ROUTE,
+            rank: 0,
+            reserved: 0,
         };
         Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
     }
@@ -191,14 +191,13 @@ fn assign_pinned(
     Some(taken)
 }
 
-/// The group a member stays in; an orphan, of no group while others are split, joins the one of the nearest member.
-fn group_of(member: &Member, members: &[Member]) -> GroupId {
+/// The group a member stays in; an orphan, of no group while others are `split`, joins the one of the nearest of them.
+fn group_of(member: &Member, split: &[&Member]) -> GroupId {
     if member.group != GroupId::ALL {
         return member.group;
     }
-    let near = |m: &&Member| (m.position - member.position).norm_squared();
-    let split = members.iter().filter(|m| m.group != GroupId::ALL);
-    split.min_by(|a, b| near(a).total_cmp(&near(b)).then(a.id.cmp(&b.id))).map_or(GroupId::ALL, |m| m.group)
+    let near = |m: &Member| (m.position - member.position).norm_squared();
+    split.iter().min_by(|a, b| near(a).total_cmp(&near(b)).then(a.id.cmp(&b.id))).map_or(GroupId::ALL, |m| m.group)
 }
 
 /// The shape with wider gaps, about its own centre: whoever is shut out finds a way in, and when the ranks close again

@@ -124,7 +124,7 @@ impl Leading {
         let late =
             |id: DroneId| self.peers.is_living(id, now) && self.peers.last(id).is_some_and(|pose| pose.obeyed < stamp);
         let first = say.len();
-        say.extend(orders.parts.iter().filter(|(id, _)| all || late(**id)).map(|(_, part)| Message::Assignment(*part)));
+        say.extend(orders.parts.iter().filter(|part| all || late(part.drone)).map(|part| Message::Assignment(*part)));
         if say.len() == first {
             return;
         }

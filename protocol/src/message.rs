@@ -120,6 +120,7 @@ impl Message {
     ///
     /// # Errors
     /// [`DecodeError`]; nothing a frame holds can panic.
+    #[inline]
     pub fn decode(frame: &Frame) -> Result<Self, DecodeError> {
         if frame.version != payload::VERSION {
             return Err(DecodeError::Version(frame.version));
@@ -186,6 +187,7 @@ impl Message {
     }
 }
 
+#[inline]
 fn read<T: Pod>(frame: &Frame) -> Result<T, DecodeError> {
     const { assert!(size_of::<T>() <= FRAME_PAYLOAD, "a payload must fit a frame") };
     if frame.len as usize != size_of::<T>() {

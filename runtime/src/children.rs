@@ -34,6 +34,20 @@ impl fmt::Display for Role {
     }
 }
 
+/// Settings of the C library, in the environment.
+const TUNABLES: &str = "GLIBC_TUNABLES";
+/// No restartable sequences, which nobody here uses: the kernel would look at and write a page of the process at each switch
+/// to it, cold by then.
+const NO_RSEQ: &str = "glibc.pthread.rseq=0";
+
+/// The settings for a child: of one that is there twice the last counts, so nothing that somebody set is overruled.
+fn tunables(inherited: Option<String>) -> String {
+    match inherited.filter(|settings| !settings.is_empty()) {
+        Some(settings) => format!("{NO_RSEQ}:{settings}"),
+        None => NO_RSEQ.to_owned(),
+    }
+}
+
 struct Running {
     role: Role,
     child: Child,
@@ -99,6 +113,7 @@ impl Children {
         command.args(["--pin", if self.pin == PinMode::Auto { "auto" } else { "off" }]);
         // A terminal's Ctrl-C must reach the launcher alone, and stdout is the launcher's.
         command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
+        command.env(TUNABLES, tunables(std::env::var(TUNABLES).ok()));
         let child = command
             .spawn()
             .map_err(RuntimeError::system(format!("starting {role} as {}", self.executable.display())))?;
@@ -204,5 +219,18 @@ impl Children {
 impl Drop for Children {
     fn drop(&mut self) {
         self.kill_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_somebody_set_is_kept_and_comes_last() {
+        assert_eq!(tunables(None), NO_RSEQ);
+        assert_eq!(tunables(Some(String::new())), NO_RSEQ);
+        let set = "glibc.pthread.rseq=1".to_owned();
+        assert_eq!(tunables(Some(set)), "glibc.pthread.rseq=0:glibc.pthread.rseq=1");
     }
 }

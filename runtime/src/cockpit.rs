@@ -12,6 +12,7 @@ use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 /// A frame on its way to this drone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,26 +34,34 @@ enum Place {
     Kept(u32),
 }
 
-/// One drone: its pilot and its radio.
-pub struct Cockpit {
-    me: DroneId,
-    dt_s: f64,
-    dt_ns: i64,
-    radio: Radio,
-    /// How far it hears each topic, m.
-    reach_m: [f64; Topic::ALL.len()],
-    pilot: Box<dyn Pilot>,
-    /// The one due first is the first.
-    pending: BinaryHeap<Reverse<Pending>>,
-    /// Frames that are heard in a later tick than they come in, and the places among them that are free.
-    kept: Vec<AirFrame>,
-    free: Vec<u32>,
+/// Memory for the work of one tick. Drones that are stepped in turn share it: it stays in the caches, and holds what the
+/// busiest of them needs, not what each of them once needed.
+#[derive(Default)]
+pub struct Desk {
+    /// Due now.
+    arrived: Vec<Pending>,
     heard: Vec<Heard>,
     /// What the tick's hash is over.
     folded: Vec<u8>,
     said: Vec<Message>,
     frames: Vec<Frame>,
     ages: Vec<f64>,
+}
+
+/// One drone: its pilot and its radio.
+pub struct Cockpit {
+    me: DroneId,
+    dt_s: f64,
+    dt_ns: i64,
+    radio: Arc<Radio>,
+    /// How far it hears each topic, m.
+    reach_m: [f64; Topic::ALL.len()],
+    pilot: Box<dyn Pilot>,
+    /// Due in a later tick than they come in: the one due first is the first.
+    pending: BinaryHeap<Reverse<Pending>>,
+    /// Their frames, and the places among them that are free.
+    kept: Vec<AirFrame>,
+    free: Vec<u32>,
     frames_total: u64,
     duplicates: u32,
     dropped: [u32; skein_protocol::radio::DROP_REASONS],
@@ -61,7 +70,8 @@ pub struct Cockpit {
 impl Cockpit {
     /// A drone before its first tick.
     #[must_use]
-    pub fn new(me: DroneId, dt_s: f64, radio: Radio, pilot: Box<dyn Pilot>) -> Self {
+    pub fn new(me: DroneId, dt_s: f64, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
+        let radio = radio.into();
         Self {
             me,
             dt_s,
@@ -72,11 +82,6 @@ impl Cockpit {
             pending: BinaryHeap::new(),
             kept: Vec::new(),
             free: Vec::new(),
-            heard: Vec::new(),
-            folded: Vec::new(),
-            said: Vec::new(),
-            frames: Vec::new(),
-            ages: Vec::new(),
             frames_total: 0,
             duplicates: 0,
             dropped: Default::default(),
@@ -84,24 +89,29 @@ impl Cockpit {
     }
 
     /// Puts the frames of a downlink that comes too late to be answered through the radio, which counts in `stats`.
-    pub fn overhear(&mut self, down: &DownlinkView<'_>, stats: &mut LinkStats) {
-        self.receive(down, SimTime(i64::MIN), stats);
+    pub fn overhear(&mut self, down: &DownlinkView<'_>, desk: &mut Desk, stats: &mut LinkStats) {
+        self.receive(down, SimTime(i64::MIN), desk, stats);
     }
 
     /// Puts the frames of the newest downlink through the radio, and steps the pilot on it: fills its actuator slot and
     /// returns the frames it sends.
-    pub fn step(&mut self, down: &DownlinkView<'_>, slot: &mut Slot, stats: &mut LinkStats) -> &[Frame] {
-        self.frames.clear();
-        self.said.clear();
-        let Some(senses) = down.senses(self.me) else { return &self.frames };
-        self.receive(down, senses.now, stats);
-        let heard_hash = self.deliver(&senses, down.frames, stats);
-        let command = self.pilot.step(&senses, &self.heard, &mut self.said);
-        self.frames.extend(self.said.iter().map(Message::encode));
-        self.frames_total += self.frames.len() as u64;
-        self.count_ages(&senses, stats);
+    pub fn step<'d>(
+        &mut self,
+        down: &DownlinkView<'_>,
+        desk: &'d mut Desk,
+        slot: &mut Slot,
+        stats: &mut LinkStats,
+    ) -> &'d [Frame] {
+        desk.clear();
+        let Some(senses) = down.senses(self.me) else { return &desk.frames };
+        self.receive(down, senses.now, desk, stats);
+        let heard_hash = self.deliver(&senses, down.frames, desk, stats);
+        let command = self.pilot.step(&senses, &desk.heard, &mut desk.said);
+        desk.frames.extend(desk.said.iter().map(Message::encode));
+        self.frames_total += desk.frames.len() as u64;
+        self.count_ages(&senses, desk, stats);
         *slot = Slot {
-            heard: self.heard.len() as u32 - self.duplicates,
+            heard: desk.heard.len() as u32 - self.duplicates,
             duplicates: std::mem::take(&mut self.duplicates),
             heard_hash,
             dropped: std::mem::take(&mut self.dropped),
@@ -109,18 +119,20 @@ impl Cockpit {
             ..Slot::default()
         };
         command.fill(slot);
-        &self.frames
+        &desk.frames
     }
 
     /// Takes up what will be heard; frames that are not due by `now` are kept.
-    fn receive(&mut self, down: &DownlinkView<'_>, now: SimTime, stats: &mut LinkStats) {
+    fn receive(&mut self, down: &DownlinkView<'_>, now: SimTime, desk: &mut Desk, stats: &mut LinkStats) {
         let Some(own) = down.drones.get(self.me.index()) else { return };
         if own.cuts != Cuts::default() || !self.hears_nearby(&down.nearby.locality) {
-            (0..down.frames.len()).for_each(|place| _ = self.take_up(own, down.frames, place, now, stats));
+            let frames = 0..down.frames.len();
+            frames.for_each(|place| _ = self.take_up((own, now), down.frames, place, desk, stats));
             return;
         }
         let mut looked = 0;
-        down.nearby.each(own.position_m.into(), |place| looked += self.take_up(own, down.frames, place, now, stats));
+        let here = own.position_m.into();
+        down.nearby.each(here, |place| looked += self.take_up((own, now), down.frames, place, desk, stats));
         let from = |id| down.frames.partition_point(|frame| frame.source.0 < id);
         let others = down.frames.len() - (from(self.me.0 + 1) - from(self.me.0));
         self.drop_frames(DropReason::Range, (others - looked) as u32, stats);
@@ -135,10 +147,10 @@ impl Cockpit {
     /// Takes up one frame of somebody else; the number of those that there were, 1 or 0.
     fn take_up(
         &mut self,
-        own: &SenseHead,
+        (own, now): (&SenseHead, SimTime),
         frames: &[AirFrame],
         place: usize,
-        now: SimTime,
+        desk: &mut Desk,
         stats: &mut LinkStats,
     ) -> usize {
         let Some(frame) = frames.get(place).filter(|frame| frame.source != self.me) else { return 0 };
@@ -149,17 +161,21 @@ impl Cockpit {
         match self.radio.fate(frame, self.me, own.position_m.into(), self.dt_ns) {
             Verdict::Drop(reason) => self.drop_frames(reason, 1, stats),
             Verdict::Deliver { due, again } => {
-                self.expect(frame, place as u32, (due, false), now);
-                again.into_iter().for_each(|due| self.expect(frame, place as u32, (due, true), now));
+                self.expect(frame, place as u32, (due, false), now, desk);
+                again.into_iter().for_each(|due| self.expect(frame, place as u32, (due, true), now, desk));
             }
         }
         1
     }
 
-    fn expect(&mut self, frame: &AirFrame, index: u32, (due, again): (SimTime, bool), now: SimTime) {
-        let place = if due <= now { Place::Here(index) } else { Place::Kept(self.keep(frame)) };
-        let pending = Pending { due, source: frame.source, sequence: frame.sequence, again, place };
-        self.pending.push(Reverse(pending));
+    fn expect(&mut self, frame: &AirFrame, index: u32, (due, again): (SimTime, bool), now: SimTime, desk: &mut Desk) {
+        let pending = |place| Pending { due, source: frame.source, sequence: frame.sequence, again, place };
+        if due <= now {
+            desk.arrived.push(pending(Place::Here(index)));
+        } else {
+            let place = Place::Kept(self.keep(frame));
+            self.pending.push(Reverse(pending(place)));
+        }
     }
 
     fn keep(&mut self, frame: &AirFrame) -> u32 {
@@ -173,11 +189,12 @@ impl Cockpit {
 
     /// Takes what is due, in the order (due, source, sequence), a second copy after the first; `here`: the frames of the
     /// downlink at hand.
-    fn deliver(&mut self, senses: &Senses<'_>, here: &[AirFrame], stats: &mut LinkStats) -> u64 {
-        self.heard.clear();
-        self.folded.clear();
+    fn deliver(&mut self, senses: &Senses<'_>, here: &[AirFrame], desk: &mut Desk, stats: &mut LinkStats) -> u64 {
         while self.pending.peek().is_some_and(|Reverse(next)| next.due <= senses.now) {
-            let Some(Reverse(Pending { source, sequence, again, place, .. })) = self.pending.pop() else { break };
+            desk.arrived.extend(self.pending.pop().map(|Reverse(pending)| pending));
+        }
+        desk.arrived.sort_unstable();
+        for &Pending { source, sequence, again, place, .. } in &desk.arrived {
             let AirFrame { tick, frame, .. } = match place {
                 Place::Here(index) => &here[index as usize],
                 Place::Kept(index) => {
@@ -187,16 +204,16 @@ impl Cockpit {
             };
             match Message::decode(frame) {
                 Ok(message) => {
-                    self.folded.extend_from_slice(&u64::from(source.0).to_le_bytes());
-                    self.folded.extend_from_slice(&u64::from(sequence).to_le_bytes());
-                    self.folded.extend_from_slice(&frame.payload[..frame.len as usize]);
+                    desk.folded.extend_from_slice(&u64::from(source.0).to_le_bytes());
+                    desk.folded.extend_from_slice(&u64::from(sequence).to_le_bytes());
+                    desk.folded.extend_from_slice(&frame.payload[..frame.len as usize]);
                     if again {
                         self.duplicates += 1;
                         stats.duplicates += 1;
                     } else {
                         stats.delay(senses.tick.saturating_sub(*tick));
                     }
-                    self.heard.push(Heard { source, message });
+                    desk.heard.push(Heard { source, message });
                 }
                 Err(_) if again => {}
                 Err(_) => {
@@ -205,7 +222,7 @@ impl Cockpit {
                 }
             }
         }
-        Digest::of(&self.folded)
+        Digest::of(&desk.folded)
     }
 
     fn drop_frames(&mut self, reason: DropReason, count: u32, stats: &mut LinkStats) {
@@ -214,11 +231,21 @@ impl Cockpit {
     }
 
     /// How old its knowledge of its peers is whenever it beacons.
-    fn count_ages(&mut self, senses: &Senses<'_>, stats: &mut LinkStats) {
-        if self.said.iter().any(|message| matches!(message, Message::Pose(_))) {
-            self.pilot.pose_ages_s(senses.now, &mut self.ages);
+    fn count_ages(&self, senses: &Senses<'_>, desk: &mut Desk, stats: &mut LinkStats) {
+        if desk.said.iter().any(|message| matches!(message, Message::Pose(_))) {
+            self.pilot.pose_ages_s(senses.now, &mut desk.ages);
             let ticks = |age_s: &f64| (age_s / self.dt_s).round().max(0.0) as u64;
-            self.ages.iter().map(ticks).for_each(|age| stats.age(age));
+            desk.ages.iter().map(ticks).for_each(|age| stats.age(age));
         }
+    }
+}
+
+impl Desk {
+    fn clear(&mut self) {
+        self.arrived.clear();
+        self.heard.clear();
+        self.folded.clear();
+        self.said.clear();
+        self.frames.clear();
     }
 }

@@ -1,6 +1,6 @@
 //! A drone's process, or that of several: it waits for a tick, hears, steps its pilots, speaks, answers.
 
-use crate::cockpit::Cockpit;
+use crate::cockpit::{Cockpit, Desk};
 use crate::{PilotKind, RuntimeError, mission};
 use skein_bus::{
     BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, SHARD_DRONES, Services, TickSignal, UplinkHeader,
@@ -89,7 +89,7 @@ impl Crew {
 pub fn run(args: &ChildArgs, crew: Crew, pilot: PilotKind) -> Result<(), RuntimeError> {
     fly(args, crew, |scenario, id| {
         let start = SimTime(crew.first_tick as i64 * mission::dt_ns(scenario));
-        mission::cockpit_with(pilot, scenario, id, crew.incarnation, start)
+        mission::Yard::new(scenario, pilot).cockpit(id, crew.incarnation, start)
     })
 }
 
@@ -122,6 +122,7 @@ pub fn fly(
         hears: services.downlink_subscriber()?,
         incarnation: crew.incarnation,
         seats,
+        desk: Desk::default(),
     };
     process.seats.iter().for_each(|seat| seat.barrier.announce(crew.incarnation));
     process.fly()
@@ -143,6 +144,7 @@ struct DroneProcess {
     speaks: Vec<UplinkPublisher>,
     first_shard: usize,
     seats: Vec<Seat>,
+    desk: Desk,
 }
 
 impl DroneProcess {
@@ -157,6 +159,7 @@ impl DroneProcess {
 
     /// Reads the downlinks up to the newest, and answers that one.
     fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
+        let desk = &mut self.desk;
         let resume_from = self.seats.first().map_or(0, |seat| seat.barrier.resume_from());
         while let Some(sample) = self.hears.receive()? {
             if sample.tick() < resume_from {
@@ -166,12 +169,12 @@ impl DroneProcess {
             let down = DownlinkView::parse(sample.bytes())
                 .map_err(|error| RuntimeError::Process(format!("drone process: {error}")))?;
             if sample.tick() < tick {
-                self.seats.iter_mut().for_each(|seat| seat.cockpit.overhear(&down, seat.barrier.stats_mut()));
+                self.seats.iter_mut().for_each(|seat| seat.cockpit.overhear(&down, desk, seat.barrier.stats_mut()));
                 continue;
             }
             for seat in &mut self.seats {
                 let header = UplinkHeader { tick, source: seat.id.0, incarnation: self.incarnation };
-                seat.step(&down, header, &self.speaks[seat.id.index() / SHARD_DRONES - self.first_shard])?;
+                seat.step(&down, desk, header, &self.speaks[seat.id.index() / SHARD_DRONES - self.first_shard])?;
             }
             // The world waits for them in turn: when the first has answered, all have.
             self.seats.iter_mut().rev().for_each(|seat| _ = seat.barrier.finish(tick, &seat.slot));
@@ -185,11 +188,12 @@ impl Seat {
     fn step(
         &mut self,
         down: &DownlinkView<'_>,
+        desk: &mut Desk,
         header: UplinkHeader,
         speaks: &UplinkPublisher,
     ) -> Result<(), RuntimeError> {
         let started = Instant::now();
-        let frames = self.cockpit.step(down, &mut self.slot, self.barrier.stats_mut());
+        let frames = self.cockpit.step(down, desk, &mut self.slot, self.barrier.stats_mut());
         if !frames.is_empty() {
             match speaks.send(header, frames.len(), |out| out.copy_from_slice(frames)) {
                 // By the wall clock only: the world is far behind, what is said is lost.

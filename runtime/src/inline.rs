@@ -1,7 +1,7 @@
 //! The inline runtime: the same pilots and the same world, stepped by function calls in one thread. The oracle for
 //! determinism, and the engine for large sweeps.
 
-use crate::cockpit::Cockpit;
+use crate::cockpit::{Cockpit, Desk};
 use crate::{PilotKind, RunEnd, RuntimeError, mission};
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
@@ -44,11 +44,11 @@ pub fn run_with(
     sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
-    let cockpit = |id, incarnation, start| mission::cockpit_with(pilot, scenario, id, incarnation, start);
+    let (yard, mut desk) = (mission::Yard::new(scenario, pilot), Desk::default());
     let started = Instant::now();
     let mut world = mission::world(scenario)?;
     let seat = |id| Seat {
-        cockpit: Some(cockpit(DroneId(id), 1, SimTime::ZERO)),
+        cockpit: Some(yard.cockpit(DroneId(id), 1, SimTime::ZERO)),
         frozen: false,
         slot: Slot::default(),
         frames: Vec::new(),
@@ -62,9 +62,9 @@ pub fn run_with(
         world
             .orders()
             .iter()
-            .for_each(|&order| carry_out(order, &mut seats, |id, incarnation| cockpit(id, incarnation, start)));
+            .for_each(|&order| carry_out(order, &mut seats, |id, incarnation| yard.cockpit(id, incarnation, start)));
         let down = world.downlink().view();
-        seats.iter_mut().for_each(|seat| seat.answer(&down));
+        seats.iter_mut().for_each(|seat| seat.answer(&down, &mut desk));
         for (seat, id) in seats.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
             world.take_slot(DroneId(id), &seat.slot);
             world.take_frames(DroneId(id), &seat.frames);
@@ -90,9 +90,9 @@ impl Seat {
         self.cockpit.is_some() && !self.frozen
     }
 
-    fn answer(&mut self, down: &DownlinkView<'_>) {
+    fn answer(&mut self, down: &DownlinkView<'_>, desk: &mut Desk) {
         let Some(cockpit) = self.cockpit.as_mut().filter(|_| !self.frozen) else { return };
-        let frames = cockpit.step(down, &mut self.slot, &mut self.stats);
+        let frames = cockpit.step(down, desk, &mut self.slot, &mut self.stats);
         self.frames.clear();
         self.frames.extend_from_slice(frames);
     }

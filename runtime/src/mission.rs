@@ -6,14 +6,16 @@ use crate::{RuntimeError, plan};
 use skein_agent::danger::Braking;
 use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::{RANGING, SafetyParams};
-use skein_agent::{PilotParams, SwarmPilot};
+use skein_agent::{Pilot, PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
 use skein_leader::planner::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
+use skein_protocol::radio::Radio;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use skein_scenario::{End, Failsafe, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
+use std::sync::Arc;
 
 /// Number of drones in a scenario.
 #[must_use]
@@ -167,20 +169,37 @@ impl PilotKind {
     }
 }
 
-/// One drone with a pilot of this kind, ready for the tick that begins at `start`.
-#[must_use]
-pub fn cockpit_with(kind: PilotKind, scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
-    if kind == PilotKind::Swarm {
-        return cockpit(scenario, me, incarnation, start);
+/// Makes the drones of a swarm, or of a process, which share what is the same for all.
+pub struct Yard<'s> {
+    scenario: &'s Scenario,
+    kind: PilotKind,
+    radio: Arc<Radio>,
+}
+
+impl<'s> Yard<'s> {
+    /// Makes drones with pilots of this kind.
+    #[must_use]
+    pub fn new(scenario: &'s Scenario, kind: PilotKind) -> Self {
+        Self { scenario, kind, radio: Arc::new(scenario.radio()) }
     }
-    let beacon_ticks = (scenario.protocol.beacon_period_s / scenario.time.dt_s).round() as u64;
-    let pilot = BeaconPilot::new(me, incarnation, beacon_ticks);
-    Cockpit::new(me, scenario.time.dt_s, scenario.radio(), Box::new(pilot))
+
+    /// One drone, ready for the tick that begins at `start`.
+    #[must_use]
+    pub fn cockpit(&self, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
+        let pilot: Box<dyn Pilot> = match self.kind {
+            PilotKind::Swarm => Box::new(SwarmPilot::new(pilot_params(self.scenario, me, incarnation, start))),
+            PilotKind::Beacon => Box::new(BeaconPilot::new(me, incarnation, self.beacon_ticks())),
+        };
+        Cockpit::new(me, self.scenario.time.dt_s, Arc::clone(&self.radio), pilot)
+    }
+
+    fn beacon_ticks(&self) -> u64 {
+        (self.scenario.protocol.beacon_period_s / self.scenario.time.dt_s).round() as u64
+    }
 }
 
 /// One drone with the paper's pilot, ready for the tick that begins at `start`.
 #[must_use]
 pub fn cockpit(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
-    let pilot = SwarmPilot::new(pilot_params(scenario, me, incarnation, start));
-    Cockpit::new(me, scenario.time.dt_s, scenario.radio(), Box::new(pilot))
+    Yard::new(scenario, PilotKind::Swarm).cockpit(me, incarnation, start)
 }

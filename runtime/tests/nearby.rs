@@ -9,7 +9,7 @@ use skein_protocol::payload::Leadership;
 use skein_protocol::radio::{Air, Radio, Range, Rule};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::cockpit::Cockpit;
+use skein_runtime::cockpit::{Cockpit, Desk};
 
 /// Does nothing.
 struct Idle;
@@ -48,7 +48,7 @@ fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
 fn hear(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
     let mut cockpit = Cockpit::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
-    cockpit.step(&down.view(), &mut slot, &mut stats);
+    cockpit.step(&down.view(), &mut Desk::default(), &mut slot, &mut stats);
     (slot, stats)
 }
 

@@ -5,6 +5,7 @@ use skein_protocol::frame::Frame;
 use skein_protocol::record::Outcome;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime};
+use skein_runtime::cockpit::Desk;
 use skein_runtime::mission;
 use skein_scenario::{Scenario, Source};
 use skein_world::World;
@@ -28,13 +29,13 @@ fn to_the_end(scenario: &Scenario) -> World {
     let mut world = mission::world(scenario).unwrap();
     let ids = 0..scenario.formation.drones;
     let mut cockpits: Vec<_> = ids.map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
-    let mut stats = LinkStats::default();
+    let (mut desk, mut stats) = (Desk::default(), LinkStats::default());
     while world.ended().is_none() {
         let down = world.downlink().view();
         let mut answers: Vec<(Slot, Vec<Frame>)> = Vec::new();
         for cockpit in &mut cockpits {
             let mut slot = Slot::default();
-            let frames = cockpit.step(&down, &mut slot, &mut stats).to_vec();
+            let frames = cockpit.step(&down, &mut desk, &mut slot, &mut stats).to_vec();
             answers.push((slot, frames));
         }
         for (id, (slot, frames)) in (0..).zip(&answers) {

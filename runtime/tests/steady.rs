@@ -4,7 +4,7 @@
 
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime};
-use skein_runtime::cockpit::Cockpit;
+use skein_runtime::cockpit::{Cockpit, Desk};
 use skein_runtime::mission;
 use skein_scenario::{Scenario, Source};
 use skein_world::World;
@@ -53,6 +53,7 @@ fn scenario(drones: u32, more: &str) -> Scenario {
 struct Swarm {
     world: World,
     cockpits: Vec<Cockpit>,
+    desk: Desk,
     slots: Vec<Slot>,
     stats: LinkStats,
 }
@@ -63,6 +64,7 @@ impl Swarm {
         Self {
             world: mission::world(scenario).unwrap(),
             cockpits: ids.map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect(),
+            desk: Desk::default(),
             slots: vec![Slot::default(); scenario.formation.drones as usize],
             stats: LinkStats::default(),
         }
@@ -81,7 +83,7 @@ impl Swarm {
         let mut said = Vec::with_capacity(self.cockpits.len());
         for (cockpit, slot) in self.cockpits.iter_mut().zip(&mut self.slots) {
             let before = COUNT.get();
-            let frames = cockpit.step(&down.view(), slot, &mut self.stats);
+            let frames = cockpit.step(&down.view(), &mut self.desk, slot, &mut self.stats);
             count(0, before);
             // As the wire does it.
             said.push(frames.to_vec());

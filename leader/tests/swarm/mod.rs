@@ -141,7 +141,7 @@ impl Watch {
         }
         let Some(orders) = leading.ledger.obeyed() else { return Ok(()) };
         let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&orders.plan)));
-        let parts = orders.parts.iter().map(|(&of, part)| (of, hash(bytemuck::bytes_of(part))));
+        let parts = orders.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(part))));
         for (of, value) in std::iter::once(plan).chain(parts) {
             if *self.parts.entry((stamp, of)).or_insert(value) != value {
                 return Err(Breach::TwoPlans { drone, of, stamp });

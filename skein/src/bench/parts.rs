@@ -9,6 +9,7 @@ use skein_leader::split::Table;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_runtime::cockpit::Desk;
 use skein_runtime::{PilotKind, mission};
 use skein_scenario::{Scenario, Source};
 use std::hint::black_box;
@@ -109,7 +110,8 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
     const TICKS: u32 = 50;
     let mut world = mission::world(scenario).map_err(Failure::environment)?;
     let drones = scenario.formation.drones;
-    let cockpit = |id| mission::cockpit_with(PilotKind::Beacon, scenario, DroneId(id), 1, SimTime::ZERO);
+    let (yard, mut desk) = (mission::Yard::new(scenario, PilotKind::Beacon), Desk::default());
+    let cockpit = |id| yard.cockpit(DroneId(id), 1, SimTime::ZERO);
     let mut cockpits: Vec<_> = (0..drones).map(cockpit).collect();
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     Ok(median((0..rounds).map(|_| {
@@ -119,7 +121,7 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
             let down = world.downlink().view();
             let started = Instant::now();
             for cockpit in &mut cockpits {
-                let frames = cockpit.step(&down, &mut slot, &mut stats).to_vec();
+                let frames = cockpit.step(&down, &mut desk, &mut slot, &mut stats).to_vec();
                 answers.push((slot, frames));
             }
             spent_s += started.elapsed().as_secs_f64();

@@ -1,0 +1,108 @@
+//! Everybody's part in a plan: one block of memory, sorted by drone. Looked through far more often than added to, and what
+//! is added mostly comes in the order of ids.
+
+use skein_protocol::DroneId;
+use skein_protocol::payload::Assignment;
+
+/// One part a drone, by id.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Roster(Vec<Assignment>);
+
+impl Roster {
+    fn place(&self, drone: DroneId) -> Result<usize, usize> {
+        match self.0.last() {
+            Some(last) if last.drone >= drone => self.0.binary_search_by_key(&drone, |part| part.drone),
+            _ => Err(self.0.len()),
+        }
+    }
+
+    /// The part of a drone.
+    #[must_use]
+    pub fn get(&self, drone: DroneId) -> Option<&Assignment> {
+        self.place(drone).ok().map(|place| &self.0[place])
+    }
+
+    /// The part of a drone, to be changed; who it is for is to stay.
+    pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut Assignment> {
+        self.place(drone).ok().map(|place| &mut self.0[place])
+    }
+
+    /// Whether a drone has a part.
+    #[must_use]
+    pub fn contains(&self, drone: DroneId) -> bool {
+        self.place(drone).is_ok()
+    }
+
+    /// Adds a part, unless its drone has one already; the one it has then.
+    pub fn add(&mut self, part: Assignment) -> &mut Assignment {
+        let place = self.place(part.drone).unwrap_or_else(|place| {
+            self.0.insert(place, part);
+            place
+        });
+        &mut self.0[place]
+    }
+
+    /// All parts, by drone.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &Assignment> + Clone {
+        self.0.iter()
+    }
+
+    /// All parts, by drone, to be changed; who they are for is to stay.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Assignment> {
+        self.0.iter_mut()
+    }
+
+    /// Number of drones that have a part.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether nobody has a part.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Keeps the parts of these drones alone.
+    pub fn retain(&mut self, stays: impl Fn(DroneId) -> bool) {
+        self.0.retain(|part| stays(part.drone));
+    }
+
+    /// Leaves nobody a part.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// Of several parts of one drone the first counts.
+impl FromIterator<Assignment> for Roster {
+    fn from_iter<I: IntoIterator<Item = Assignment>>(parts: I) -> Self {
+        let parts = parts.into_iter();
+        let mut roster = Self(Vec::with_capacity(parts.size_hint().0));
+        parts.for_each(|part| _ = roster.add(part));
+        roster
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn part(drone: u32, rank: u16) -> Assignment {
+        Assignment { drone: DroneId(drone), rank, ..Assignment::zeroed() }
+    }
+
+    #[test]
+    fn in_whatever_order_they_come_they_are_by_drone_and_the_first_of_each_counts() {
+        let mut roster: Roster = [part(5, 0), part(1, 1), part(9, 2), part(5, 3), part(3, 4)].into_iter().collect();
+        let all = |roster: &Roster| roster.iter().map(|p| (p.drone.0, p.rank)).collect::<Vec<_>>();
+        assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2)]);
+        assert_eq!(roster.add(part(3, 7)).rank, 4);
+        assert_eq!(roster.add(part(10, 8)).rank, 8);
+        assert!(roster.contains(DroneId(9)) && !roster.contains(DroneId(4)) && roster.get(DroneId(11)).is_none());
+        roster.retain(|id| id.0 != 5);
+        assert_eq!(all(&roster), [(1, 1), (3, 4), (9, 2), (10, 8)]);
+    }
+}
