@@ -16,6 +16,8 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 const SHARED_MEMORY: &str = "/dev/shm";
 /// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher lives.
 const LOCK: &str = "lock";
+/// So often the root is made anew because somebody took it away meanwhile.
+const MOST_TRIES: u32 = 100;
 /// Longest path of a run's folder, bytes: iceoryx2 appends up to 140 to it and allows 255.
 const MAX_FOLDER: usize = 112;
 /// Longest label that is kept, bytes.
@@ -40,7 +42,7 @@ pub struct Cleaned {
     pub files: usize,
 }
 
-/// The folder of all runs of this user, made if need be: `$XDG_RUNTIME_DIR/skein`, else `/dev/shm/skein-<uid>`. Mode 0700,
+/// The folder of all runs of this user, which is there as long as one of them is: `$XDG_RUNTIME_DIR/skein`, else `/dev/shm/skein-<uid>`. Mode 0700,
 /// owned by this user. In memory: a run makes a dozen files a drone, and on a disk that is most of what a start costs.
 ///
 /// # Errors
@@ -53,7 +55,6 @@ pub fn root() -> Result<PathBuf, BusError> {
         Some(dir) => dir.join("skein"),
         None => Path::new(SHARED_MEMORY).join(format!("skein-{uid}")),
     };
-    private_folder(&root)?;
     Ok(root)
 }
 
@@ -70,7 +71,7 @@ pub fn clean() -> Result<Cleaned, BusError> {
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
 pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
-    let _guard = lock_root(root)?;
+    let guard = lock_root(root)?;
     let mut cleaned = Cleaned::default();
     for (path, prefix) in runs(root)? {
         // The lock is held until the folder is gone. A run without a lock file died before it had one: those who make
@@ -79,6 +80,7 @@ pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
         cleaned.files += remove_run(&path, &prefix)?;
         cleaned.runs += 1;
     }
+    leave(root, guard);
     Ok(cleaned)
 }
 
@@ -95,13 +97,14 @@ pub fn living() -> Result<Vec<PathBuf>, BusError> {
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
 pub fn living_in(root: &Path) -> Result<Vec<PathBuf>, BusError> {
-    let _guard = lock_root(root)?;
+    let guard = lock_root(root)?;
     let mut found = Vec::new();
     for (path, _) in runs(root)? {
         if take_lock(&path.join(LOCK))?.is_none() {
             found.push(path);
         }
     }
+    leave(root, guard);
     Ok(found)
 }
 
@@ -163,9 +166,13 @@ impl Drop for Domain {
             return;
         }
         // Beside a cleaning, each would trip over what the other removes.
-        let _guard = self.path.parent().map(lock_root);
+        let root = self.path.parent().unwrap_or(Path::new("/"));
+        let guard = lock_root(root);
         if let Err(error) = remove_run(&self.path, &self.prefix) {
             tracing::warn!(%error, "the run's shared files are left for the next cleaning");
+        }
+        if let Ok(guard) = guard {
+            leave(root, guard);
         }
     }
 }
@@ -238,13 +245,35 @@ fn open_lock(path: &Path) -> Result<File, BusError> {
     options.write(true).create(true).truncate(false).mode(0o600).open(path).map_err(BusError::io("open", path))
 }
 
-/// Waits for, and holds, the right to make or remove runs.
+/// Waits for, and holds, the right to make or remove runs. Makes the root if need be.
 fn lock_root(root: &Path) -> Result<File, BusError> {
-    check_private(root)?;
     let path = root.join(LOCK);
-    let lock = open_lock(&path)?;
-    flock(&lock, FlockOperation::LockExclusive).map_err(BusError::io("lock", &path))?;
-    Ok(lock)
+    let mut tries = 0..MOST_TRIES;
+    loop {
+        let lock = match private_folder(root).and_then(|()| open_lock(&path)) {
+            Err(BusError::Io { source, .. }) if source.kind() == ErrorKind::NotFound && tries.next().is_some() => {
+                continue;
+            }
+            other => other?,
+        };
+        flock(&lock, FlockOperation::LockExclusive).map_err(BusError::io("lock", &path))?;
+        let inode = |meta: std::io::Result<fs::Metadata>| meta.map(|meta| (meta.dev(), meta.ino())).ok();
+        let held = inode(lock.metadata());
+        if held.is_some() && held == inode(fs::symlink_metadata(&path)) {
+            return Ok(lock);
+        }
+    }
+}
+
+/// Takes the root away if nothing but its lock is in it, so that nothing stays in memory; lets go of the lock. Who waits for it
+/// finds that it is gone, and makes a new one.
+fn leave(root: &Path, lock: File) {
+    let only_lock = |entries: fs::ReadDir| entries.flatten().all(|entry| entry.file_name() == LOCK);
+    if fs::read_dir(root).is_ok_and(only_lock) {
+        // Whatever is left is in nobody's way.
+        let _ = fs::remove_file(root.join(LOCK)).and_then(|()| fs::remove_dir(root));
+    }
+    drop(lock);
 }
 
 /// The lock of a dead run; `None` if its launcher lives. The caller holds the root's lock.

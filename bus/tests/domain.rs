@@ -152,3 +152,23 @@ fn folders_of_others_and_open_ones_are_refused() {
     assert!(error.to_string().contains("not a run's"), "{error}");
     assert!(matches!(Domain::join(&root.path().join("none.1_2_3")), Err(BusError::Io { .. })));
 }
+
+#[test]
+fn the_last_run_takes_the_root_with_it_and_others_make_it_anew() {
+    let parent = root();
+    let root = parent.path().join("runs");
+    let fly = || {
+        for i in 0..200 {
+            let first = Domain::create_in(&root, "a").unwrap();
+            let second = (i % 3 == 0).then(|| Domain::create_in(&root, "b").unwrap());
+            assert!(first.path().is_dir());
+            drop(first);
+            assert!(second.is_none_or(|second| second.path().is_dir()));
+        }
+    };
+    std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(fly))));
+    assert!(!root.exists(), "nobody is left, the root is");
+    assert_eq!(clean_in(&root).unwrap().runs, 0);
+    assert!(!root.exists());
+    assert!(clean_in(&parent.path().join("no/such")).is_err());
+}

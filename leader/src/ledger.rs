@@ -226,7 +226,7 @@ impl Ledger {
                 let (id, scope, group) = (set.stamp, set.scope, pose.group);
                 let part =
                     Assignment { id, scope, group, drone, leader: DroneId::NONE, route, rank, ..Assignment::zeroed() };
-                set.parts.entry(drone).or_insert(part);
+                set.parts.add(part);
             }
         }
     }

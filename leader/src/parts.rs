@@ -177,7 +177,7 @@ impl Leading {
     fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
         let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
         let mine = (me.id != named, self.key(me.position, me.id));
-        let unheard = |id: DroneId| self.ledger.obeyed().is_some_and(|orders| !orders.parts.contains_key(&id));
+        let unheard = |id: DroneId| self.ledger.obeyed().is_some_and(|orders| !orders.parts.contains(id));
         let before = |m: &Member| (m.id != named, self.key(m.position, m.id)) < mine;
         let kin = |m: &Member| me.group.contains(m.group) || (m.id == named && unheard(named));
         self.living_peers(now).filter(|m| kin(m) && before(m)).count()

@@ -35,7 +35,7 @@ fn beacon(obeyed: PlanStamp, rank: u16) -> Pose {
 }
 
 fn place_of(ledger: &Ledger, drone: u32) -> Option<(u16, u16)> {
-    ledger.sets()[0].parts.get(&DroneId(drone)).map(|part| (part.route, part.rank))
+    ledger.sets()[0].parts.get(DroneId(drone)).map(|part| (part.route, part.rank))
 }
 
 #[test]
@@ -50,5 +50,5 @@ fn a_lost_part_is_known_from_what_its_drone_flies() {
     assert_eq!(place_of(&ledger, 2), Some((1, 0)));
     ledger.hear_place(DroneId(1), &beacon(STAMP, 0));
     assert_eq!(place_of(&ledger, 1), Some((0, 1)), "what was heard as a part stays");
-    assert!(!ledger.obeyed().unwrap().parts.contains_key(&DroneId(2)), "it is not said as if its leader had said it");
+    assert!(!ledger.obeyed().unwrap().parts.contains(DroneId(2)), "it is not said as if its leader had said it");
 }

@@ -22,6 +22,7 @@ mod plan;
 pub mod supervisor;
 pub mod world_process;
 
+pub use children::lighten;
 pub use clock::Clock;
 pub use error::RuntimeError;
 pub use mission::PilotKind;

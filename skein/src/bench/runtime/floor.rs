@@ -9,6 +9,7 @@ use clap::Args;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use skein_bus::Floor;
 use skein_protocol::slot::Slot;
+use skein_runtime::lighten;
 use std::os::unix::net::UnixDatagram;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
@@ -91,6 +92,7 @@ impl Peers {
             command.arg("floor-peer").args(of).args(["--id", &id.to_string()]);
             command.args(["--parent", &std::process::id().to_string()]);
             command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
+            lighten(&mut command);
             peers.0.push(command.spawn().map_err(Failure::environment)?);
         }
         Ok(peers)
