@@ -1,6 +1,5 @@
 //! The small quadratic program behind the safety filter: the acceleration nearest to the wanted one that keeps every
-//! half-plane and the greatest acceleration; where that is impossible, the one that breaks the soft half-planes least
-//! while it keeps the hard ones.
+//! half-plane and the greatest acceleration; where that is impossible, one that breaks them least, tier by tier.
 //!
 //! Incremental, as in two-dimensional linear programming: half-planes are added one by one, and whenever the optimum so
 //! far is cut off, the new one lies on the border just added. No allocation once its memory has grown.

@@ -49,9 +49,12 @@ impl Cell {
 
 /// A TOML value as JSON; what is none stays text.
 fn toml_json(value: &str) -> Value {
-    let table: Result<toml::Table, _> = toml::from_str(&format!("value = {value}"));
-    let found = table.ok().and_then(|mut table| table.remove("value"));
-    found.and_then(|value| serde_json::to_value(value).ok()).unwrap_or_else(|| json!(value))
+    toml_value(value).and_then(|value| serde_json::to_value(value).ok()).unwrap_or_else(|| json!(value))
+}
+
+/// The value that a text is in TOML, if it is one.
+pub fn toml_value(text: &str) -> Option<toml::Value> {
+    toml::from_str::<toml::Table>(&format!("value = {text}")).ok()?.remove("value")
 }
 
 /// A cell for each combination that has rows, in the grid's order. Rows are in the order of their jobs.

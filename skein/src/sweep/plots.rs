@@ -1,6 +1,6 @@
 //! Which plots a sweep has: lines over one key that varies, heat maps over more.
 
-use super::cells::Cell;
+use super::cells::{Cell, toml_value};
 use super::experiment::Experiment;
 use super::metrics::{METRICS, SUCCESS, label, metric};
 use super::statistics::Estimate;
@@ -68,8 +68,7 @@ fn side(experiment: &Experiment, keys: Vec<usize>) -> Side {
 
 /// TOML values as they are called in a plot: texts without quotes, and tables by their first key that tells them apart.
 fn brief(values: &[String]) -> Vec<String> {
-    let parsed = |value: &String| toml::from_str::<toml::Table>(&format!("value = {value}")).ok()?.remove("value");
-    let parsed: Vec<Option<toml::Value>> = values.iter().map(parsed).collect();
+    let parsed: Vec<Option<toml::Value>> = values.iter().map(|value| toml_value(value)).collect();
     let plain = |value: &toml::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let by = |key: &str| -> Option<Vec<String>> {
         let found = parsed.iter().map(|value| Some(plain(value.as_ref()?.get(key)?)));
