@@ -3,15 +3,15 @@
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, PlanStamp, SimTime, Vec2};
 
-/// A message that came in by the radio.
+/// A message that came in by the radio, read where it lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Heard {
+pub struct Heard<'a> {
     /// Who said it.
     pub source: DroneId,
     /// What.
-    pub message: Message,
+    pub message: MessageRef<'a>,
 }
 
 /// What a drone's actuators are to do, and what it obeys.
@@ -69,7 +69,7 @@ impl Command {
 /// One drone's mind. Deterministic: equal senses and messages give equal commands and messages.
 pub trait Pilot: Send {
     /// One tick: `heard` in the order in which it was heard; what is to be said is pushed to `say`.
-    fn step(&mut self, senses: &Senses<'_>, heard: &[Heard], say: &mut Vec<Message>) -> Command;
+    fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command;
 
     /// Ages of what it knows of its peers at `now`, in s, one a peer it knows: for the statistics.
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>);

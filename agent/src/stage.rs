@@ -50,7 +50,7 @@ pub struct Stage {
     gate_x_m: f64,
     pilots: Vec<SwarmPilot>,
     bodies: Vec<(Vec2, Vec2)>,
-    said: Vec<Heard>,
+    said: Vec<(DroneId, Message)>,
     energy_j: f64,
     pass_s: Option<f64>,
     way_s: f64,
@@ -124,14 +124,17 @@ impl Stage {
         let mut accelerations = Vec::with_capacity(self.pilots.len());
         let mut said = Vec::new();
         let mut words: Vec<Message> = Vec::new();
+        let before = std::mem::take(&mut self.said);
+        let heard: Vec<Heard<'_>> =
+            before.iter().map(|(source, message)| Heard { source: *source, message: message.into() }).collect();
         for i in 0..self.pilots.len() {
             let (obstacles, neighbours) = self.surroundings(i, shapes);
             let senses = Senses::new((self.tick, self.now), self.bodies[i], &obstacles, &neighbours, shapes);
             let source = self.pilots[i].params.me;
             words.clear();
             // Nobody minds to hear itself.
-            accelerations.push(self.pilots[i].step(&senses, &self.said, &mut words).acceleration);
-            said.extend(words.iter().map(|&message| Heard { source, message }));
+            accelerations.push(self.pilots[i].step(&senses, &heard, &mut words).acceleration);
+            said.extend(words.iter().map(|&message| (source, message)));
         }
         self.said = said;
         self.fly(&accelerations);

@@ -3,7 +3,7 @@
 use crate::guidance::anchor;
 use skein_protocol::formation::Shape;
 use skein_protocol::payload::{PHASE_REFORM, Plan};
-use skein_protocol::{GroupId, Message, SimTime, Vec2};
+use skein_protocol::{GroupId, MessageRef, SimTime, Vec2};
 
 /// Who is followed by nobody for so long is heard by nobody, s.
 const UNHEARD_S: f64 = 5.0;
@@ -18,8 +18,8 @@ pub(crate) struct Stray {
 
 impl Stray {
     /// Hears of formations.
-    pub fn hear(&mut self, message: &Message) {
-        let Message::Plan(plan) = message else { return };
+    pub fn hear(&mut self, message: MessageRef<'_>) {
+        let MessageRef::Plan(plan) = message else { return };
         let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
         if later && plan.phase == PHASE_REFORM && plan.group == GroupId::ALL {
             self.formation = Some(*plan);
@@ -51,7 +51,7 @@ mod tests {
             |stray: &mut Stray, now_s, unfollowed| stray.slot(SimTime::from_secs(now_s), unfollowed, &shape, 10.0);
         assert_eq!(slot(&mut stray, 0.0, true), None);
         assert_eq!(slot(&mut stray, 6.0, true), None, "it knows of no formation");
-        stray.hear(&Message::Plan(plan));
+        stray.hear(MessageRef::Plan(&plan));
         assert_eq!(slot(&mut stray, 6.1, true), Some((Vec2::new(30.0, 12.0), Vec2::zeros())));
         assert_eq!(slot(&mut stray, 6.2, false), None);
         assert_eq!(slot(&mut stray, 6.3, true), None, "it may be for a moment only");

@@ -274,12 +274,12 @@ impl SwarmPilot {
 }
 
 impl Pilot for SwarmPilot {
-    fn step(&mut self, senses: &Senses<'_>, heard: &[Heard], say: &mut Vec<Message>) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
         self.params.braking.reaction_time_s = self.reaction.slow_down(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.span_s());
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
-        for Heard { source, message } in heard {
-            self.leading.hear(senses.now, *source, message, say);
+        for &Heard { source, message } in heard {
+            self.leading.hear(senses.now, source, message, say);
             self.stray.hear(message);
         }
         self.leading.feel(senses.broken != 0);

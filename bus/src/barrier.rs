@@ -4,13 +4,15 @@
 //! dead. The `waiting` hint only saves wake-ups.
 #![allow(unsafe_code)]
 
-use crate::control::{Control, DEAD, SLICE, STOP, WaitMode};
+use crate::control::{Control, DEAD, DroneWords, SLICE, STOP, WaitMode};
 use crate::error::BusError;
 use crate::futex;
+use crate::stopwatch::Stopwatch;
 use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
+use std::ptr::NonNull;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// Yields between two looks at the clock, and at whether the world still lives.
@@ -168,14 +170,24 @@ fn word_of(k: Tick) -> Result<u32, BusError> {
     word.ok_or_else(|| BusError::Control(format!("tick {k} is past the last one, {}", DEAD - 2)))
 }
 
-/// A drone's end of the barrier.
+/// A drone's end of the barrier. What it needs in every tick it holds itself: on waking, everything else is far away.
 #[derive(Debug)]
 pub struct DroneEnd {
-    control: Arc<Control>,
+    /// Of its core, in the segment.
+    tick_word: NonNull<AtomicU32>,
+    /// Its own, in the segment.
+    words: NonNull<DroneWords>,
+    wait: WaitMode,
+    spin: u32,
     drone: usize,
     last: u32,
     bound: bool,
+    stopwatch: Stopwatch,
+    control: Arc<Control>,
 }
+
+// SAFETY: the pointers are into the mapping that `control` keeps, which any thread may touch.
+unsafe impl Send for DroneEnd {}
 
 impl DroneEnd {
     /// The end of this drone; there must be no other one for it.
@@ -187,7 +199,19 @@ impl DroneEnd {
         if drone >= drones {
             return Err(BusError::Control(format!("drone {drone} is not below {drones}")));
         }
-        Ok(Self { control, drone, last: 0, bound: false })
+        let (tick_word, words) = (control.tick_word(control.core_of(drone)).into(), control.drone(drone).into());
+        let (wait, spin) = (control.spec().wait, control.spin());
+        Ok(Self {
+            tick_word,
+            words,
+            wait,
+            spin,
+            drone,
+            last: 0,
+            bound: false,
+            stopwatch: Stopwatch::default(),
+            control,
+        })
     }
 
     /// This process dies with its launcher, which closes the barrier should the world die: it need not look whether they
@@ -199,22 +223,20 @@ impl DroneEnd {
 
     /// Tells that this process, of an incarnation from 1, has its ports open and will answer ticks.
     pub fn announce(&self, incarnation: u32) {
-        self.control.drone(self.drone).ready.store(incarnation, Ordering::Release);
+        self.words().ready.store(incarnation, Ordering::Release);
     }
 
     /// Waits for a tick that this drone has not seen yet, and gives the newest. `alive` is asked every 100 ms or so
     /// whether the world is still there, unless the process is [`DroneEnd::bound`].
     pub fn wait_tick(&mut self, mut alive: impl FnMut() -> bool) -> TickSignal {
-        let control = &self.control;
-        let word = control.tick_word(control.core_of(self.drone));
-        let mut spins = control.spin();
+        let mut spins = self.spin;
         loop {
-            let seen = word.load(Ordering::Acquire);
+            let seen = self.tick_word().load(Ordering::Acquire);
             if seen == STOP {
                 return TickSignal::Stop;
             }
             if seen > self.last && self.may_answer(seen) {
-                self.last = seen;
+                self.take_up(seen);
                 return TickSignal::Tick(Tick::from(seen - 1));
             }
             if spins > 0 {
@@ -230,15 +252,28 @@ impl DroneEnd {
     /// answer it.
     pub fn join_tick(&mut self, tick: Tick) -> bool {
         let joined = word_of(tick).ok().filter(|&seen| seen > self.last && self.may_answer(seen));
-        self.last = joined.unwrap_or(self.last);
+        joined.into_iter().for_each(|seen| self.take_up(seen));
         joined.is_some()
     }
 
+    fn take_up(&mut self, seen: u32) {
+        if self.last == 0 {
+            self.stopwatch = self.control.stopwatch();
+        }
+        self.last = seen;
+    }
+
+    /// What spans of a tick are measured by; by the system's clock before the first tick.
+    #[must_use]
+    pub fn stopwatch(&self) -> Stopwatch {
+        self.stopwatch
+    }
+
     /// Waits for another value than `seen`; false if there was none for a while.
+    #[inline]
     fn pause(&self, seen: u32) -> bool {
-        let word = self.control.tick_word(self.control.core_of(self.drone));
-        let calls = &self.control.drone(self.drone).calls;
-        match self.control.spec().wait {
+        let (word, calls) = (self.tick_word(), &self.words().calls);
+        match self.wait {
             WaitMode::Block => {
                 calls.fetch_add(1, Ordering::Relaxed);
                 if self.bound { futex::wait_on(word, seen) } else { futex::wait(word, seen, SLICE) }
@@ -261,10 +296,15 @@ impl DroneEnd {
         if Tick::from(done) != k + 1 || !self.may_answer(done) {
             return false;
         }
-        // SAFETY: the slot is this drone's alone, and the world copies it only between our store of the done word and
-        // its opening of the next tick.
-        unsafe { self.control.slot_at(self.drone).write_volatile(*slot) };
-        let words = self.control.drone(self.drone);
+        let parts: &[u64; size_of::<Slot>() / 8] = bytemuck::cast_ref(slot);
+        let place = self.control.slot_at(self.drone).cast::<u64>();
+        // Word by word: as a whole it would be copied by a library, whose page is not at hand.
+        for (i, &word) in parts.iter().enumerate() {
+            // SAFETY: within the slot, which is this drone's alone; the world copies it only between our store of the done
+            // word and its opening of the next tick.
+            unsafe { place.add(i).write_volatile(word) };
+        }
+        let words = self.words();
         // See `sleep_on` for why both are sequentially consistent.
         words.done.store(done, Ordering::SeqCst);
         if self.control.waiting().load(Ordering::SeqCst) == self.drone as u32 + 1 {
@@ -284,7 +324,17 @@ impl DroneEnd {
     /// The first tick that this drone may read and answer.
     #[must_use]
     pub fn resume_from(&self) -> Tick {
-        Tick::from(self.control.drone(self.drone).resume_from.load(Ordering::SeqCst))
+        Tick::from(self.words().resume_from.load(Ordering::SeqCst))
+    }
+
+    fn tick_word(&self) -> &AtomicU32 {
+        // SAFETY: in the mapping, which `control` keeps, aligned, and only touched atomically.
+        unsafe { self.tick_word.as_ref() }
+    }
+
+    fn words(&self) -> &DroneWords {
+        // SAFETY: as in `tick_word`.
+        unsafe { self.words.as_ref() }
     }
 
     fn may_answer(&self, seen: u32) -> bool {

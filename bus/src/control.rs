@@ -1,14 +1,17 @@
 //! The control segment: a memfd that every process of a run maps. Wire and clock, not a message path.
 //!
 //! Laid out as a header, the launcher's and the world's words, the world's hint, the order words, a tick word a core,
-//! three words a drone, then a [`Slot`] and a [`LinkStats`] a drone; each on cache lines of its own.
+//! then a block a drone: its words, a [`Slot`] and a [`LinkStats`]; each on cache lines of its own. What one process
+//! touches in a tick lies together: after a switch of processes every page of it costs a walk through cold tables.
 #![allow(unsafe_code)]
 
 use crate::error::BusError;
+use crate::stopwatch::{Mark, Stopwatch};
 use rustix::fs::{MemfdFlags, fstat, ftruncate, memfd_create};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use skein_protocol::slot::{LinkStats, Slot};
 use std::fs::OpenOptions;
+use std::mem::offset_of;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
 use std::path::PathBuf;
 use std::ptr::NonNull;
@@ -17,7 +20,7 @@ use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
 /// Raised with every change of the layout, and of `Slot` or `LinkStats`.
-const LAYOUT: u32 = 4;
+const LAYOUT: u32 = 5;
 /// Bound on drones and cores that an attached segment may announce.
 const MAX_COUNT: usize = 1 << 16;
 /// Looks before sleeping, if every process has a core of its own.
@@ -71,6 +74,8 @@ pub(crate) struct SharedWords {
     pub(crate) world_state: AtomicU32,
     /// System calls of the barrier that the world has made.
     pub(crate) calls: AtomicU64,
+    /// Nanoseconds a count of the processor's counter, the bits of an `f64`.
+    pub(crate) ns_per_count: AtomicU64,
 }
 
 #[repr(C, align(128))]
@@ -99,13 +104,19 @@ pub(crate) struct DroneWords {
     pub(crate) calls: AtomicU64,
 }
 
+/// What is one drone's.
+#[repr(C, align(128))]
+struct DroneBlock {
+    words: DroneWords,
+    slot: Slot,
+    stats: LinkStats,
+}
+
 /// Where the parts begin, bytes.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     ticks: usize,
     drones: usize,
-    slots: usize,
-    stats: usize,
     end: usize,
 }
 
@@ -116,10 +127,8 @@ const ARRAYS: usize = ORDERS + size_of::<OrderWords>();
 
 impl Layout {
     fn new(drones: usize, cores: usize) -> Self {
-        let words = ARRAYS + cores * size_of::<PaddedWord>();
-        let slots = words + drones * size_of::<DroneWords>();
-        let stats = slots + drones * size_of::<Slot>();
-        Self { ticks: ARRAYS, drones: words, slots, stats, end: stats + drones * size_of::<LinkStats>() }
+        let blocks = ARRAYS + cores * size_of::<PaddedWord>();
+        Self { ticks: ARRAYS, drones: blocks, end: blocks + drones * size_of::<DroneBlock>() }
     }
 }
 
@@ -132,6 +141,8 @@ pub struct Control {
     spin: u32,
     /// The memfd, in the process that made it.
     memfd: Option<OwnedFd>,
+    /// When it was made, there.
+    made: Option<Mark>,
 }
 
 // SAFETY: the mapping stays until drop, and all shared access goes through atomics or through copies of slots and
@@ -161,7 +172,7 @@ impl Control {
             spin: spin_for(spec.drones.div_ceil(spec.per_process)),
             per_process: spec.per_process as u32,
         };
-        let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd) };
+        let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd), made: Some(Mark::now()) };
         // SAFETY: `base` is the start of a fresh, page-aligned mapping that holds a header, and nobody else has it yet.
         unsafe { base.cast::<Header>().write(header) };
         Ok(control)
@@ -202,7 +213,7 @@ impl Control {
             return wrong(format!("holds {size} bytes, expected {} for {} drones", layout.end, spec.drones));
         }
         let base = map(file.as_fd(), layout.end)?;
-        Ok(Self { base, layout, spec, spin: header.spin, memfd: None })
+        Ok(Self { base, layout, spec, spin: header.spin, memfd: None, made: None })
     }
 
     /// Number of the descriptor to hand to children; `None` in a process that attached.
@@ -239,6 +250,17 @@ impl Control {
         [self.shared().calls.load(Ordering::Relaxed), drones]
     }
 
+    /// What spans of a tick are measured by, once the launcher gave the go.
+    pub(crate) fn stopwatch(&self) -> Stopwatch {
+        Stopwatch::new(f64::from_bits(self.shared().ns_per_count.load(Ordering::Relaxed)))
+    }
+
+    /// The launcher's part: how fast the counter runs it knows from how long the start took.
+    pub(crate) fn gauge_counter(&self) {
+        let speed = self.made.map_or(0.0, |mark| mark.ns_per_count());
+        self.shared().ns_per_count.store(speed.to_bits(), Ordering::Relaxed);
+    }
+
     /// The tick word's number that a drone waits on; it should be pinned to that core.
     #[must_use]
     pub fn core_of(&self, drone: usize) -> usize {
@@ -246,11 +268,17 @@ impl Control {
     }
 
     pub(crate) fn slot_at(&self, drone: usize) -> NonNull<Slot> {
-        self.element(self.layout.slots, drone, self.spec.drones)
+        // SAFETY: a part of the block, which lies in the mapping.
+        unsafe { self.block(drone).byte_add(offset_of!(DroneBlock, slot)).cast() }
     }
 
     pub(crate) fn stats_at(&self, drone: usize) -> NonNull<LinkStats> {
-        self.element(self.layout.stats, drone, self.spec.drones)
+        // SAFETY: as in `slot_at`.
+        unsafe { self.block(drone).byte_add(offset_of!(DroneBlock, stats)).cast() }
+    }
+
+    fn block(&self, drone: usize) -> NonNull<DroneBlock> {
+        self.element(self.layout.drones, drone, self.spec.drones)
     }
 
     pub(crate) fn spin(&self) -> u32 {
@@ -281,8 +309,8 @@ impl Control {
     }
 
     pub(crate) fn drone(&self, drone: usize) -> &DroneWords {
-        // SAFETY: as in `shared`.
-        unsafe { self.element(self.layout.drones, drone, self.spec.drones).as_ref() }
+        // SAFETY: as in `shared`; the words are the block's first part.
+        unsafe { self.block(drone).cast::<DroneWords>().as_ref() }
     }
 
     /// Element `index` of the array of `count` at `start`: in the mapping, and aligned, since every part is a multiple

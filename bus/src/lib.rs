@@ -5,7 +5,7 @@
 //! | [`domain`] | where a run's shared things live, and how they are removed |
 //! | [`control`], [`barrier`], [`mission`], [`orders`] | the control segment: a memfd of futex words and actuator slots |
 //! | [`services`], [`ports`], [`payload`] | downlink, uplink shards and record, over iceoryx2 publish-subscribe |
-//! | [`host`] | pinning, limits |
+//! | [`host`], [`stopwatch`] | pinning, limits; what a step takes |
 //!
 //! The launcher calls [`Domain::create`], [`Control::create`] and [`Services::create`]; its children get the domain's
 //! path and the memfd's number and call [`Domain::join`], [`Control::attach`] and [`Services::open`].
@@ -23,6 +23,7 @@ pub mod orders;
 pub mod payload;
 pub mod ports;
 pub mod services;
+pub mod stopwatch;
 
 pub use barrier::{Answer, DroneEnd, Patience, TickSignal};
 pub use control::{Control, ControlSpec, WaitMode};
@@ -38,3 +39,4 @@ pub use ports::{
     UplinkSubscriber, WatchPublisher,
 };
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};
+pub use stopwatch::Stopwatch;

@@ -25,6 +25,7 @@ pub enum WorldState {
 impl Control {
     /// Lets the world begin.
     pub fn give_go(&self) {
+        self.gauge_counter();
         let word = &self.shared().go;
         word.store(1, Ordering::Release);
         futex::wake_all(word);

@@ -27,8 +27,12 @@ pub const SHARD_DRONES: usize = 32;
 const SPARE: usize = 4;
 /// Samples that wait in a subscriber's buffer.
 const BUFFER: usize = 8;
-/// The recorder's buffer: a second at 50 Hz and more.
-const RECORD_BUFFER: usize = 64;
+/// An observer's buffer: a second at 50 Hz and more.
+const WATCH_BUFFER: usize = 64;
+/// The recorder's buffer, in records and in rows of records: it looks every millisecond, and a few drones that yield
+/// make a hundred ticks in that.
+const RECORD_BUFFER: [usize; 2] = [64, 512];
+const RECORD_ROWS: usize = 8192;
 /// Samples that a subscriber holds at a time.
 const BORROWED: usize = 2;
 /// Chunks of the downlink's data segment beside those in the buffers, which all hold the same newest samples. If more
@@ -96,7 +100,7 @@ impl Services {
             _uplinks: (0..shards(drones))
                 .map(|shard| create(&node, &uplink_name(shard), uplink_limits(per_process)))
                 .collect::<Result<_, _>>()?,
-            _record: create(&node, RECORD, record_limits())?,
+            _record: create(&node, RECORD, record_limits(drones))?,
             _watch: create(&node, WATCH, watch_limits())?,
         };
         Ok(Self { node, drones, _kept: Some(kept) })
@@ -157,7 +161,7 @@ impl Services {
         Ok(RecordPublisher { stream: StreamPublisher(self.sender(RECORD, self.record_room(), handler)?), dropped })
     }
 
-    /// The recorder's: the launcher's, and nobody else's, since the world may wait for it. A buffer of 64.
+    /// The recorder's: the launcher's, and nobody else's, since the world may wait for it.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -265,12 +269,13 @@ fn uplink_limits(per_process: usize) -> Limits {
 }
 
 /// A second subscriber is for a second launcher.
-fn record_limits() -> Limits {
-    Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer: RECORD_BUFFER, overflow: false }
+fn record_limits(drones: usize) -> Limits {
+    let buffer = (RECORD_ROWS / drones).clamp(RECORD_BUFFER[0], RECORD_BUFFER[1]);
+    Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer, overflow: false }
 }
 
 fn watch_limits() -> Limits {
-    Limits { publishers: 1 + 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: RECORD_BUFFER, overflow: true }
+    Limits { publishers: 1 + 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: WATCH_BUFFER, overflow: true }
 }
 
 /// What happens when the recorder's buffer is full.

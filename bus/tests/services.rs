@@ -135,6 +135,9 @@ fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
     assert!(error.to_string().contains("of this swarm?"), "{error}");
 }
 
+/// Records of a single drone's run that wait for the recorder.
+const RECORDS: u64 = 512;
+
 #[test]
 fn in_lockstep_the_record_waits_for_the_recorder() {
     let run = run();
@@ -150,7 +153,7 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
         let services = Services::open(&Domain::join(&domain).unwrap(), 1, "recorder").unwrap();
         let port = services.record_subscriber().unwrap();
         let mut ticks = Vec::new();
-        while ticks.len() < 200 {
+        while ticks.len() < 2000 {
             match port.receive().unwrap() {
                 Some(sample) => ticks.push((sample.tick(), sample.bytes().to_vec())),
                 None => std::thread::sleep(Duration::from_millis(1)),
@@ -162,20 +165,20 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
     while world.send(0, 1, |bytes| bytes[0] = 0).unwrap() < 1 {
         std::thread::sleep(Duration::from_millis(1));
     }
-    for tick in 1..200 {
+    for tick in 1..2000 {
         world.send(tick, 1, |bytes| bytes[0] = tick as u8).unwrap();
     }
     let ticks = wait_done.recv().unwrap();
-    assert!(ticks.into_iter().eq((0..200).map(|tick| (tick, vec![tick as u8]))), "the recorder lost a record");
+    assert!(ticks.into_iter().eq((0..2000).map(|tick| (tick, vec![tick as u8]))), "the recorder lost a record");
     assert_eq!(world.dropped(), 0);
 
     // The recorder dies with a full buffer.
-    for tick in 0..64 {
+    for tick in 0..RECORDS {
         world.send(tick, 1, |_| ()).unwrap();
     }
     alive.store(false, Ordering::Relaxed);
     let start = Instant::now();
-    world.send(64, 1, |_| ()).unwrap();
+    world.send(RECORDS, 1, |_| ()).unwrap();
     assert!(start.elapsed() < Duration::from_secs(1));
     assert_eq!(world.dropped(), 1);
     drop(die);
@@ -189,7 +192,7 @@ fn by_the_wall_clock_a_full_recorder_drops_and_says_so() {
     let world = services.record_publisher(RecordPolicy::Drop).unwrap();
     let recorder = services.record_subscriber().unwrap();
     recorder.connect().unwrap();
-    for tick in 0..70 {
+    for tick in 0..RECORDS + 6 {
         world.send(tick, 16, |bytes| bytes.fill(1)).unwrap();
     }
     assert_eq!(world.dropped(), 6);

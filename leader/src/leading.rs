@@ -14,7 +14,7 @@ use crate::planner::{Member, Planner, PlannerParams, Situation};
 use crate::talk::Talk;
 use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_IMPAIRED, POSE_LEADS, Pose};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, SimTime, Vec2};
 
 /// What the machine needs to know before it starts.
 #[derive(Clone, Debug)]
@@ -124,32 +124,38 @@ impl Leading {
     }
 
     /// Hears a message of `source`; what has to be answered at once goes into `say`.
-    pub fn hear(&mut self, now: SimTime, source: DroneId, message: &Message, say: &mut Vec<Message>) {
+    pub fn hear<'m>(
+        &mut self,
+        now: SimTime,
+        source: DroneId,
+        message: impl Into<MessageRef<'m>>,
+        say: &mut Vec<Message>,
+    ) {
         if source == self.me || source.0 >= self.drones {
             return;
         }
-        match message {
-            Message::Pose(pose) => self.hear_pose(now, source, pose),
-            Message::Obstacle(o) => {
+        match message.into() {
+            MessageRef::Pose(pose) => self.hear_pose(now, source, pose),
+            MessageRef::Obstacle(o) => {
                 if self.obstacles.learn(now, o.id, o.shape, o.witness) {
                     self.settle(now);
                 }
             }
-            Message::Leadership(l) => self.hear_leadership(now, source, l, say),
-            Message::Plan(plan) => {
+            MessageRef::Leadership(l) => self.hear_leadership(now, source, l, say),
+            MessageRef::Plan(plan) => {
                 if self.sign(now, source, plan.id.ballot, plan.group, false) {
                     self.ledger.hear_plan(plan, &self.obstacles);
                     self.join(now);
                 }
             }
-            Message::Assignment(part) => {
+            MessageRef::Assignment(part) => {
                 if self.sign(now, source, part.id.ballot, part.scope, part.drone == self.me) {
                     self.ledger.hear_assignment(part, &self.obstacles);
                     self.join(now);
                 }
             }
-            Message::Arrivals(row) => self.planner.hear(now, row),
-            Message::Passed(passed) => self.obstacles.hear_passed(source, passed),
+            MessageRef::Arrivals(row) => self.planner.hear(now, row),
+            MessageRef::Passed(passed) => self.obstacles.hear_passed(source, passed),
         }
     }
 

@@ -13,10 +13,11 @@ impl Default for Digest {
 }
 
 impl Digest {
-    /// The hash of these bytes alone: the same as folding them in one by one.
+    /// A hash of a sequence of words, from 0 on: cheap for a few.
     #[must_use]
-    pub fn of(bytes: &[u8]) -> u64 {
-        xxhash_rust::xxh3::xxh3_64(bytes)
+    #[inline]
+    pub fn chain(hash: u64, word: u64) -> u64 {
+        xxhash_rust::xxh3::xxh3_64_with_seed(&word.to_le_bytes(), hash)
     }
 
     /// Folds bytes in.

@@ -35,7 +35,7 @@ pub mod thin_plate;
 pub mod time;
 
 pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
-pub use message::Message;
+pub use message::{Message, MessageRef};
 pub use time::{SimTime, Tick};
 
 /// A planar vector or point, metres (or m/s, m/s²), world frame.

@@ -5,6 +5,7 @@ use crate::ids::GroupId;
 use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
+use std::mem::offset_of;
 use thiserror::Error;
 
 /// The kinds of message; each is a topic of its own to an observer and to the radio's rules.
@@ -96,6 +97,7 @@ impl Message {
 
     /// The frame that carries it.
     #[must_use]
+    #[inline]
     pub fn encode(&self) -> Frame {
         let bytes: &[u8] = match self {
             Self::Pose(payload) => bytemuck::bytes_of(payload),
@@ -120,8 +122,51 @@ impl Message {
     ///
     /// # Errors
     /// [`DecodeError`]; nothing a frame holds can panic.
-    #[inline]
     pub fn decode(frame: &Frame) -> Result<Self, DecodeError> {
+        MessageRef::read(frame).map(MessageRef::to_message)
+    }
+}
+
+/// A message where it lies: in a frame, or in a [`Message`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MessageRef<'a> {
+    /// See [`Message::Pose`].
+    Pose(&'a Pose),
+    /// See [`Message::Obstacle`].
+    Obstacle(&'a Obstacle),
+    /// See [`Message::Leadership`].
+    Leadership(&'a Leadership),
+    /// See [`Message::Plan`].
+    Plan(&'a Plan),
+    /// See [`Message::Assignment`].
+    Assignment(&'a Assignment),
+    /// See [`Message::Arrivals`].
+    Arrivals(&'a Arrivals),
+    /// See [`Message::Passed`].
+    Passed(&'a Passed),
+}
+
+impl<'a> From<&'a Message> for MessageRef<'a> {
+    fn from(message: &'a Message) -> Self {
+        match message {
+            Message::Pose(payload) => Self::Pose(payload),
+            Message::Obstacle(payload) => Self::Obstacle(payload),
+            Message::Leadership(payload) => Self::Leadership(payload),
+            Message::Plan(payload) => Self::Plan(payload),
+            Message::Assignment(payload) => Self::Assignment(payload),
+            Message::Arrivals(payload) => Self::Arrivals(payload),
+            Message::Passed(payload) => Self::Passed(payload),
+        }
+    }
+}
+
+impl<'a> MessageRef<'a> {
+    /// Reads the message in a frame that another process wrote, in place.
+    ///
+    /// # Errors
+    /// [`DecodeError`]; nothing a frame holds can panic.
+    #[inline]
+    pub fn read(frame: &'a Frame) -> Result<Self, DecodeError> {
         if frame.version != payload::VERSION {
             return Err(DecodeError::Version(frame.version));
         }
@@ -136,6 +181,20 @@ impl Message {
         };
         message.check()?;
         Ok(message)
+    }
+
+    /// A copy of it.
+    #[must_use]
+    pub fn to_message(self) -> Message {
+        match self {
+            Self::Pose(payload) => Message::Pose(*payload),
+            Self::Obstacle(payload) => Message::Obstacle(*payload),
+            Self::Leadership(payload) => Message::Leadership(*payload),
+            Self::Plan(payload) => Message::Plan(*payload),
+            Self::Assignment(payload) => Message::Assignment(*payload),
+            Self::Arrivals(payload) => Message::Arrivals(*payload),
+            Self::Passed(payload) => Message::Passed(*payload),
+        }
     }
 
     fn check(&self) -> Result<(), DecodeError> {
@@ -188,10 +247,13 @@ impl Message {
 }
 
 #[inline]
-fn read<T: Pod>(frame: &Frame) -> Result<T, DecodeError> {
-    const { assert!(size_of::<T>() <= FRAME_PAYLOAD, "a payload must fit a frame") };
+fn read<T: Pod>(frame: &Frame) -> Result<&T, DecodeError> {
+    const {
+        assert!(size_of::<T>() <= FRAME_PAYLOAD, "a payload must fit a frame");
+        assert!(align_of::<T>() <= align_of::<Frame>() && offset_of!(Frame, payload) % align_of::<T>() == 0);
+    };
     if frame.len as usize != size_of::<T>() {
         return Err(DecodeError::Length(frame.len, size_of::<T>()));
     }
-    Ok(bytemuck::pod_read_unaligned(&frame.payload[..size_of::<T>()]))
+    Ok(bytemuck::from_bytes(&frame.payload[..size_of::<T>()]))
 }

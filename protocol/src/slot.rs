@@ -18,7 +18,7 @@ pub struct Slot {
     pub acceleration_mps2: [f64; 2],
     /// Frames it has sent since its process started: all of them are in its uplink once its done word is set.
     pub frames_total: u64,
-    /// Hash of what it heard in this tick.
+    /// Hash of which frames it heard in this tick, in which order; 0 if none.
     pub heard_hash: u64,
     /// Hash of its route, rank, slot and phase under `obeyed`; 0 before the first. The same plan with another part for
     /// the same drone shows as another hash.

@@ -22,7 +22,7 @@ impl BeaconPilot {
 }
 
 impl Pilot for BeaconPilot {
-    fn step(&mut self, senses: &Senses<'_>, _: &[Heard], say: &mut Vec<Message>) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, _: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
         if senses.tick % self.beacon_ticks == u64::from(self.me.0) % self.beacon_ticks {
             say.push(Message::Pose(Pose {
                 stamp: senses.now,

@@ -7,13 +7,13 @@ use skein_bus::{
     UplinkPublisher, pin_to_core, raise_file_limit,
 };
 use skein_protocol::downlink::DownlinkView;
+use skein_protocol::frame::Frame;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, SimTime, Tick};
+use skein_protocol::{DroneId, Message, SimTime, Tick};
 use skein_scenario::Scenario;
 use std::os::fd::RawFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// What the launcher tells a child process in its arguments.
 #[derive(Clone, Debug)]
@@ -192,16 +192,18 @@ impl Seat {
         header: UplinkHeader,
         speaks: &UplinkPublisher,
     ) -> Result<(), RuntimeError> {
-        let started = Instant::now();
-        let frames = self.cockpit.step(down, desk, &mut self.slot, self.barrier.stats_mut());
-        if !frames.is_empty() {
-            match speaks.send(header, frames.len(), |out| out.copy_from_slice(frames)) {
+        let watch = self.barrier.stopwatch();
+        let lap = watch.start();
+        let said = self.cockpit.step(down, desk, &mut self.slot, self.barrier.stats_mut());
+        if !said.is_empty() {
+            let encode = |(frame, message): (&mut Frame, &Message)| *frame = message.encode();
+            match speaks.send(header, said.len(), |out| out.iter_mut().zip(said).for_each(encode)) {
                 // By the wall clock only: the world is far behind, what is said is lost.
                 Err(BusError::Full { .. }) => {}
                 sent => sent?,
             }
         }
-        self.slot.step_ns = u32::try_from(started.elapsed().as_nanos()).unwrap_or(u32::MAX);
+        self.slot.step_ns = watch.ns(lap);
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::RecordSink;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::{DroneId, Message, SimTime};
 use skein_scenario::Scenario;
 use skein_world::faults::ProcessOrder;
 use std::time::Instant;
@@ -92,9 +92,9 @@ impl Seat {
 
     fn answer(&mut self, down: &DownlinkView<'_>, desk: &mut Desk) {
         let Some(cockpit) = self.cockpit.as_mut().filter(|_| !self.frozen) else { return };
-        let frames = cockpit.step(down, desk, &mut self.slot, &mut self.stats);
+        let said = cockpit.step(down, desk, &mut self.slot, &mut self.stats);
         self.frames.clear();
-        self.frames.extend_from_slice(frames);
+        self.frames.extend(said.iter().map(Message::encode));
     }
 }
 

@@ -15,6 +15,7 @@ mod children;
 pub mod clock;
 pub mod cockpit;
 pub mod drone_process;
+mod ear;
 mod error;
 pub mod inline;
 pub mod mission;

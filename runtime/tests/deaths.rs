@@ -4,7 +4,7 @@
 use skein_protocol::frame::Frame;
 use skein_protocol::record::{FaultKind, Outcome};
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::cockpit::Desk;
 use skein_runtime::mission;
 use skein_scenario::{Scenario, Source};
@@ -28,7 +28,8 @@ fn fly(scenario: &Scenario, dead: DroneId, at: u64) -> World {
         let mut answers: Vec<(DroneId, Slot, Vec<Frame>)> = Vec::new();
         for (cockpit, id) in cockpits.iter_mut().zip(0..).filter(|(_, id)| tick < at || DroneId(*id) != dead) {
             let mut slot = Slot::default();
-            let frames = cockpit.step(&down, &mut desk, &mut slot, &mut stats).to_vec();
+            let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+            let frames = said.iter().map(Message::encode).collect();
             answers.push((DroneId(id), slot, frames));
         }
         if tick == at {

@@ -15,7 +15,7 @@ use skein_runtime::cockpit::{Cockpit, Desk};
 struct Idle;
 
 impl Pilot for Idle {
-    fn step(&mut self, _: &Senses<'_>, _: &[Heard], _: &mut Vec<Message>) -> Command {
+    fn step(&mut self, _: &Senses<'_>, _: &[Heard<'_>], _: &mut Vec<Message>) -> Command {
         Command::default()
     }
 

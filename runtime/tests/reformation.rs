@@ -4,7 +4,7 @@
 use skein_protocol::frame::Frame;
 use skein_protocol::record::Outcome;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::cockpit::Desk;
 use skein_runtime::mission;
 use skein_scenario::{Scenario, Source};
@@ -35,7 +35,8 @@ fn to_the_end(scenario: &Scenario) -> World {
         let mut answers: Vec<(Slot, Vec<Frame>)> = Vec::new();
         for cockpit in &mut cockpits {
             let mut slot = Slot::default();
-            let frames = cockpit.step(&down, &mut desk, &mut slot, &mut stats).to_vec();
+            let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+            let frames = said.iter().map(Message::encode).collect();
             answers.push((slot, frames));
         }
         for (id, (slot, frames)) in (0..).zip(&answers) {

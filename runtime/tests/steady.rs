@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::cockpit::{Cockpit, Desk};
 use skein_runtime::mission;
 use skein_scenario::{Scenario, Source};
@@ -83,10 +83,10 @@ impl Swarm {
         let mut said = Vec::with_capacity(self.cockpits.len());
         for (cockpit, slot) in self.cockpits.iter_mut().zip(&mut self.slots) {
             let before = COUNT.get();
-            let frames = cockpit.step(&down.view(), &mut self.desk, slot, &mut self.stats);
+            let words = cockpit.step(&down.view(), &mut self.desk, slot, &mut self.stats);
             count(0, before);
             // As the wire does it.
-            said.push(frames.to_vec());
+            said.push(words.iter().map(Message::encode).collect::<Vec<_>>());
         }
         let before = COUNT.get();
         for ((slot, frames), id) in self.slots.iter().zip(&said).zip(0..) {

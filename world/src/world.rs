@@ -338,27 +338,6 @@ impl World {
         });
     }
 
-    fn fold(&mut self) {
-        self.folded.clear();
-        let mut word = |value: u64| self.folded.extend_from_slice(&value.to_le_bytes());
-        word(self.tick);
-        for (body, process) in self.bodies.iter().zip(&self.processes) {
-            let state = [body.position.x, body.position.y, body.velocity.x, body.velocity.y, body.energy_j];
-            state.into_iter().for_each(|value| word(value.to_bits()));
-            word(u64::from(body.alive));
-            if body.alive {
-                word(u64::from(process.slot.heard));
-                process.slot.dropped[..ALWAYS_FOLDED].iter().for_each(|&count| word(u64::from(count)));
-                word(process.slot.heard_hash);
-                let later = std::iter::once(&process.slot.duplicates).chain(&process.slot.dropped[ALWAYS_FOLDED..]);
-                later.zip(1u64..).filter(|(count, _)| **count > 0).for_each(|(&count, which)| {
-                    word(which << 32 | u64::from(count));
-                });
-            }
-        }
-        self.digest.bytes(&self.folded);
-    }
-
     fn close_tick(&mut self, end: SimTime) {
         self.rows.clear();
         for ((body, process), id) in self.bodies.iter().zip(&self.processes).zip(0..) {
@@ -391,6 +370,7 @@ fn check_bodies(starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<()
     shapes.try_for_each(|(index, shape)| shape.check().map_err(|error| WorldError::Obstacle { index, error }))
 }
 
+mod fold;
 mod motion;
 mod orders;
 #[cfg(test)]

@@ -193,7 +193,7 @@ impl Mission {
             let (mut machine, mut say) = (Leading::clone(machine), Vec::new());
             for (post, message) in due.iter().filter(|(post, _)| post.to == id && state.hear_each_other(post.from, id))
             {
-                machine.hear(now, DroneId(post.from), message, &mut say);
+                machine.hear(now, DroneId(post.from), &**message, &mut say);
             }
             // The first one senses, the others are told.
             for wall in (0..self.walls).filter(|w| id == 0 && state.step >= 2 + 3 * w) {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use skein_leader::split::Table;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, SimTime, Vec2};
 use skein_runtime::cockpit::Desk;
 use skein_runtime::{PilotKind, mission};
 use skein_scenario::{Scenario, Source};
@@ -121,8 +121,8 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
             let down = world.downlink().view();
             let started = Instant::now();
             for cockpit in &mut cockpits {
-                let frames = cockpit.step(&down, &mut desk, &mut slot, &mut stats).to_vec();
-                answers.push((slot, frames));
+                let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+                answers.push((slot, said.iter().map(Message::encode).collect::<Vec<_>>()));
             }
             spent_s += started.elapsed().as_secs_f64();
             for ((slot, frames), id) in answers.iter().zip(0..) {

@@ -283,6 +283,23 @@ fn equal_runs_have_equal_digests_and_one_bit_makes_another() {
 }
 
 #[test]
+fn what_is_said_is_in_the_digest() {
+    let said = |kind, byte| {
+        let mut world = eight(params(), &[]);
+        let mut frame = frame();
+        (frame.kind, frame.len, frame.payload[5]) = (kind, 6, byte);
+        world.downlink();
+        (0..8).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+        world.take_frames(DroneId(3), &[frame]);
+        world.advance();
+        world.digest()
+    };
+    assert_eq!(said(1, 7), said(1, 7));
+    assert_ne!(said(1, 7), said(1, 6));
+    assert_ne!(said(1, 7), said(2, 7));
+}
+
+#[test]
 fn a_swarm_of_a_thousand_is_sensed_and_kept_apart_by_the_grid() {
     let mut world = World::new(params(), &starts(1000), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap();
     tick(&mut world, &Slot::default());

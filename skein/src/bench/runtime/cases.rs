@@ -5,6 +5,7 @@ use super::floor;
 use super::probe::Measured;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
+use clap::ValueEnum;
 use serde::Serialize;
 use skein_bus::WaitMode;
 use skein_protocol::downlink::{DownHead, SenseHead, SensedNeighbour};
@@ -18,9 +19,9 @@ pub(super) const PACK: u32 = 32;
 const MANY: u32 = 256;
 
 /// What is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Case {
+pub enum Case {
     /// Raw shared memory, one word, one counter: [`skein_bus::Floor`].
     Floor,
     /// The floor's exchange over Unix datagrams.
@@ -42,8 +43,8 @@ pub(super) enum Case {
 }
 
 impl Case {
-    /// Those for a swarm of this size.
-    pub fn of(drones: u32, datagrams: bool) -> Vec<Self> {
+    /// Those for a swarm of this size; of these, if there are any.
+    pub(super) fn of(drones: u32, datagrams: bool, only: &[Self]) -> Vec<Self> {
         use Case::*;
         let all = [Floor, Datagrams, InlineBeacon, BlockBeacon, YieldBeacon, Inline, Block, Yield, Packed];
         let apt = |case: &Case| match case {
@@ -51,7 +52,8 @@ impl Case {
             Packed => drones > PACK,
             _ => true,
         };
-        all.into_iter().filter(apt).collect()
+        let wanted = |case: &Case| only.is_empty() || only.contains(case);
+        all.into_iter().filter(apt).filter(wanted).collect()
     }
 
     /// For people.
@@ -70,7 +72,7 @@ impl Case {
     }
 
     /// Measures it once.
-    pub fn measure(self, size: &Size, interrupt: &Interrupt) -> Result<Measured, Failure> {
+    pub(super) fn measure(self, size: &Size, interrupt: &Interrupt) -> Result<Measured, Failure> {
         use PilotKind::{Beacon, Swarm};
         match self {
             Self::Floor => floor::measure(size, floor::Transport::Memory),
@@ -100,9 +102,9 @@ pub(super) struct Size {
 
 impl Size {
     /// A grid in formation flight at the paper's spacing.
-    pub fn new(drones: u32, quick: bool) -> Result<Self, Failure> {
+    pub fn new(drones: u32, quick: bool, ticks: Option<u64>) -> Result<Self, Failure> {
         let window = (240_000 / u64::from(drones + 16)).clamp(240, 12_000);
-        let window = if quick { window / 3 } else { window };
+        let window = ticks.unwrap_or(if quick { window / 3 } else { window });
         // The plan that puts all into formation is made and known by then.
         let from = 60;
         let until = from + window;

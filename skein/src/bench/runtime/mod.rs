@@ -32,6 +32,12 @@ pub struct RuntimeArgs {
     /// A third of the ticks, three rounds at most
     #[arg(long)]
     pub quick: bool,
+    /// Ticks that count, instead of fewer the more drones there are
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub ticks: Option<u64>,
+    /// Only these
+    #[arg(long, value_enum, value_name = "CASE,…", value_delimiter = ',')]
+    pub cases: Vec<Case>,
     /// Another transport to compare with
     #[arg(long, value_enum)]
     pub compare: Option<Compare>,
@@ -49,7 +55,17 @@ pub struct RuntimeArgs {
 impl Default for RuntimeArgs {
     fn default() -> Self {
         let drones = vec![1, 8, 64, 256, 1000];
-        Self { drones, rounds: 7, quick: false, compare: None, plot: None, json: false, out: None }
+        Self {
+            drones,
+            rounds: 7,
+            quick: false,
+            ticks: None,
+            cases: Vec::new(),
+            compare: None,
+            plot: None,
+            json: false,
+            out: None,
+        }
     }
 }
 
@@ -100,8 +116,8 @@ pub fn runtime(args: &RuntimeArgs) -> Result<Exit, Failure> {
     let rounds = if args.quick { args.rounds.min(3) } else { args.rounds };
     let mut bench = Bench { cores, rounds, rows: Vec::new(), ratios: Vec::new() };
     for &drones in &args.drones {
-        let size = Size::new(drones, args.quick)?;
-        let cases = Case::of(drones, args.compare.is_some());
+        let size = Size::new(drones, args.quick, args.ticks)?;
+        let cases = Case::of(drones, args.compare.is_some(), &args.cases);
         let mut measured: Vec<Vec<Measured>> = vec![Vec::new(); cases.len()];
         for round in 0..rounds as usize {
             // Each round begins with another case, so that none always follows the same one.
