@@ -2,6 +2,8 @@
 //! chance; each statistic is within five standard errors of what its model says, which a wrong model is not.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
+use proptest::prelude::*;
+use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{
     Air, BLOCK_BURSTS, Burst, Delay, DelayModel, DropReason, Link, Radio, Range, Rule, Scope, Verdict,
@@ -337,4 +339,30 @@ fn the_last_rule_about_a_frame_counts() {
     let (pose, assignment, unknown) = (Topic::Pose as u16, Topic::Assignment as u16, 99);
     assert_eq!([due_s(pose, 1), due_s(assignment, 1), due_s(unknown, 1)], [1.0, 0.0, 0.0]);
     assert_eq!([due_s(pose, 3), due_s(assignment, 3), due_s(unknown, 3)], [2.0, 2.0, 2.0]);
+}
+
+proptest! {
+    #[test]
+    fn rules_looked_up_beforehand_are_the_same_rules(
+        conditions in prop::collection::vec((0u8..128, 0u8..16, 0u8..16), 0..5),
+        kind in 0u16..9,
+        (source, destination) in (0u32..4, 0u32..4),
+    ) {
+        let drones = |bits: u8| (bits > 7).then(|| (0..3).filter(|i| bits >> i & 1 == 1).map(DroneId).collect());
+        let topics = |bits: u8| (bits > 15).then(|| Topic::ALL.into_iter().filter(|&t| bits >> t as u16 & 1 == 1).collect());
+        // Each air is known by its delay.
+        let delay = |s: usize| Air { delay: Delay { mean_s: 1.0 + s as f64, ..Delay::default() }, ..Air::default() };
+        let rule = |(i, &(t, from, to)): (usize, &(u8, u8, u8))| Rule {
+            topics: topics(t),
+            from: drones(from),
+            to: drones(to),
+            air: delay(i),
+        };
+        let radio = Radio { rules: conditions.iter().enumerate().map(rule).collect(), ..Radio::default() };
+        let mut frame: AirFrame = bytemuck::Zeroable::zeroed();
+        (frame.source, frame.frame.kind) = (DroneId(source), kind);
+        let (receiver, here) = (DroneId(destination), Vec2::zeros());
+        let airs = radio.airs_at(receiver);
+        prop_assert_eq!(radio.fate_at(&airs, &frame, here, 20), radio.fate(&frame, receiver, here, 20));
+    }
 }

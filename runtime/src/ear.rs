@@ -6,7 +6,7 @@ use skein_protocol::downlink::{DownlinkView, SenseHead};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::{DROP_REASONS, DropReason, Radio, Verdict};
+use skein_protocol::radio::{AirsAt, DROP_REASONS, DropReason, Radio, Verdict};
 use skein_protocol::sides::Cuts;
 use skein_protocol::slot::LinkStats;
 use skein_protocol::{DroneId, MessageRef, SimTime};
@@ -39,6 +39,7 @@ pub(crate) struct Ear {
     me: DroneId,
     dt_ns: i64,
     radio: Arc<Radio>,
+    airs: AirsAt,
     /// How far it hears each topic, m.
     reach_m: [f64; Topic::ALL.len()],
     /// Due in a later tick than they come in: the one due first is the first.
@@ -66,6 +67,7 @@ impl Ear {
             me,
             dt_ns,
             reach_m: Topic::ALL.map(|topic| radio.reach_m(topic, me)),
+            airs: radio.airs_at(me),
             radio,
             pending: BinaryHeap::new(),
             kept: Vec::new(),
@@ -121,7 +123,7 @@ impl Ear {
             self.drop_frames(reason, 1, stats);
             return 1;
         }
-        match self.radio.fate(frame, self.me, own.position_m.into(), self.dt_ns) {
+        match self.radio.fate_at(&self.airs, frame, own.position_m.into(), self.dt_ns) {
             Verdict::Drop(reason) => self.drop_frames(reason, 1, stats),
             Verdict::Deliver { due, again } => {
                 self.expect(frame, place as u32, (due, false), now, arrived);

@@ -67,6 +67,17 @@ pub struct Radio {
     pub rules: Vec<Rule>,
 }
 
+/// In [`AirsAt::places`]: the air where no rule says otherwise.
+const GENERAL: u16 = u16::MAX;
+
+/// What air each topic goes through to one receiver: rules are looked up once, not for every frame.
+#[derive(Clone, Copy, Debug)]
+pub struct AirsAt {
+    receiver: DroneId,
+    /// A rule's place; `None`: it depends on who sends.
+    places: [Option<u16>; Topic::ALL.len()],
+}
+
 /// Which frame, from whom, to whom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
@@ -112,7 +123,10 @@ impl Radio {
     /// What becomes of a frame that went on the air at `aired` and flew over `path` (from sender to receiver, m).
     #[must_use]
     pub fn verdict(&self, link: Link, path: Vec2, aired: SimTime) -> Verdict {
-        let air = self.air_of(link);
+        self.verdict_in(self.air_of(link), link, path, aired)
+    }
+
+    fn verdict_in(&self, air: &Air, link: Link, path: Vec2, aired: SimTime) -> Verdict {
         let chance = |purpose| Draws::of_frame(self.seed, link, purpose).unit();
         if let Some(range) = air.range {
             let heard = range.heard(path.norm_squared());
@@ -145,9 +159,36 @@ impl Radio {
         if frame.queue_ns == NEVER_AIRED {
             return Verdict::Drop(DropReason::Queue);
         }
-        let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
-        let aired = sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX);
-        self.verdict(Link::of(frame, receiver), here - frame.position(), aired)
+        self.verdict(Link::of(frame, receiver), here - frame.position(), aired(frame, dt_ns))
+    }
+
+    /// The same for a receiver whose airs were looked up beforehand.
+    #[must_use]
+    pub fn fate_at(&self, airs: &AirsAt, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Verdict {
+        let known = airs.places.get(usize::from(frame.frame.kind).wrapping_sub(1)).copied().flatten();
+        let air = match known {
+            Some(GENERAL) => Some(&self.air),
+            Some(rule) => self.rules.get(usize::from(rule)).map(|rule| &rule.air),
+            None => None,
+        };
+        match air.filter(|_| frame.queue_ns != NEVER_AIRED) {
+            Some(air) => {
+                let link = Link::of(frame, airs.receiver);
+                self.verdict_in(air, link, here - frame.position(), aired(frame, dt_ns))
+            }
+            None => self.fate(frame, airs.receiver, here, dt_ns),
+        }
+    }
+
+    /// What air each topic goes through to a receiver, where that is the same for all senders.
+    #[must_use]
+    pub fn airs_at(&self, receiver: DroneId) -> AirsAt {
+        let at = |rule: &Rule, topic| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
+        let place = |topic| {
+            let Some(last) = self.rules.iter().rposition(|rule| at(rule, topic)) else { return Some(GENERAL) };
+            u16::try_from(last).ok().filter(|&place| place != GENERAL && self.rules[last].from.is_none())
+        };
+        AirsAt { receiver, places: Topic::ALL.map(place) }
     }
 
     /// Looks up what became of every frame in a tick's record, at every other drone that was alive at the tick's end.
@@ -206,4 +247,10 @@ impl Radio {
         let part = if link.source == low { part } else { -part };
         libm::pow(1.0 + self.asymmetry, part)
     }
+}
+
+/// When a frame went on the air.
+fn aired(frame: &AirFrame, dt_ns: i64) -> SimTime {
+    let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
+    sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX)
 }
