@@ -1,5 +1,5 @@
-//! What a step took, by the processor's own counter. Asking the system's clock needs pages of three libraries, which a
-//! process that was just switched to finds nowhere near: with a thousand drones a twelfth of all they do.
+//! What a step took, by the processor's own counter. Asking the system's clock needs pages of libraries and of the kernel's,
+//! which a process that was just switched to finds nowhere near: with a thousand drones 7 % of the samples of a profile.
 #![allow(unsafe_code)]
 
 use std::time::Instant;
