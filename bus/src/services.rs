@@ -270,7 +270,7 @@ fn uplink_limits(per_process: usize) -> Limits {
 
 /// A second subscriber is for a second launcher.
 fn record_limits(drones: usize) -> Limits {
-    let buffer = (RECORD_ROWS / drones).clamp(RECORD_BUFFER[0], RECORD_BUFFER[1]);
+    let buffer = (RECORD_ROWS / drones.max(1)).clamp(RECORD_BUFFER[0], RECORD_BUFFER[1]);
     Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer, overflow: false }
 }
 
