@@ -141,7 +141,7 @@ pub struct Control {
     spin: u32,
     /// The memfd, in the process that made it.
     memfd: Option<OwnedFd>,
-    /// When it was made, there.
+    /// When it was made, there, if there is a counter that tells.
     made: Option<Mark>,
 }
 
@@ -172,7 +172,7 @@ impl Control {
             spin: spin_for(spec.drones.div_ceil(spec.per_process)),
             per_process: spec.per_process as u32,
         };
-        let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd), made: Some(Mark::now()) };
+        let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd), made: Mark::now() };
         // SAFETY: `base` is the start of a fresh, page-aligned mapping that holds a header, and nobody else has it yet.
         unsafe { base.cast::<Header>().write(header) };
         Ok(control)

@@ -4,23 +4,31 @@
 
 use std::time::Instant;
 
-/// Reads of the counter and of the clock, as one moment.
+/// Tries to read counter and clock as one moment: whoever is put aside between the two has read two moments.
+const TRIES: u32 = 8;
+
+/// The counter and the clock at one moment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mark {
-    count: Option<u64>,
+    count: u64,
     clock: Instant,
 }
 
 impl Mark {
-    pub fn now() -> Self {
-        Self { count: steady().then(count), clock: Instant::now() }
+    /// `None` if there is no counter to go by.
+    pub fn now() -> Option<Self> {
+        let look = |_| {
+            let (count_before, clock) = (count(), Instant::now());
+            (count().saturating_sub(count_before), Self { count: count_before, clock })
+        };
+        let (_, mark) = (0..TRIES).map(look).min_by_key(|(span, _)| *span)?;
+        steady().then_some(mark)
     }
 
     /// Nanoseconds a count, since this mark; 0 if there is no counter to go by.
     pub fn ns_per_count(&self) -> f64 {
-        let Some(begun) = self.count else { return 0.0 };
-        let counts = count().wrapping_sub(begun);
-        if counts == 0 { 0.0 } else { self.clock.elapsed().as_nanos() as f64 / counts as f64 }
+        let Some(now) = Self::now().filter(|now| now.count > self.count) else { return 0.0 };
+        (now.clock - self.clock).as_nanos() as f64 / (now.count - self.count) as f64
     }
 }
 
@@ -96,7 +104,7 @@ mod tests {
     fn the_counter_and_the_clock_agree() {
         let mark = Mark::now();
         std::thread::sleep(Duration::from_millis(20));
-        let by_counter = Stopwatch::new(mark.ns_per_count());
+        let by_counter = Stopwatch::new(mark.map_or(0.0, |mark| mark.ns_per_count()));
         let by_clock = Stopwatch::default();
         let (a, b) = (by_counter.start(), by_clock.start());
         std::thread::sleep(Duration::from_millis(20));

@@ -156,28 +156,29 @@ impl Radio {
     /// What becomes of a frame, as the world stamped it, at a receiver that is `here` (m) one tick after it was sent.
     #[must_use]
     pub fn fate(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Verdict {
-        if frame.queue_ns == NEVER_AIRED {
-            return Verdict::Drop(DropReason::Queue);
-        }
-        self.verdict(Link::of(frame, receiver), here - frame.position(), aired(frame, dt_ns))
+        let link = Link::of(frame, receiver);
+        self.fate_in(self.air_of(link), frame, (link, here), dt_ns)
     }
 
     /// The same for a receiver whose airs were looked up beforehand.
     #[must_use]
     pub fn fate_at(&self, airs: &AirsAt, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Verdict {
-        let known = airs.places.get(usize::from(frame.frame.kind).wrapping_sub(1)).copied().flatten();
-        let air = match known {
-            Some(GENERAL) => Some(&self.air),
-            Some(rule) => self.rules.get(usize::from(rule)).map(|rule| &rule.air),
-            None => None,
-        };
-        match air.filter(|_| frame.queue_ns != NEVER_AIRED) {
-            Some(air) => {
-                let link = Link::of(frame, airs.receiver);
-                self.verdict_in(air, link, here - frame.position(), aired(frame, dt_ns))
-            }
-            None => self.fate(frame, airs.receiver, here, dt_ns),
+        let link = Link::of(frame, airs.receiver);
+        let place = airs.places.get(usize::from(link.topic).wrapping_sub(1)).copied().flatten();
+        let known = place.and_then(|place| match place {
+            GENERAL => Some(&self.air),
+            rule => self.rules.get(usize::from(rule)).map(|rule| &rule.air),
+        });
+        self.fate_in(known.unwrap_or_else(|| self.air_of(link)), frame, (link, here), dt_ns)
+    }
+
+    fn fate_in(&self, air: &Air, frame: &AirFrame, (link, here): (Link, Vec2), dt_ns: i64) -> Verdict {
+        if frame.queue_ns == NEVER_AIRED {
+            return Verdict::Drop(DropReason::Queue);
         }
+        let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
+        let aired = sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX);
+        self.verdict_in(air, link, here - frame.position(), aired)
     }
 
     /// What air each topic goes through to a receiver, where that is the same for all senders.
@@ -247,10 +248,4 @@ impl Radio {
         let part = if link.source == low { part } else { -part };
         libm::pow(1.0 + self.asymmetry, part)
     }
-}
-
-/// When a frame went on the air.
-fn aired(frame: &AirFrame, dt_ns: i64) -> SimTime {
-    let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
-    sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX)
 }

@@ -48,7 +48,7 @@ impl Case {
         use Case::*;
         let all = [Floor, Datagrams, InlineBeacon, BlockBeacon, YieldBeacon, Inline, Block, Yield, Packed];
         let apt = |case: &Case| match case {
-            Datagrams => datagrams,
+            Datagrams => datagrams || only.contains(case),
             Packed => drones > PACK,
             _ => true,
         };
@@ -154,4 +154,17 @@ safe_distance_m = 37
         text += "[[radio.rule]]\ntopics = [\"leadership\", \"plan\", \"assignment\"]\nrange_m = 100000\n";
     }
     Scenario::parse(&text, Source { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_case_that_is_named_is_measured() {
+        assert!(!Case::of(8, false, &[]).contains(&Case::Datagrams));
+        assert!(Case::of(8, true, &[]).contains(&Case::Datagrams));
+        assert_eq!(Case::of(8, false, &[Case::Floor, Case::Datagrams]), [Case::Floor, Case::Datagrams]);
+        assert_eq!(Case::of(PACK, false, &[Case::Packed]), []);
+    }
 }

@@ -118,6 +118,9 @@ pub fn runtime(args: &RuntimeArgs) -> Result<Exit, Failure> {
     for &drones in &args.drones {
         let size = Size::new(drones, args.quick, args.ticks)?;
         let cases = Case::of(drones, args.compare.is_some(), &args.cases);
+        if cases.is_empty() {
+            return Err(Failure::usage(format!("expected a case that there is with {drones} drones, see --cases")));
+        }
         let mut measured: Vec<Vec<Measured>> = vec![Vec::new(); cases.len()];
         for round in 0..rounds as usize {
             // Each round begins with another case, so that none always follows the same one.
