@@ -8,7 +8,7 @@
 //! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
 //! | [`escape`] | out of a corner |
 //! | `stray` | into the others' formation, though none of them hears this drone |
-//! | [`rehearsal`], [`stage`] | a leader flies its alternatives ahead |
+//! | [`rollout`], [`stage`] | a leader flies its alternatives ahead |
 //! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
 //! | [`talk`] | what is said, and when |
 
@@ -22,7 +22,7 @@ pub mod pilot;
 pub mod program;
 pub mod queue;
 mod reaction;
-pub mod rehearsal;
+pub mod rollout;
 pub mod safety;
 pub mod stage;
 mod stray;

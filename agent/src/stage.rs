@@ -6,7 +6,7 @@ use crate::pilot::{Heard, Pilot};
 use crate::safety::RANGING;
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::geometry::nearest;
-use skein_leader::ledger::{Ledger, Orders};
+use skein_leader::ledger::{Ledger, PlanBundle};
 use skein_leader::planner::{Destination, Member, Objective, PlannerParams, Strategy};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
@@ -64,12 +64,12 @@ impl Stage {
     pub fn new(
         leader: &SwarmPilot,
         crew: &[Member],
-        orders: &Orders,
+        bundle: &PlanBundle,
         (tick, now, step_s): (u64, SimTime, f64),
         thinking: u64,
     ) -> Self {
         let ledger = leader.united_ledger(now);
-        let understudy = |member: &Member| leader.understudy(member.id, now, step_s, &ledger);
+        let rollout_pilot = |member: &Member| leader.rollout_pilot(member.id, now, step_s, &ledger);
         let mut stage = Self {
             params: leader.params.clone(),
             step_s,
@@ -78,7 +78,7 @@ impl Stage {
             tick,
             thinking,
             gate_x_m: f64::NEG_INFINITY,
-            pilots: crew.iter().map(understudy).collect(),
+            pilots: crew.iter().map(rollout_pilot).collect(),
             bodies: crew.iter().map(|member| (member.position, member.velocity)).collect(),
             said: Vec::new(),
             energy_j: 0.0,
@@ -86,20 +86,20 @@ impl Stage {
             way_s: 0.0,
             safe: true,
         };
-        stage.obey(orders);
+        stage.obey(bundle);
         let sets = stage.pilots.iter().flat_map(|pilot| pilot.leading.ledger.sets());
         stage.gate_x_m = sets.map(|set| set.routes.gate_x_m()).fold(f64::NEG_INFINITY, f64::max);
         stage
     }
 
     /// All obey these orders at once: what is on the air for a tick or two makes no difference.
-    fn obey(&mut self, orders: &Orders) {
+    fn obey(&mut self, bundle: &PlanBundle) {
         let newest = self.pilots.iter().map(|pilot| pilot.leading.ledger.newest()).max().unwrap_or_default();
-        let mut orders = orders.clone();
-        orders.plan.stamp = self.now;
-        orders.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
+        let mut bundle = bundle.clone();
+        bundle.plan.stamp = self.now;
+        bundle.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
         for pilot in &mut self.pilots {
-            pilot.leading.obey(self.now, orders.clone());
+            pilot.leading.obey(self.now, bundle.clone());
         }
     }
 
@@ -111,10 +111,10 @@ impl Stage {
 
     /// The same at the decision, for these orders.
     #[must_use]
-    pub fn under(&self, orders: &Orders) -> Self {
+    pub fn under(&self, bundle: &PlanBundle) -> Self {
         let mut stage = Self { start: self.now, energy_j: 0.0, ..self.clone() };
-        stage.way_s = orders.parts.iter().map(|part| part.arrival_s).sum::<f64>() / orders.parts.len().max(1) as f64;
-        stage.obey(orders);
+        stage.way_s = bundle.parts.iter().map(|part| part.arrival_s).sum::<f64>() / bundle.parts.len().max(1) as f64;
+        stage.obey(bundle);
         stage
     }
 
@@ -211,19 +211,19 @@ impl Stage {
 
     /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
     fn closed(&self) -> Option<f64> {
-        let orders = self.pilots.first()?.leading.ledger.obeyed().filter(|orders| orders.plan.phase != PHASE_AVOID)?;
-        let (place, velocity) = anchor(&orders.plan, self.now);
+        let bundle = self.pilots.first()?.leading.ledger.obeyed().filter(|bundle| bundle.plan.phase != PHASE_AVOID)?;
+        let (place, velocity) = anchor(&bundle.plan, self.now);
         let error_m = self.params.planner.arrival_error_m;
         let holds = matches!(self.params.planner.destination, Destination::Hold { .. });
         let in_slot = |(pilot, (position, speed)): (&SwarmPilot, &(Vec2, Vec2))| {
             let slot = pilot.leading.ledger.part().map(|part| place + Vec2::from(part.slot_m));
             let still = !holds || (speed - velocity).norm() <= HOLD_SPEED_MPS;
-            pilot.leading.ledger.stamp() == orders.plan.id
+            pilot.leading.ledger.stamp() == bundle.plan.id
                 && still
                 && slot.is_some_and(|s| (s - position).norm() <= error_m)
         };
         let all = self.pilots.iter().zip(&self.bodies).all(in_slot);
-        let rest_m = if velocity.x > 0.0 { (orders.plan.anchor_stop_x_m - place.x).max(0.0) } else { 0.0 };
+        let rest_m = if velocity.x > 0.0 { (bundle.plan.anchor_stop_x_m - place.x).max(0.0) } else { 0.0 };
         all.then(|| rest_m / velocity.x.max(1e-9))
     }
 }
@@ -247,12 +247,12 @@ impl SwarmPilot {
     }
 
     /// A drone as this leader knows it, to be stepped every `dt_s`.
-    fn understudy(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
+    fn rollout_pilot(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
         let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
         params.safety.dt_s = dt_s;
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // In the mind nothing is rehearsed again.
-        params.planner.strategy = Strategy::CongestionAware;
+        params.planner.strategy = Strategy::PaperRule;
         let leading = self.leading.of_crew(&params.leading(), now, ledger.of_member(me));
         let mut study = Self::new(params);
         study.leading = leading;

@@ -8,13 +8,13 @@ use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::{Ahead, ahead_of, queue_speed};
 use crate::reaction::Reaction;
-use crate::rehearsal::{MOST_MEMBERS, Rehearsal, Start};
+use crate::rollout::{MAX_MEMBERS, Rollout, Start};
 use crate::safety::{NearObstacle, Neighbour, Safety};
 use crate::stray::Stray;
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
-use skein_leader::ledger::Orders;
+use skein_leader::ledger::PlanBundle;
 use skein_leader::planner::Strategy;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::downlink::Senses;
@@ -48,7 +48,7 @@ pub struct SwarmPilot {
     /// Since when it obeys a formation of another term than its leader's.
     old_formation: Option<SimTime>,
     /// Apart: only a leader that thinks has one, and all others would carry the room for it through every tick.
-    rehearsal: Option<Box<Rehearsal>>,
+    rollout: Option<Box<Rollout>>,
     silent: Vec<Vec2>,
     ahead: Vec<Ahead>,
     pub(crate) neighbours: Vec<Neighbour>,
@@ -67,7 +67,7 @@ impl SwarmPilot {
             escape: Escape::default(),
             stray: Stray::default(),
             old_formation: None,
-            rehearsal: None,
+            rollout: None,
             silent: Vec::new(),
             ahead: Vec::new(),
             neighbours: Vec::new(),
@@ -88,27 +88,27 @@ impl SwarmPilot {
         if self.leading.election.leads() {
             self.plan(senses.now, own, say);
         } else {
-            self.rehearsal = None;
+            self.rollout = None;
         }
     }
 
     fn plan(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
-        self.leading.muster(now, own);
-        if let Some(mut rehearsal) = self.rehearsal.take() {
+        self.leading.refresh_members(now, own);
+        if let Some(mut rollout) = self.rollout.take() {
             // What became known meanwhile is planned for in the next tick.
-            let over = match rehearsal.still_holds(self.leading.members(), self.leading.obstacles.iter().count()) {
-                true => rehearsal.work(own.tick),
-                false => Some(rehearsal.choose()),
+            let over = match rollout.still_holds(self.leading.members(), self.leading.obstacles.iter().count()) {
+                true => rollout.work(own.tick),
+                false => Some(rollout.choose()),
             };
             match over {
-                Some(orders) => self.leading.adopt(now, orders),
-                None => self.rehearsal = Some(rehearsal),
+                Some(bundle) => self.leading.adopt(now, bundle),
+                None => self.rollout = Some(rollout),
             }
             return;
         }
         let alternatives = self.leading.decide(now, &self.silent, say);
         match self.params.planner.strategy {
-            Strategy::Rehearsed(objective) if alternatives.len() > 1 && self.leading.living().len() <= MOST_MEMBERS => {
+            Strategy::LookAhead(objective) if alternatives.len() > 1 && self.leading.living().len() <= MAX_MEMBERS => {
                 self.rehearse(Start { tick: own.tick, now, objective }, alternatives);
             }
             // Too many for a rehearsal: the rule's.
@@ -117,12 +117,12 @@ impl SwarmPilot {
     }
 
     /// Sends all on the ways to fly meanwhile, in the groups they have, and begins to rehearse what else could be done.
-    fn rehearse(&mut self, start: Start, alternatives: Vec<Orders>) {
+    fn rehearse(&mut self, start: Start, alternatives: Vec<PlanBundle>) {
         let (members, scope) = (self.leading.members(), self.leading.election.scope());
         let mut first = alternatives[self.leading.meanwhile()].clone();
         first.unsplit(members, scope);
         first.parts.retain(|id| members.iter().any(|m| m.id == id));
-        self.rehearsal = Some(Box::new(Rehearsal::new(self, start, alternatives)));
+        self.rollout = Some(Box::new(Rollout::new(self, start, alternatives)));
         self.leading.adopt(start.now, first);
     }
 
@@ -141,7 +141,7 @@ impl SwarmPilot {
     }
 
     /// Nobody said anything about an obstacle, and it is dangerously near: go round it by the nearest way.
-    fn fend_for_itself(&mut self, senses: &Senses<'_>) {
+    fn emergency_avoidance(&mut self, senses: &Senses<'_>) {
         let clearance_m = self.params.safety.clearance_m;
         let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
@@ -183,8 +183,8 @@ impl SwarmPilot {
         }
         let over = self.is_formation_over(senses.now);
         match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
-            (Some(orders), Some(part)) if orders.plan.phase != PHASE_AVOID && !over => {
-                let (anchor, velocity) = anchor(&orders.plan, senses.now);
+            (Some(bundle), Some(part)) if bundle.plan.phase != PHASE_AVOID && !over => {
+                let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
                 self.on_sight(wanted, senses.now)
             }
@@ -196,8 +196,8 @@ impl SwarmPilot {
     /// others are still on their way, and a drone that kept its slot might bar it.
     fn is_formation_over(&mut self, now: SimTime) -> bool {
         let term = self.leading.election.obeyed();
-        let orders = self.leading.ledger.obeyed();
-        let old = orders.is_some_and(|orders| orders.plan.phase == PHASE_REFORM && orders.plan.id.ballot != term);
+        let bundle = self.leading.ledger.obeyed();
+        let old = bundle.is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM && bundle.plan.id.ballot != term);
         self.old_formation = old.then(|| self.old_formation.unwrap_or(now));
         self.old_formation.is_some_and(|since| now.since(since) >= OLD_FORMATION_S)
     }
@@ -267,7 +267,7 @@ impl SwarmPilot {
             group: self.leading.ledger.group(),
             leads: self.leading.election.leads().then(|| self.leading.election.scope()),
             term: self.leading.election.obeyed(),
-            phase: self.leading.ledger.obeyed().map_or(0, |orders| orders.plan.phase),
+            phase: self.leading.ledger.obeyed().map_or(0, |bundle| bundle.plan.phase),
             place: open.map(|place| (place.route, place.rank)),
         }
     }
@@ -286,7 +286,7 @@ impl Pilot for SwarmPilot {
         self.sense(senses);
         self.find_silent(senses);
         self.lead(senses, &own, say);
-        self.fend_for_itself(senses);
+        self.emergency_avoidance(senses);
         let radius_m = DEAD_BERTH * self.params.safety.safe_distance_m;
         let bodies: Vec<Body> = self.silent.iter().map(|&centre_m| Body { centre_m, radius_m }).collect();
         self.way.update(&self.leading.ledger, senses.position, &bodies);

@@ -1,10 +1,10 @@
 //! A drone's way past the obstacle sets ahead: its routes, the taut string through them, its places in queues.
 
 use skein_leader::cost::{Flight, shortest, trips};
+use skein_leader::funnel::{Corridor, RUN_OUT_M, Steering};
 use skein_leader::ledger::Ledger;
 use skein_leader::ledger::PlannedSet;
 use skein_leader::routes::{Body, Routes};
-use skein_leader::string::{Lane, Pull, RUN_OUT_M};
 use skein_protocol::payload::{MAX_PLACES, QueuePlace};
 use skein_protocol::{DroneId, PlanStamp, Vec2};
 
@@ -38,7 +38,7 @@ pub struct Way {
     me: DroneId,
     course_y_m: f64,
     legs: Vec<Leg>,
-    lane: Option<Lane>,
+    lane: Option<Corridor>,
     drawn: Option<(PlanStamp, bool, usize)>,
     /// Routes taken instead of those assigned, by set: an obstacle abreast or a body in the gap shut the other one off.
     detours: Vec<(u32, usize)>,
@@ -159,12 +159,12 @@ impl Way {
             .iter()
             .map(|(routes, _)| routes.exit_x_m())
             .reduce(f64::max)
-            .map(|exit_x_m| Lane::new(&open, &self.bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
+            .map(|exit_x_m| Corridor::new(&open, &self.bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
     }
 
     /// The next step along the way; `None` if nothing lies ahead.
     #[must_use]
-    pub fn pull(&self, position: Vec2) -> Option<Pull> {
+    pub fn pull(&self, position: Vec2) -> Option<Steering> {
         self.lane.as_ref().map(|lane| lane.pull(position, self.first_gate()))
     }
 

@@ -1,7 +1,7 @@
 //! Ticks per second of the bare barrier: `cargo run --example barrier -- [DRONES] [TICKS] [block|yield] [auto|off]`.
 
 use skein_bus::{
-    Answer, Control, ControlSpec, DroneEnd, Patience, PinMode, TickSignal, WaitMode, allowed_cores, pin_to_core,
+    Control, ControlSpec, DroneEnd, Patience, PinMode, TickOutcome, TickSignal, WaitMode, allowed_cores, pin_to_core,
 };
 use skein_protocol::slot::Slot;
 use std::error::Error;
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         std::thread::sleep(Duration::from_millis(1));
     }
     pin_to_core(0, pin)?;
-    let mut answers = vec![Answer::Pending; drones];
+    let mut answers = vec![TickOutcome::Pending; drones];
     let start = Instant::now();
     for k in 0..ticks {
         world.open_tick(k)?;

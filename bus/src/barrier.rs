@@ -20,7 +20,7 @@ const YIELDS: u32 = 256;
 
 /// What became of one drone in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Answer {
+pub enum TickOutcome {
     /// Not yet waited for.
     #[default]
     Pending,
@@ -39,9 +39,9 @@ pub enum Answer {
 /// How long the world waits for a drone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Patience {
-    /// Until then; who has not answered is [`Answer::Late`]. For the wall clock.
+    /// Until then; who has not answered is [`TickOutcome::Late`]. For the wall clock.
     Until(Instant),
-    /// That long from the call; who has not answered is [`Answer::Hung`]. For lockstep.
+    /// That long from the call; who has not answered is [`TickOutcome::Hung`]. For lockstep.
     For(Duration),
 }
 
@@ -83,29 +83,29 @@ impl Control {
     }
 
     /// Waits until every drone has answered tick `k`, is dead, or has used up the patience, and writes what became of
-    /// each to `answers` (one a drone; those that are [`Answer::Absent`] are left alone). Allocates nothing.
+    /// each to `answers` (one a drone; those that are [`TickOutcome::Absent`] are left alone). Allocates nothing.
     ///
     /// # Errors
     /// [`BusError::Control`] for a tick past 2³¹ − 2, or a slice of another length than the number of drones.
-    pub fn wait_done(&self, k: Tick, patience: Patience, answers: &mut [Answer]) -> Result<(), BusError> {
+    pub fn wait_done(&self, k: Tick, patience: Patience, answers: &mut [TickOutcome]) -> Result<(), BusError> {
         let target = word_of(k)?;
         let drones = self.spec().drones;
         if answers.len() != drones {
             return Err(BusError::Control(format!("expected {drones} answers, not {}", answers.len())));
         }
         let (end, overdue) = match patience {
-            Patience::Until(end) => (end, Answer::Late),
-            Patience::For(span) => (Instant::now() + span, Answer::Hung),
+            Patience::Until(end) => (end, TickOutcome::Late),
+            Patience::For(span) => (Instant::now() + span, TickOutcome::Hung),
         };
         for (drone, answer) in answers.iter_mut().enumerate() {
-            if *answer != Answer::Absent {
+            if *answer != TickOutcome::Absent {
                 *answer = self.wait_for(drone, target, end).unwrap_or(overdue);
             }
         }
         Ok(())
     }
 
-    fn wait_for(&self, drone: usize, target: u32, end: Instant) -> Option<Answer> {
+    fn wait_for(&self, drone: usize, target: u32, end: Instant) -> Option<TickOutcome> {
         let word = &self.drone(drone).done;
         for _ in 0..self.spin() {
             if let Some(answer) = judge(word.load(Ordering::Acquire), target) {
@@ -155,11 +155,11 @@ impl Control {
 }
 
 /// A drone that answered and then died has answered.
-fn judge(done: u32, target: u32) -> Option<Answer> {
+fn judge(done: u32, target: u32) -> Option<TickOutcome> {
     if done & !DEAD == target {
-        Some(Answer::Done)
+        Some(TickOutcome::Done)
     } else if done & DEAD != 0 {
-        Some(Answer::Dead)
+        Some(TickOutcome::Dead)
     } else {
         None
     }

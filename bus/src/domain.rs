@@ -17,7 +17,7 @@ const SHARED_MEMORY: &str = "/dev/shm";
 /// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher lives.
 const LOCK: &str = "lock";
 /// So often the root is made anew because somebody took it away meanwhile.
-const MOST_TRIES: u32 = 100;
+const MAX_TRIES: u32 = 100;
 /// Longest path of a run's folder, bytes: iceoryx2 appends up to 140 to it and allows 255.
 const MAX_FOLDER: usize = 112;
 /// Longest label that is kept, bytes.
@@ -248,7 +248,7 @@ fn open_lock(path: &Path) -> Result<File, BusError> {
 /// Waits for, and holds, the right to make or remove runs. Makes the root if need be.
 fn lock_root(root: &Path) -> Result<File, BusError> {
     let path = root.join(LOCK);
-    let mut tries = 0..MOST_TRIES;
+    let mut tries = 0..MAX_TRIES;
     loop {
         let lock = match private_folder(root).and_then(|()| open_lock(&path)) {
             Err(BusError::Io { source, .. }) if source.kind() == ErrorKind::NotFound && tries.next().is_some() => {

@@ -19,24 +19,24 @@ pub mod floor;
 mod futex;
 pub mod host;
 pub mod mission;
-pub mod orders;
 pub mod payload;
 pub mod ports;
+pub mod process_request;
 pub mod services;
 pub mod stopwatch;
 
-pub use barrier::{Answer, DroneEnd, Patience, TickSignal};
+pub use barrier::{DroneEnd, Patience, TickOutcome, TickSignal};
 pub use control::{Control, ControlSpec, WaitMode};
 pub use domain::{Cleaned, Domain, clean, living};
 pub use error::BusError;
 pub use floor::Floor;
 pub use host::{PinMode, allowed_cores, pin_to_core, raise_file_limit};
 pub use mission::WorldState;
-pub use orders::{Order, OrderKind};
 pub use payload::UplinkHeader;
 pub use ports::{
     DownlinkPublisher, DownlinkSubscriber, RecordPolicy, RecordPublisher, RecordSubscriber, UplinkPublisher,
     UplinkSubscriber, WatchPublisher,
 };
+pub use process_request::{ProcessRequest, RequestKind};
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};
 pub use stopwatch::Stopwatch;

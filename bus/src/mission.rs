@@ -92,14 +92,14 @@ impl Control {
     }
 
     /// Takes the mark back before a new process is started, which answers from tick `from` on; until then the world
-    /// counts the drone as [`Answer::Absent`](crate::Answer::Absent).
+    /// counts the drone as [`TickOutcome::Absent`](crate::Answer::Absent).
     pub fn revive(&self, drone: usize, from: Tick) {
         self.set_resume_from(drone, from);
         self.drone(drone).done.store(0, Ordering::SeqCst);
     }
 
     /// Keeps a drone from reading or answering any tick: to be called before SIGSTOP. The world counts it as
-    /// [`Answer::Absent`](crate::Answer::Absent) from then on.
+    /// [`TickOutcome::Absent`](crate::Answer::Absent) from then on.
     pub fn freeze(&self, drone: usize) {
         self.drone(drone).resume_from.store(FROZEN, Ordering::SeqCst);
     }

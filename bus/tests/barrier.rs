@@ -1,7 +1,7 @@
 //! The barrier, with threads in the place of processes: each maps the segment for itself.
 #![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
 
-use skein_bus::{Answer, BusError, Control, ControlSpec, DroneEnd, Patience, TickSignal, WaitMode};
+use skein_bus::{BusError, Control, ControlSpec, DroneEnd, Patience, TickOutcome, TickSignal, WaitMode};
 use skein_protocol::slot::Slot;
 use std::io::Write;
 use std::os::fd::AsRawFd;
@@ -43,11 +43,11 @@ fn lockstep(drones: usize, cores: usize, ticks: u64, wait: WaitMode) {
     let launcher = segment(drones, cores, wait);
     let world = Control::attach(launcher.fd().unwrap()).unwrap();
     let flock: Vec<_> = (0..drones).map(|i| drone(&launcher, i)).collect();
-    let mut answers = vec![Answer::Pending; drones];
+    let mut answers = vec![TickOutcome::Pending; drones];
     for k in 0..ticks {
         world.open_tick(k).unwrap();
         world.wait_done(k, LONG, &mut answers).unwrap();
-        assert!(answers.iter().all(|&answer| answer == Answer::Done), "tick {k}: {answers:?}");
+        assert!(answers.iter().all(|&answer| answer == TickOutcome::Done), "tick {k}: {answers:?}");
         assert!((0..drones).all(|i| world.slot(i) == slot(i, k)), "tick {k}");
     }
     world.close();
@@ -80,11 +80,11 @@ fn a_death_wakes_the_world() {
         thread::sleep(Duration::from_millis(30));
         supervisor.mark_dead(0);
     });
-    let mut answers = [Answer::Pending; 2];
+    let mut answers = [TickOutcome::Pending; 2];
     let start = Instant::now();
     world.wait_done(0, LONG, &mut answers).unwrap();
     assert!(start.elapsed() < Duration::from_secs(2), "the mark did not wake the world");
-    assert_eq!(answers, [Answer::Dead, Answer::Done]);
+    assert_eq!(answers, [TickOutcome::Dead, TickOutcome::Done]);
     watcher.join().unwrap();
 
     // A new process answers from tick 5 on, and the tick before goes on without it.
@@ -93,9 +93,9 @@ fn a_death_wakes_the_world() {
     let again = drone(&world, 0);
     for k in 3..7 {
         world.open_tick(k).unwrap();
-        answers[0] = if k < 5 { Answer::Absent } else { Answer::Pending };
+        answers[0] = if k < 5 { TickOutcome::Absent } else { TickOutcome::Pending };
         world.wait_done(k, LONG, &mut answers).unwrap();
-        assert_eq!(answers, [if k < 5 { Answer::Absent } else { Answer::Done }, Answer::Done]);
+        assert_eq!(answers, [if k < 5 { TickOutcome::Absent } else { TickOutcome::Done }, TickOutcome::Done]);
     }
     world.close();
     assert_eq!(again.join().unwrap(), [5, 6]);
@@ -110,12 +110,12 @@ fn who_answered_before_it_died_has_answered() {
     assert_eq!(end.wait_tick(|| true), TickSignal::Tick(0));
     assert!(end.finish(0, &slot(0, 0)));
     world.mark_dead(0);
-    let mut answers = [Answer::Pending];
+    let mut answers = [TickOutcome::Pending];
     world.wait_done(0, LONG, &mut answers).unwrap();
-    assert_eq!(answers, [Answer::Done]);
+    assert_eq!(answers, [TickOutcome::Done]);
     world.open_tick(1).unwrap();
     world.wait_done(1, LONG, &mut answers).unwrap();
-    assert_eq!(answers, [Answer::Dead]);
+    assert_eq!(answers, [TickOutcome::Dead]);
 }
 
 #[test]
@@ -125,10 +125,10 @@ fn the_late_and_the_hung() {
     let mut slow = end_of(&world, 0);
     world.open_tick(0).unwrap();
     assert_eq!(slow.wait_tick(|| true), TickSignal::Tick(0));
-    let mut answers = [Answer::Pending; 2];
+    let mut answers = [TickOutcome::Pending; 2];
     let start = Instant::now();
     world.wait_done(0, Patience::Until(start + Duration::from_millis(300)), &mut answers).unwrap();
-    assert_eq!(answers, [Answer::Late, Answer::Done]);
+    assert_eq!(answers, [TickOutcome::Late, TickOutcome::Done]);
     assert!(start.elapsed() >= Duration::from_millis(300));
 
     // It answers tick 0 while tick 2 is open: that is no answer to tick 2, and the next it sees is the newest.
@@ -136,11 +136,11 @@ fn the_late_and_the_hung() {
     world.open_tick(2).unwrap();
     assert!(slow.finish(0, &slot(0, 0)));
     world.wait_done(2, Patience::For(Duration::from_millis(300)), &mut answers).unwrap();
-    assert_eq!(answers, [Answer::Hung, Answer::Done]);
+    assert_eq!(answers, [TickOutcome::Hung, TickOutcome::Done]);
     assert_eq!(slow.wait_tick(|| true), TickSignal::Tick(2));
     assert!(slow.finish(2, &slot(0, 2)));
     world.wait_done(2, LONG, &mut answers).unwrap();
-    assert_eq!((answers, world.slot(0)), ([Answer::Done; 2], slot(0, 2)));
+    assert_eq!((answers, world.slot(0)), ([TickOutcome::Done; 2], slot(0, 2)));
     world.close();
     assert_eq!(slow.wait_tick(|| true), TickSignal::Stop);
     assert_eq!(prompt.join().unwrap().last(), Some(&2));
@@ -199,5 +199,5 @@ fn what_is_no_control_segment_is_refused() {
     assert_eq!(attached.spec(), good.spec());
     assert!(DroneEnd::new(Arc::new(attached), 3).is_err());
     assert!(good.open_tick(u64::from(u32::MAX)).is_err());
-    assert!(good.wait_done(0, LONG, &mut [Answer::Pending]).is_err());
+    assert!(good.wait_done(0, LONG, &mut [TickOutcome::Pending]).is_err());
 }

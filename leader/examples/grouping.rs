@@ -9,7 +9,7 @@
     reason = "it measures and prints; nothing that flies does"
 )]
 
-use skein_leader::split::Table;
+use skein_leader::split::ArrivalTable;
 use std::time::{Duration, Instant};
 
 /// Drones, routes, headway (s).
@@ -44,7 +44,7 @@ fn median(work: impl Fn() -> f64) -> (Duration, f64) {
 
 fn main() {
     for (name, rows) in [("scattered", scattered()), ("block", block())] {
-        let table = Table::new(&rows, &[SIZE.2; SIZE.1]).unwrap();
+        let table = ArrivalTable::new(&rows, &[SIZE.2; SIZE.1]).unwrap();
         let (quick, least_s) = median(|| table.least_makespan_s());
         let (whole, split_s) = median(|| table.split().makespan_s);
         assert_eq!(least_s, split_s, "the tie-break keeps the makespan");

@@ -2,11 +2,11 @@
 
 use crate::candidates::candidates;
 use crate::cost::{Flight, Trip, shortest, trips};
-use crate::council;
-use crate::ledger::{Ledger, Orders, PlannedSet};
+use crate::ledger::{Ledger, PlanBundle, PlannedSet};
+use crate::plan_exchange;
 use crate::planner::{Member, Planner, Situation, Strategy};
 use crate::routes::Routes;
-use crate::split::{Split, Table};
+use crate::split::{ArrivalTable, RouteAssignment};
 use skein_protocol::payload::{Arrivals, Assignment, PHASE_AVOID, Plan, set_tag};
 use skein_protocol::{GroupId, ObstacleId, Vec2};
 use std::collections::BTreeMap;
@@ -60,20 +60,20 @@ impl Planner {
         s: &Situation<'_>,
         set: &[ObstacleId],
         say: &mut Vec<Arrivals>,
-    ) -> Option<Vec<Orders>> {
+    ) -> Option<Vec<PlanBundle>> {
         let survey = self.survey(s, set)?;
         let others = self.others_before(s, set);
         self.meanwhile = 0;
         if others.is_empty() {
             let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
             let groupings = self.choose(s.members, &survey)?;
-            return Some(groupings.iter().map(|grouping| self.orders(s, set, &survey, grouping, replan)).collect());
+            return Some(groupings.iter().map(|grouping| self.bundle(s, set, &survey, grouping, replan)).collect());
         }
         let tag = set_tag(set);
         let rows = || (0..s.members.len()).map(|i| row(s, &survey, tag, i)).collect();
-        self.council.ask(s.now, tag, rows, say);
-        let table = self.council.answer(s.now, &others, survey.routes.count(), s.delay_s)?;
-        self.council.close(s.now, say);
+        self.plan_exchange.ask(s.now, tag, rows, say);
+        let table = self.plan_exchange.answer(s.now, &others, survey.routes.count(), s.delay_s)?;
+        self.plan_exchange.close(s.now, say);
         self.together(s, set, table, &survey)
     }
 
@@ -94,14 +94,14 @@ impl Planner {
     }
 
     /// Orders for the members; `replan`: the set was planned for before.
-    pub(crate) fn orders(
+    pub(crate) fn bundle(
         &self,
         s: &Situation<'_>,
         set: &[ObstacleId],
         survey: &Survey<'_>,
         grouping: &Grouping,
         replan: bool,
-    ) -> Orders {
+    ) -> PlanBundle {
         let Grouping { chosen, ranks, predicted_s } = grouping;
         let groups = groups(s, chosen, &survey.kept, replan);
         let leaders = self.params.fronts(s.members, &groups);
@@ -111,7 +111,7 @@ impl Planner {
             ..self.plan(s, PHASE_AVOID, set, Vec2::new(f64::INFINITY, 0.0))
         };
         let part = |(i, m): (usize, &Member)| {
-            let mine = s.ledger.obeyed().and_then(|orders| orders.parts.get(m.id));
+            let mine = s.ledger.obeyed().and_then(|bundle| bundle.parts.get(m.id));
             Assignment {
                 id: plan.id,
                 scope: s.scope,
@@ -125,7 +125,7 @@ impl Planner {
                 reserved: 0,
             }
         };
-        Orders { plan, parts: s.members.iter().enumerate().map(part).collect() }
+        PlanBundle { plan, parts: s.members.iter().enumerate().map(part).collect() }
     }
 
     /// One or several groupings of the members alone.
@@ -137,18 +137,18 @@ impl Planner {
         let rows: Vec<Vec<f64>> = free.iter().map(|&i| arrivals[i].clone()).collect();
         let table = self.table(&rows, routes.count())?;
         let splits = match self.params.strategy {
-            Strategy::Rehearsed(_) => {
+            Strategy::LookAhead(_) => {
                 let lateral_m: Vec<f64> = free.iter().map(|&i| members[i].position.y).collect();
                 candidates(&table, &lateral_m, routes.count())
             }
-            Strategy::CongestionAware => vec![table.split()],
+            Strategy::PaperRule => vec![table.split()],
             Strategy::Fixed { left, right } if routes.count() == 2 && left + right == free.len() => {
                 vec![table.fixed(&[right, left]).ok()?]
             }
             Strategy::ShortestPath | Strategy::Fixed { .. } => vec![table.shortest()],
         };
         let all = self.table(&arrivals, routes.count())?;
-        let grouping = |split: Split| {
+        let grouping = |split: RouteAssignment| {
             let mut chosen: Vec<usize> = (0..members.len()).map(|i| settled(i).unwrap_or(0)).collect();
             free.iter().zip(split.routes).for_each(|(&i, route)| chosen[i] = route);
             let kept: Vec<Option<u16>> = survey.kept.iter().map(|part| part.map(|part| part.rank)).collect();
@@ -159,15 +159,15 @@ impl Planner {
     }
 
     /// `None` only for arrivals that are no numbers, which finite positions do not have.
-    pub(crate) fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<Table> {
-        Table::new(arrivals, &vec![self.params.headway_s; routes]).ok()
+    pub(crate) fn table(&self, arrivals: &[Vec<f64>], routes: usize) -> Option<ArrivalTable> {
+        ArrivalTable::new(arrivals, &vec![self.params.headway_s; routes]).ok()
     }
 }
 
 /// What other leaders are told of a member.
 fn row(s: &Situation<'_>, survey: &Survey<'_>, tag: u32, i: usize) -> Arrivals {
     let arrivals_s = survey.arrivals_s(s.members, i);
-    council::row(s.now, s.ballot, s.scope, s.members[i].id, tag, &arrivals_s)
+    plan_exchange::row(s.now, s.ballot, s.scope, s.members[i].id, tag, &arrivals_s)
 }
 
 /// The sets before `routes` that a member has still to leave, with its route past each.

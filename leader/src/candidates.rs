@@ -1,6 +1,6 @@
 //! The groupings that are worth a rehearsal: a pure function of arrival times and of where the drones are.
 
-use crate::split::{Split, Table};
+use crate::split::{ArrivalTable, RouteAssignment};
 
 /// Most groupings, the shortest ways and the rule's among them.
 const MOST: usize = 16;
@@ -9,16 +9,16 @@ const MOST: usize = 16;
 /// routes, by makespan: exact, or in lateral order, where no lanes cross. No two alike. `lateral_m` is each drone's
 /// ordinate, the rows of the table.
 #[must_use]
-pub fn candidates(table: &Table, lateral_m: &[f64], routes: usize) -> Vec<Split> {
+pub fn candidates(table: &ArrivalTable, lateral_m: &[f64], routes: usize) -> Vec<RouteAssignment> {
     let rule = table.split();
     let mut counts: Vec<usize> = vec![0; routes];
     rule.routes.iter().for_each(|&route| counts[route] += 1);
     let numbers = neighbouring(&counts, lateral_m.len());
     let in_order = |counts: &Vec<usize>| in_lateral_order(table, lateral_m, counts);
-    let mut others: Vec<Split> = numbers.iter().chain([&counts]).filter_map(in_order).collect();
+    let mut others: Vec<RouteAssignment> = numbers.iter().chain([&counts]).filter_map(in_order).collect();
     others.extend(numbers.iter().filter_map(|counts| table.fixed(counts).ok()));
     others.sort_by(|a, b| a.makespan_s.total_cmp(&b.makespan_s).then(a.total_s.total_cmp(&b.total_s)));
-    let mut kept: Vec<Split> = Vec::new();
+    let mut kept: Vec<RouteAssignment> = Vec::new();
     for split in [table.shortest(), rule].into_iter().chain(others) {
         if kept.len() < MOST && !kept.iter().any(|other| other.routes == split.routes) {
             kept.push(split);
@@ -28,7 +28,7 @@ pub fn candidates(table: &Table, lateral_m: &[f64], routes: usize) -> Vec<Split>
 }
 
 /// The drones dealt out to the routes from right to left, so many to each.
-fn in_lateral_order(table: &Table, lateral_m: &[f64], counts: &[usize]) -> Option<Split> {
+fn in_lateral_order(table: &ArrivalTable, lateral_m: &[f64], counts: &[usize]) -> Option<RouteAssignment> {
     let mut from_right: Vec<usize> = (0..lateral_m.len()).collect();
     from_right.sort_by(|&a, &b| lateral_m[a].total_cmp(&lateral_m[b]).then(a.cmp(&b)));
     let mut chosen = vec![0; from_right.len()];
@@ -64,7 +64,7 @@ mod tests {
     fn the_shortest_ways_and_the_rule_come_first_and_none_twice() {
         // Six drones close to the right route; the left one is two seconds longer.
         let arrivals: Vec<Vec<f64>> = (0..6).map(|i| vec![10.0 + f64::from(i), 12.0 + f64::from(i)]).collect();
-        let table = Table::new(&arrivals, &[4.0, 4.0]).expect("a table of numbers");
+        let table = ArrivalTable::new(&arrivals, &[4.0, 4.0]).expect("a table of numbers");
         let lateral_m: Vec<f64> = (0..6).map(|i| f64::from(i % 3)).collect();
         let found = candidates(&table, &lateral_m, 2);
         assert_eq!(found[0].routes, vec![0; 6]);
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn where_all_agree_there_is_one() {
-        let table = Table::new(&[vec![3.0]], &[4.0]).expect("a table of numbers");
+        let table = ArrivalTable::new(&[vec![3.0]], &[4.0]).expect("a table of numbers");
         assert_eq!(candidates(&table, &[0.0], 1).len(), 1);
     }
 }

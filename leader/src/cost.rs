@@ -1,7 +1,7 @@
 //! Arrival times: how long a drone would take to the gate along a route if it were alone (paper, Alg. 3 and C1).
 
+use crate::funnel::{Corridor, RUN_OUT_M};
 use crate::routes::Routes;
-use crate::string::{Lane, RUN_OUT_M};
 use skein_protocol::Vec2;
 
 /// How the swarm flies.
@@ -28,7 +28,7 @@ pub struct Trip {
 pub fn trip(earlier: &[(&Routes, usize)], routes: &Routes, route: usize, position: Vec2, flight: &Flight) -> Trip {
     let passages: Vec<(&Routes, usize)> = earlier.iter().copied().chain([(routes, route)]).collect();
     let exit_x_m = passages.iter().map(|(routes, _)| routes.exit_x_m()).fold(f64::NEG_INFINITY, f64::max);
-    let lane = Lane::new(&passages, &[], Vec2::new(exit_x_m + RUN_OUT_M, flight.course_y_m));
+    let lane = Corridor::new(&passages, &[], Vec2::new(exit_x_m + RUN_OUT_M, flight.course_y_m));
     let pull = lane.pull(position, routes.gate_x_m());
     Trip { arrival_s: pull.to_gate_m / flight.speed_mps, total_s: pull.total_m / flight.speed_mps }
 }

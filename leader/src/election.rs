@@ -5,7 +5,7 @@
 //! Uniqueness of a leader for a ballot holds by construction: a ballot names its claimant, and the launcher gives each
 //! start of a process an incarnation of its own.
 
-use crate::rhythm::Rhythm;
+use crate::adaptive_timeout::AdaptiveTimeout;
 use skein_protocol::payload::{
     LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, LEADERSHIP_YIELD, Leadership,
 };
@@ -81,7 +81,7 @@ pub struct Election {
     /// Last sign of life of the leader, heard by itself or by another, or the start.
     heard: SimTime,
     /// Of the leaders' own signs.
-    rhythm: Rhythm,
+    adaptive_timeout: AdaptiveTimeout,
     /// Since when only leaders of parts of its group are heard.
     parted: Option<SimTime>,
     next_heartbeat: SimTime,
@@ -105,7 +105,7 @@ impl Election {
             highest_round: 0,
             leads: false,
             heard: now,
-            rhythm: Rhythm::expecting(now, params.heartbeat_period_s),
+            adaptive_timeout: AdaptiveTimeout::expecting(now, params.heartbeat_period_s),
             parted: None,
             next_heartbeat: now,
             probed: None,
@@ -139,7 +139,7 @@ impl Election {
     /// How long the leader may be silent, s: the time-out, or more if its signs come in rarely or irregularly.
     #[must_use]
     pub fn patience_s(&self) -> f64 {
-        self.rhythm.patience_s(self.leader_timeout_s)
+        self.adaptive_timeout.patience_s(self.leader_timeout_s)
     }
 
     /// Whether it leads, or the leader it obeys is not silent for too long.
@@ -227,7 +227,7 @@ impl Election {
             self.obeyed = ballot;
             self.scope = scope;
             self.leads = false;
-            self.rhythm.turn(now);
+            self.adaptive_timeout.turn(now);
         }
         // Its group was split without it: whoever leads a part will take it in, and what it led is no more. One of an
         // older term cannot.
@@ -237,7 +237,7 @@ impl Election {
         }
         if ballot == self.obeyed {
             self.parted = None;
-            self.rhythm.hear(now, BEAT * self.heartbeat_period_s, self.patience_s());
+            self.adaptive_timeout.hear(now, BEAT * self.heartbeat_period_s, self.patience_s());
         }
         if ballot == self.obeyed || (parted && self.may_be_taken_in(now)) {
             self.heard = now;

@@ -4,10 +4,10 @@
 
 use crate::avoid::{Grouping, Survey, ranks};
 use crate::candidates::candidates;
-use crate::council::{self, arrivals_s};
-use crate::ledger::Orders;
+use crate::ledger::PlanBundle;
+use crate::plan_exchange::{self, arrivals_s};
 use crate::planner::{Planner, Situation, Strategy};
-use crate::split::Split;
+use crate::split::RouteAssignment;
 use skein_protocol::payload::{ARRIVALS_CHOSEN, Arrivals, Assignment, set_tag};
 use skein_protocol::{Ballot, DroneId, ObstacleId, SimTime};
 use std::collections::BTreeMap;
@@ -41,7 +41,7 @@ impl Planner {
         set: &[ObstacleId],
         table: Vec<Arrivals>,
         survey: &Survey<'_>,
-    ) -> Option<Vec<Orders>> {
+    ) -> Option<Vec<PlanBundle>> {
         let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
         let union = self.table(&arrivals, survey.routes.count())?;
         let thinker = thinker(&table)?;
@@ -50,27 +50,27 @@ impl Planner {
         let saves = rule.makespan_s - start_s <= (1.0 - WORTH_UNREHEARSED) * (shortest.makespan_s - start_s);
         let splits = match self.params.strategy {
             Strategy::ShortestPath => vec![shortest],
-            Strategy::Rehearsed(_) if thinker == s.ballot.claimant => {
+            Strategy::LookAhead(_) if thinker == s.ballot.claimant => {
                 let all = || s.members.iter().chain(s.others);
                 let lateral_m = |row: &Arrivals| all().find(|m| m.id == row.drone).map_or(0.0, |m| m.position.y);
                 candidates(&union, &table.iter().map(lateral_m).collect::<Vec<_>>(), survey.routes.count())
             }
-            Strategy::Rehearsed(_) if !saves => vec![shortest],
-            Strategy::Rehearsed(_) | Strategy::CongestionAware | Strategy::Fixed { .. } => vec![rule],
+            Strategy::LookAhead(_) if !saves => vec![shortest],
+            Strategy::LookAhead(_) | Strategy::PaperRule | Strategy::Fixed { .. } => vec![rule],
         };
-        let rehearsed = matches!(self.params.strategy, Strategy::Rehearsed(_));
+        let rehearsed = matches!(self.params.strategy, Strategy::LookAhead(_));
         let replan = s.ledger.sets().iter().any(|p| p.ids.iter().any(|id| set.contains(id)));
-        let orders = |split: &Split| {
+        let bundle = |split: &RouteAssignment| {
             let grouping = joint_grouping(s, &table, survey, split);
-            let mut orders = self.orders(s, set, survey, &grouping, replan);
+            let mut bundle = self.bundle(s, set, survey, &grouping, replan);
             if rehearsed && thinker == s.ballot.claimant {
-                add_others(&mut orders, s, &table, survey, split);
+                add_others(&mut bundle, s, &table, survey, split);
             } else if rehearsed {
-                orders.unsplit(s.members, s.scope);
+                bundle.unsplit(s.members, s.scope);
             }
-            orders
+            bundle
         };
-        let all: Vec<Orders> = splits.iter().map(orders).collect();
+        let all: Vec<PlanBundle> = splits.iter().map(bundle).collect();
         self.meanwhile = usize::from(saves && all.len() > 1);
         let kept = s.members.iter().zip(&survey.kept).filter_map(|(m, part)| Some((m.id, *(*part)?))).collect();
         let waits = rehearsed && thinker != s.ballot.claimant;
@@ -80,14 +80,14 @@ impl Planner {
     }
 
     /// What the one who thinks for all chose for the members, once all of it was heard.
-    pub(crate) fn chosen(&mut self, s: &Situation<'_>) -> Option<Orders> {
+    pub(crate) fn chosen(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
         let joint = self.joint.take()?;
         if joint.ballot != s.ballot || s.now.since(joint.since) > PATIENCE_S + 2.0 * s.delay_s {
             return None;
         }
         // Who has but one way left needs no choice, and who thinks may not have asked about it.
         let choice = |row: &Arrivals| {
-            let heard = self.council.chosen(row.drone, set_tag(&joint.set), joint.thinker, joint.since);
+            let heard = self.plan_exchange.chosen(row.drone, set_tag(&joint.set), joint.thinker, joint.since);
             heard.or_else(|| only_route(row))
         };
         let Some(routes) = joint.table.iter().map(choice).collect::<Option<Vec<usize>>>() else {
@@ -99,23 +99,23 @@ impl Planner {
         let arrivals: Vec<Vec<f64>> = joint.table.iter().map(arrivals_s).collect();
         let split = self.table(&arrivals, survey.routes.count())?.assigned(&routes).ok()?;
         let grouping = joint_grouping(s, &joint.table, &survey, &split);
-        Some(self.orders(s, &joint.set, &survey, &grouping, joint.replan))
+        Some(self.bundle(s, &joint.set, &survey, &grouping, joint.replan))
     }
 
     /// Keeps of orders what is about the members; the others' leaders are told what was chosen for all.
-    pub(crate) fn tell_chosen(&mut self, now: SimTime, orders: &mut Orders, own: impl Fn(DroneId) -> bool) {
-        if orders.parts.iter().all(|part| own(part.drone)) {
+    pub(crate) fn tell_chosen(&mut self, now: SimTime, bundle: &mut PlanBundle, own: impl Fn(DroneId) -> bool) {
+        if bundle.parts.iter().all(|part| own(part.drone)) {
             return;
         }
-        let (plan, set) = (orders.plan, crate::obstacles::set_ids(&orders.plan.set, orders.plan.set_count));
+        let (plan, set) = (bundle.plan, crate::obstacles::set_ids(&bundle.plan.set, bundle.plan.set_count));
         let row = |part: &Assignment| {
             let mut gate_s = vec![f64::INFINITY; plan.routes as usize];
             gate_s.iter_mut().skip(usize::from(part.route)).take(1).for_each(|s| *s = part.arrival_s);
-            let row = council::row(now, plan.id.ballot, plan.group, part.drone, set_tag(set), &gate_s);
+            let row = plan_exchange::row(now, plan.id.ballot, plan.group, part.drone, set_tag(set), &gate_s);
             Arrivals { flags: ARRIVALS_CHOSEN, ..row }
         };
-        self.council.announce(now, orders.parts.iter().map(row).collect());
-        orders.parts.retain(own);
+        self.plan_exchange.announce(now, bundle.parts.iter().map(row).collect());
+        bundle.parts.retain(own);
     }
 }
 
@@ -133,7 +133,7 @@ fn only_route(row: &Arrivals) -> Option<usize> {
 }
 
 /// Of a split of the table the part that is about the members.
-fn joint_grouping(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Split) -> Grouping {
+fn joint_grouping(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &RouteAssignment) -> Grouping {
     let places = places(s, table, survey, split);
     let (mut chosen, mut ranks) = (vec![0; s.members.len()], vec![0; s.members.len()]);
     for (row, (route, rank)) in table.iter().zip(split.routes.iter().zip(places)) {
@@ -145,7 +145,7 @@ fn joint_grouping(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, sp
 }
 
 /// The place in its queue of each drone in the table.
-fn places(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Split) -> Vec<u16> {
+fn places(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &RouteAssignment) -> Vec<u16> {
     let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
     let own = |drone: DroneId| s.members.binary_search_by_key(&drone, |m| m.id).ok();
     let kept: Vec<Option<u16>> =
@@ -154,10 +154,16 @@ fn places(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Sp
 }
 
 /// The parts of other groups' drones, for a rehearsal and for their leaders.
-fn add_others(orders: &mut Orders, s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &Split) {
-    let (plan, now_s) = (orders.plan, s.now.since(SimTime::ZERO));
+fn add_others(
+    bundle: &mut PlanBundle,
+    s: &Situation<'_>,
+    table: &[Arrivals],
+    survey: &Survey<'_>,
+    split: &RouteAssignment,
+) {
+    let (plan, now_s) = (bundle.plan, s.now.since(SimTime::ZERO));
     for (row, (&route, rank)) in table.iter().zip(split.routes.iter().zip(places(s, table, survey, split))) {
-        orders.parts.add(Assignment {
+        bundle.parts.add(Assignment {
             id: plan.id,
             scope: s.scope,
             group: row.group,

@@ -6,7 +6,7 @@
 //! everything, the foremost leader claims the whole swarm again, and the formation closes.
 
 use crate::election::{Election, ElectionParams, Input};
-use crate::ledger::{Ledger, Orders};
+use crate::ledger::{Ledger, PlanBundle};
 use crate::membership::Peers;
 use crate::obstacles::Obstacles;
 use crate::parts::Due;
@@ -168,7 +168,8 @@ impl Leading {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
         }
         let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
-        self.due.belied |= self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
+        self.due.plan_conflict_seen |=
+            self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made;
     }
 
     /// Claims and heartbeats count from the claimant alone.
@@ -228,7 +229,7 @@ impl Leading {
     }
 
     /// Whether a peer's last beacon says that it has all its sensors.
-    pub(crate) fn is_sound(&self, peer: DroneId) -> bool {
+    pub(crate) fn is_healthy(&self, peer: DroneId) -> bool {
         self.peers.last(peer).is_some_and(|pose| pose.flags & POSE_IMPAIRED == 0)
     }
 
@@ -270,7 +271,7 @@ impl Leading {
         let rivals = self
             .living_peers(now)
             .filter(|m| !(suspect.is_some() && m.id == suspect.claimant) && scope.contains(m.group));
-        rivals.filter(|m| (!self.is_sound(m.id), self.key(m.position, m.id)) < mine).count()
+        rivals.filter(|m| (!self.is_healthy(m.id), self.key(m.position, m.id)) < mine).count()
     }
 
     /// Order of claims: by distance to the destination, ties by id.
@@ -285,7 +286,7 @@ impl Leading {
     }
 
     /// What a leader decides now: nothing, orders, or alternatives. `silent`: where drones that fell silent may hang, m.
-    pub fn decide(&mut self, now: SimTime, silent: &[Vec2], say: &mut Vec<Message>) -> Vec<Orders> {
+    pub fn decide(&mut self, now: SimTime, silent: &[Vec2], say: &mut Vec<Message>) -> Vec<PlanBundle> {
         let mut rows = Vec::new();
         let situation = Situation {
             now,
@@ -298,22 +299,22 @@ impl Leading {
             obstacles: &self.obstacles,
             ledger: &self.ledger,
         };
-        let orders = self.planner.decide(&situation, &mut rows);
+        let bundle = self.planner.decide(&situation, &mut rows);
         say.extend(rows.into_iter().map(Message::Arrivals));
-        orders
+        bundle
     }
 
     /// Takes up orders of one's own making, and tells them at once; what they say of other groups, to their leaders.
-    pub fn adopt(&mut self, now: SimTime, mut orders: Orders) {
+    pub fn adopt(&mut self, now: SimTime, mut bundle: PlanBundle) {
         let members = &self.members;
         let own = |id: DroneId| members.iter().any(|m| m.id == id);
-        self.planner.tell_chosen(now, &mut orders, own);
-        self.obey(now, orders);
+        self.planner.tell_chosen(now, &mut bundle, own);
+        self.obey(now, bundle);
     }
 
     /// Takes up orders that it obeys, whoever made them.
-    pub fn obey(&mut self, now: SimTime, orders: Orders) {
-        self.ledger.adopt(orders, &self.obstacles);
+    pub fn obey(&mut self, now: SimTime, bundle: PlanBundle) {
+        self.ledger.adopt(bundle, &self.obstacles);
         self.join(now);
         self.talk.hurry();
     }

@@ -12,14 +12,14 @@ use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime};
 
 /// A plan and everybody's part in it, as its leader made it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Orders {
+pub struct PlanBundle {
     /// The plan.
     pub plan: Plan,
     /// One part a member, by id.
     pub parts: Roster,
 }
 
-impl Orders {
+impl PlanBundle {
     /// Leaves the members in the groups they have; who is of none within the scope, in that one.
     pub fn unsplit(&mut self, members: &[Member], scope: GroupId) {
         for member in members {
@@ -68,11 +68,11 @@ pub struct Ledger {
     plan: Option<Plan>,
     /// Of the newest plan, until it is obeyed: then they are in `obeyed`.
     parts: Roster,
-    obeyed: Option<Orders>,
+    obeyed: Option<PlanBundle>,
     /// This drone's part in it: what is asked for in every tick lies with what else is, not among a thousand others.
     mine: Option<Assignment>,
     /// The plan that split the group whose leader made the plan it obeys, if that one came from another leader.
-    origin: Option<Orders>,
+    origin: Option<PlanBundle>,
     sets: Vec<PlannedSet>,
     /// Of this drone's part under what it obeys.
     part_hash: u64,
@@ -111,8 +111,8 @@ impl Ledger {
     #[must_use]
     pub fn united(&self, ballot: Ballot, places: &[(DroneId, QueuePlace)]) -> Self {
         let mut all = Self { origin: None, ..self.clone() };
-        let newest = self.obeyed.as_ref().filter(|orders| orders.plan.id == self.stamp);
-        let given = |id: DroneId| newest.map_or(&self.parts, |orders| &orders.parts).contains(id);
+        let newest = self.obeyed.as_ref().filter(|bundle| bundle.plan.id == self.stamp);
+        let given = |id: DroneId| newest.map_or(&self.parts, |bundle| &bundle.parts).contains(id);
         for set in &mut all.sets {
             (set.stamp.ballot, set.scope) = (ballot, GroupId::ALL);
             for &(drone, place) in places.iter().filter(|(id, place)| place.set == set.tag && !given(*id)) {
@@ -120,8 +120,8 @@ impl Ledger {
                 (part.route, part.rank) = (place.route, place.rank);
             }
         }
-        if let Some(orders) = &mut all.obeyed {
-            orders.unite(PlanStamp { ballot, ..orders.plan.id });
+        if let Some(bundle) = &mut all.obeyed {
+            bundle.unite(PlanStamp { ballot, ..bundle.plan.id });
         }
         all.mine = all.find_part();
         all.stamp.ballot = ballot;
@@ -130,21 +130,21 @@ impl Ledger {
 
     /// The plan this drone obeys, with the parts it has heard of.
     #[must_use]
-    pub fn obeyed(&self) -> Option<&Orders> {
+    pub fn obeyed(&self) -> Option<&PlanBundle> {
         self.obeyed.as_ref()
     }
 
     /// The plan that made this drone's group, of a wider group's leader; repeated to those who missed it by whoever leads
     /// a part of that group now.
     #[must_use]
-    pub fn origin(&self) -> Option<&Orders> {
+    pub fn origin(&self) -> Option<&PlanBundle> {
         self.origin.as_ref()
     }
 
     /// The stamp it obeys; the default, lower than any, before the first.
     #[must_use]
     pub fn stamp(&self) -> PlanStamp {
-        self.obeyed.as_ref().map_or(PlanStamp::default(), |orders| orders.plan.id)
+        self.obeyed.as_ref().map_or(PlanStamp::default(), |bundle| bundle.plan.id)
     }
 
     /// The newest stamp heard of, whether it can be obeyed yet or not.
@@ -183,10 +183,10 @@ impl Ledger {
     }
 
     fn hash_part(&self) -> u64 {
-        let (Some(orders), Some(part)) = (&self.obeyed, self.part()) else { return 0 };
+        let (Some(bundle), Some(part)) = (&self.obeyed, self.part()) else { return 0 };
         let mut digest = Digest::default();
-        digest.bytes(bytemuck::bytes_of(part)).word(u64::from(orders.plan.phase));
-        digest.bytes(bytemuck::cast_slice(set_ids(&orders.plan.set, orders.plan.set_count)));
+        digest.bytes(bytemuck::bytes_of(part)).word(u64::from(bundle.plan.phase));
+        digest.bytes(bytemuck::cast_slice(set_ids(&bundle.plan.set, bundle.plan.set_count)));
         digest.value().max(1)
     }
 
@@ -209,8 +209,8 @@ impl Ledger {
         if part.drone.0 >= self.drones || !self.open(part.id) {
             return;
         }
-        if let Some(orders) = self.obeyed.as_mut().filter(|orders| orders.plan.id == part.id) {
-            orders.parts.add(*part);
+        if let Some(bundle) = self.obeyed.as_mut().filter(|bundle| bundle.plan.id == part.id) {
+            bundle.parts.add(*part);
             self.sets.iter_mut().filter(|set| set.stamp == part.id).for_each(|set| _ = set.parts.add(*part));
         } else {
             self.parts.add(*part);
@@ -232,10 +232,10 @@ impl Ledger {
     }
 
     /// Takes up orders of one's own making.
-    pub fn adopt(&mut self, orders: Orders, obstacles: &Obstacles) {
-        if self.open(orders.plan.id) {
-            self.plan = Some(orders.plan);
-            self.parts = orders.parts;
+    pub fn adopt(&mut self, bundle: PlanBundle, obstacles: &Obstacles) {
+        if self.open(bundle.plan.id) {
+            self.plan = Some(bundle.plan);
+            self.parts = bundle.parts;
             self.settle(obstacles);
         }
     }
@@ -270,7 +270,7 @@ impl Ledger {
             self.sets.clear();
         }
         let parts = std::mem::take(&mut self.parts);
-        let before = self.obeyed.replace(Orders { plan, parts });
+        let before = self.obeyed.replace(PlanBundle { plan, parts });
         self.mine = self.find_part();
         match before {
             Some(before) if before.plan.group != plan.group => {

@@ -1,13 +1,13 @@
 //! Who is there: the last beacon of each peer, and how old it is. Bounded by the size of the swarm.
 
-use crate::rhythm::Rhythm;
+use crate::adaptive_timeout::AdaptiveTimeout;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
 
 /// Weight of a new delay in the running mean.
 const NOVELTY: f64 = 0.1;
 /// A beacon that was on the air for longer tells nothing about the air, s.
-const MOST_DELAY_S: f64 = 60.0;
+const MAX_DELAY_S: f64 = 60.0;
 
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
@@ -15,13 +15,13 @@ struct Peer {
     /// How long it may be silent, s: what its rhythm says.
     patience_s: f64,
     /// Of its beacons, by when they came in, however long they were on the air.
-    rhythm: Rhythm,
+    adaptive_timeout: AdaptiveTimeout,
     pose: Pose,
 }
 
 impl Peer {
     fn lives(&self, now: SimTime) -> bool {
-        now.since(self.rhythm.last()) <= self.patience_s
+        now.since(self.adaptive_timeout.last()) <= self.patience_s
     }
 }
 
@@ -49,21 +49,21 @@ impl Peers {
     /// Simulated time alone tells what is older: a process that is started again says everything later.
     pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
         let delay_s = now.since(pose.stamp);
-        if source.0 >= self.drones || !(0.0..=MOST_DELAY_S).contains(&delay_s) {
+        if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
             return;
         }
         match self.place(source) {
             Err(place) => {
-                let rhythm = Rhythm::new(now);
-                let patience_s = rhythm.patience_s(self.timeout_s);
+                let adaptive_timeout = AdaptiveTimeout::new(now);
+                let patience_s = adaptive_timeout.patience_s(self.timeout_s);
                 self.ids.insert(place, source);
-                self.last.insert(place, Peer { patience_s, rhythm, pose });
+                self.last.insert(place, Peer { patience_s, adaptive_timeout, pose });
             }
             Ok(place) if pose.stamp > self.last[place].pose.stamp => {
                 let peer = &mut self.last[place];
                 peer.pose = pose;
-                peer.rhythm.hear(now, 0.0, peer.patience_s);
-                peer.patience_s = peer.rhythm.patience_s(self.timeout_s);
+                peer.adaptive_timeout.hear(now, 0.0, peer.patience_s);
+                peer.patience_s = peer.adaptive_timeout.patience_s(self.timeout_s);
                 self.delay_s += NOVELTY * (delay_s - self.delay_s);
             }
             Ok(_) => {}

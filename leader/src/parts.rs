@@ -25,13 +25,13 @@ pub(crate) struct Due {
     /// Since when its leader plans without it.
     left_out: Option<SimTime>,
     /// Somebody obeys what this leader never said: a new term puts an end to that.
-    pub belied: bool,
+    pub plan_conflict_seen: bool,
 }
 
 impl Leading {
     /// What else there is to do about leading by now.
     pub(crate) fn calls_for(&mut self, now: SimTime, own: &Own) -> Option<Input> {
-        if std::mem::take(&mut self.due.belied) && self.election.leads() {
+        if std::mem::take(&mut self.due.plan_conflict_seen) && self.election.leads() {
             return Some(Input::Claim(self.election.scope()));
         }
         let claim = self.claimable(now, own).or_else(|| self.scope_without_leader(now, own)).map(Input::Claim);
@@ -79,7 +79,7 @@ impl Leading {
     fn first_sound(&self, now: SimTime) -> Option<DroneId> {
         let scope = self.election.scope();
         let follows = |m: &Member| scope.contains(m.group) && self.term_of(m.id) == self.election.obeyed();
-        let sound = self.living_peers(now).filter(|m| follows(m) && self.is_sound(m.id));
+        let sound = self.living_peers(now).filter(|m| follows(m) && self.is_healthy(m.id));
         sound
             .map(|m| self.key(m.position, m.id))
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
@@ -87,10 +87,10 @@ impl Leading {
     }
 
     fn first_if_behind(&self, now: SimTime, own: &Own) -> Option<DroneId> {
-        let (orders, part) = (self.ledger.obeyed()?, self.ledger.part()?);
-        let (anchor, moves) = (Vec2::from(orders.plan.anchor_m), Vec2::from(orders.plan.anchor_mps));
-        let moved = anchor + moves * now.since(orders.plan.stamp);
-        let anchor = Vec2::new(moved.x.min(orders.plan.anchor_stop_x_m.max(anchor.x)), moved.y);
+        let (bundle, part) = (self.ledger.obeyed()?, self.ledger.part()?);
+        let (anchor, moves) = (Vec2::from(bundle.plan.anchor_m), Vec2::from(bundle.plan.anchor_mps));
+        let moved = anchor + moves * now.since(bundle.plan.stamp);
+        let anchor = Vec2::new(moved.x.min(bundle.plan.anchor_stop_x_m.max(anchor.x)), moved.y);
         let distance_m = |position| self.planner.params.destination.distance_m(position);
         let (mine_m, spacing_m) = (distance_m(own.position), self.planner.params.spacing_m);
         let slot_m = distance_m(anchor + Vec2::from(part.slot_m));
@@ -146,8 +146,8 @@ impl Leading {
         self.peers.living(now).map(move |(id, pose)| {
             let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
             let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && hears(plan.ballot);
-            let untold = plans.into_iter().flatten().filter(|orders| will_obey(&orders.plan.id));
-            let group = untold.filter_map(|orders| orders.parts.get(id)).map(|part| part.group).next();
+            let untold = plans.into_iter().flatten().filter(|bundle| will_obey(&bundle.plan.id));
+            let group = untold.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);
             let velocity = Vec2::from(pose.velocity_mps);
             let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());
@@ -177,7 +177,7 @@ impl Leading {
     fn rank_in_part(&self, now: SimTime, me: &Member) -> usize {
         let named = self.ledger.part().map_or(DroneId::NONE, |part| part.leader);
         let mine = (me.id != named, self.key(me.position, me.id));
-        let unheard = |id: DroneId| self.ledger.obeyed().is_some_and(|orders| !orders.parts.contains(id));
+        let unheard = |id: DroneId| self.ledger.obeyed().is_some_and(|bundle| !bundle.parts.contains(id));
         let before = |m: &Member| (m.id != named, self.key(m.position, m.id)) < mine;
         let kin = |m: &Member| me.group.contains(m.group) || (m.id == named && unheard(named));
         self.living_peers(now).filter(|m| kin(m) && before(m)).count()
@@ -191,7 +191,7 @@ impl Leading {
     }
 
     /// Takes stock of who is there, before a leader decides. A drone of no part joins the one of the nearest drone.
-    pub fn muster(&mut self, now: SimTime, own: &Own) {
+    pub fn refresh_members(&mut self, now: SimTime, own: &Own) {
         let scope = self.election.scope();
         let (mut members, mut others) = (std::mem::take(&mut self.members), std::mem::take(&mut self.others));
         let mut orphans = Vec::new();
@@ -228,7 +228,7 @@ impl Leading {
         self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
     }
 
-    /// All living drones, by id, as of the last [`Self::muster`].
+    /// All living drones, by id, as of the last [`Self::refresh_members`].
     #[must_use]
     pub fn living(&self) -> Vec<Member> {
         let mut all: Vec<Member> = self.members.iter().chain(&self.others).copied().collect();
@@ -236,7 +236,7 @@ impl Leading {
         all
     }
 
-    /// The living members, by id, as of the last [`Self::muster`].
+    /// The living members, by id, as of the last [`Self::refresh_members`].
     #[must_use]
     pub fn members(&self) -> &[Member] {
         &self.members

@@ -1,10 +1,10 @@
 //! What a leader decides: when to plan, and for whom. Paper, Algorithms 1, 3 and 5. Everything it knows came by its own
 //! senses or by messages.
 
-use crate::council::Council;
 use crate::joint::Joint;
-use crate::ledger::{Ledger, Orders, PlannedSet};
+use crate::ledger::{Ledger, PlanBundle, PlannedSet};
 use crate::obstacles::{Obstacles, set_array};
+use crate::plan_exchange::PlanExchange;
 use crate::reform::Reform;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
@@ -17,9 +17,9 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strategy {
     /// Least time of the last drone past the gate (paper, Algorithm 3).
-    CongestionAware,
+    PaperRule,
     /// The best few groupings by that rule and the shortest ways, flown ahead in a rehearsal; the best wins.
-    Rehearsed(Objective),
+    LookAhead(Objective),
     /// Each drone takes its own shortest way.
     ShortestPath,
     /// So many drones on the left and on the right of one obstacle, each side filled in the least time.
@@ -151,7 +151,7 @@ pub struct Situation<'a> {
 pub struct Planner {
     pub(crate) params: PlannerParams,
     pub(crate) reform: Reform,
-    pub(crate) council: Council,
+    pub(crate) plan_exchange: PlanExchange,
     pub(crate) joint: Option<Joint>,
     /// Which of the alternatives decided on last is flown while a leader thinks.
     pub(crate) meanwhile: usize,
@@ -171,24 +171,32 @@ impl Planner {
     /// A planner that has decided nothing yet, in a swarm of `drones`; questions are repeated every `repeat_s`.
     #[must_use]
     pub fn new(params: PlannerParams, drones: u32, repeat_s: f64) -> Self {
-        Self { params, reform: Reform::default(), council: Council::new(drones, repeat_s), joint: None, meanwhile: 0 }
+        Self {
+            params,
+            reform: Reform::default(),
+            plan_exchange: PlanExchange::new(drones, repeat_s),
+            joint: None,
+            meanwhile: 0,
+        }
     }
 
     /// Hears when a drone of another group can be where.
     pub fn hear(&mut self, now: SimTime, row: &Arrivals) {
-        self.council.hear(now, row);
+        self.plan_exchange.hear(now, row);
     }
 
     /// New orders, if there is something to decide: one, or alternatives to rehearse, the shortest ways first,
     /// the paper's rule second.
     /// What other leaders are to be asked or told goes into `say`.
-    pub fn decide(&mut self, s: &Situation<'_>, say: &mut Vec<Arrivals>) -> Vec<Orders> {
-        if let Some(planned) = self.council.asked(s.now).and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag)) {
+    pub fn decide(&mut self, s: &Situation<'_>, say: &mut Vec<Arrivals>) -> Vec<PlanBundle> {
+        if let Some(planned) =
+            self.plan_exchange.asked(s.now).and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag))
+        {
             say.extend(self.standing(s, planned));
         }
-        self.council.repeat(s.now, say);
-        if let Some(orders) = self.chosen(s) {
-            return vec![orders];
+        self.plan_exchange.repeat(s.now, say);
+        if let Some(bundle) = self.chosen(s) {
+            return vec![bundle];
         }
         match self.need(s) {
             Need::Plan(set) => {

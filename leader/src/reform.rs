@@ -1,7 +1,7 @@
 //! Who takes which slot (paper, Algorithm 5).
 
 use crate::geometry::nearest;
-use crate::ledger::Orders;
+use crate::ledger::PlanBundle;
 use crate::planner::{Destination, Member, Planner, Situation};
 use crate::slots::{self, Reformation};
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
@@ -12,7 +12,7 @@ const DEAD_BERTH: f64 = 1.05;
 /// While a slot is too near to one, or to an obstacle, the anchor moves on in such steps, m.
 const ANCHOR_STEP_M: f64 = 5.0;
 /// So often at most: obstacles beyond all measure do not hold up the leader.
-const MOST_ANCHOR_STEPS: u32 = 10_000;
+const MAX_ANCHOR_STEPS: u32 = 10_000;
 /// A formation in which somebody cannot reach a slot opens its ranks by this, as a factor.
 const OPEN_RANKS: f64 = 1.6;
 /// Nobody moves faster than this, m/s, …
@@ -35,18 +35,18 @@ pub(crate) struct Reform {
 
 impl Planner {
     /// Orders to fly in formation: once all are past everything, whenever the members change, and when they are stuck.
-    pub(crate) fn formation(&mut self, s: &Situation<'_>) -> Option<Orders> {
-        let obeyed = s.ledger.obeyed().filter(|orders| orders.plan.id.ballot == s.ballot);
+    pub(crate) fn formation(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
+        let obeyed = s.ledger.obeyed().filter(|bundle| bundle.plan.id.ballot == s.ballot);
         let passed = !s.ledger.sets().is_empty();
         let same =
-            obeyed.is_some_and(|orders| orders.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
+            obeyed.is_some_and(|bundle| bundle.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
         if !passed && same {
             self.reform.changed = None;
-            return obeyed.filter(|orders| self.stuck(s, orders)).and_then(|orders| {
+            return obeyed.filter(|bundle| self.stuck(s, bundle)).and_then(|bundle| {
                 let round_one = s.members.iter().any(|m| is_alone(m, s));
                 let open = !round_one && !self.reform.open;
                 self.reform = Reform { open, round_one, ..Reform::default() };
-                self.slots(s, orders.plan.phase)
+                self.slots(s, bundle.plan.phase)
             });
         }
         let changed = *self.reform.changed.get_or_insert(s.now);
@@ -54,20 +54,20 @@ impl Planner {
             return None;
         }
         self.reform = Reform::default();
-        let avoided = s.ledger.obeyed().is_some_and(|orders| orders.plan.phase != PHASE_CRUISE);
+        let avoided = s.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase != PHASE_CRUISE);
         self.slots(s, if passed || avoided { PHASE_REFORM } else { PHASE_CRUISE })
     }
 
     /// Whether nobody has moved for a while although somebody is not in its slot; also once open ranks are taken.
-    fn stuck(&mut self, s: &Situation<'_>, orders: &Orders) -> bool {
-        let anchor = Vec2::from(orders.plan.anchor_m);
-        let error = |m: &Member| match orders.parts.get(m.id) {
+    fn stuck(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> bool {
+        let anchor = Vec2::from(bundle.plan.anchor_m);
+        let error = |m: &Member| match bundle.parts.get(m.id) {
             Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
             None => 0.0,
         };
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
         let still = s.members.iter().all(|m| m.speed_mps < STALLED_MPS);
-        if !still || orders.plan.phase != PHASE_REFORM || (worst <= self.params.arrival_error_m && !self.reform.open) {
+        if !still || bundle.plan.phase != PHASE_REFORM || (worst <= self.params.arrival_error_m && !self.reform.open) {
             self.reform.stalled = None;
             return false;
         }
@@ -75,7 +75,7 @@ impl Planner {
         s.now.since(since) >= STALLED_S
     }
 
-    fn slots(&self, s: &Situation<'_>, phase: u32) -> Option<Orders> {
+    fn slots(&self, s: &Situation<'_>, phase: u32) -> Option<PlanBundle> {
         let close = self.params.shape.slots(s.members.len(), self.params.spacing_m);
         let pinned = s.members.iter().position(|m| self.reform.round_one && is_alone(m, s));
         let (anchor, pin) = match pinned {
@@ -102,7 +102,7 @@ impl Planner {
             rank: 0,
             reserved: 0,
         };
-        Some(Orders { plan, parts: s.members.iter().enumerate().map(part).collect() })
+        Some(PlanBundle { plan, parts: s.members.iter().enumerate().map(part).collect() })
     }
 
     /// Where the front slot goes: the goal, or where the members are on average, clear of obstacles and of the dead.
@@ -115,7 +115,7 @@ impl Planner {
         let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
         let mut anchor = Vec2::new(x, self.params.course_y_m);
         let (mut steps, is_blocked) = (0, self.blocker(s));
-        while phase == PHASE_REFORM && steps < MOST_ANCHOR_STEPS && is_blocked(shape, anchor) {
+        while phase == PHASE_REFORM && steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
             anchor.x += ANCHOR_STEP_M;
             steps += 1;
         }

@@ -5,7 +5,7 @@
 //! groupings that reach it the one of least total arrival is taken: exact, and polynomial where trying all assignments
 //! is not. Times are counted in whole microseconds, so that ties are ties.
 
-use crate::exchange::{Cost, place};
+use crate::matroid_intersection::{Cost, place};
 use thiserror::Error;
 
 const MICROS: f64 = 1e6;
@@ -63,7 +63,7 @@ pub enum SplitError {
 
 /// When each drone would pass on each route if it were alone, and how far apart drones pass.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct ArrivalTable {
     /// By drone and route, µs; `None` where the drone cannot take the route.
     arrivals: Vec<Vec<Option<Cost>>>,
     headways: Vec<Cost>,
@@ -71,7 +71,7 @@ pub struct Table {
 
 /// A grouping. Drones are the rows of the table; routes its columns.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Split {
+pub struct RouteAssignment {
     /// Route of each drone.
     pub routes: Vec<usize>,
     /// Drones on each route in the order in which they pass: by arrival, ties by row.
@@ -84,7 +84,7 @@ pub struct Split {
     pub total_s: f64,
 }
 
-impl Table {
+impl ArrivalTable {
     /// Checks arrivals `[drone][route]` (s; infinite: not usable; negative: passed already) and the headway of each
     /// route (s).
     ///
@@ -117,7 +117,7 @@ impl Table {
 
     /// The grouping of least makespan; among those, one of least total arrival.
     #[must_use]
-    pub fn split(&self) -> Split {
+    pub fn split(&self) -> RouteAssignment {
         let unlimited = vec![self.arrivals.len(); self.headways.len()];
         self.least(&unlimited).expect("every drone has a usable route, and every route a slot for every drone")
     }
@@ -126,7 +126,7 @@ impl Table {
     ///
     /// # Errors
     /// [`SplitError::Counts`] if there is none.
-    pub fn fixed(&self, counts: &[usize]) -> Result<Split, SplitError> {
+    pub fn fixed(&self, counts: &[usize]) -> Result<RouteAssignment, SplitError> {
         let drones = self.arrivals.len();
         let sum = counts.iter().try_fold(0usize, |sum, &count| sum.checked_add(count));
         if counts.len() != self.headways.len() || sum != Some(drones) {
@@ -137,7 +137,7 @@ impl Table {
 
     /// Each drone on the route on which it arrives first, ties to the right; the others do not matter.
     #[must_use]
-    pub fn shortest(&self) -> Split {
+    pub fn shortest(&self) -> RouteAssignment {
         let nearest = |row: &Vec<Option<Cost>>| {
             let usable = row.iter().enumerate().filter_map(|(route, &arrival)| Some((arrival?, route)));
             usable.min().map_or(0, |best| best.1)
@@ -149,7 +149,7 @@ impl Table {
     ///
     /// # Errors
     /// [`SplitError::Assignment`] if it is not one.
-    pub fn assigned(&self, routes: &[usize]) -> Result<Split, SplitError> {
+    pub fn assigned(&self, routes: &[usize]) -> Result<RouteAssignment, SplitError> {
         let usable = |(row, &route): (&Vec<Option<Cost>>, &usize)| row.get(route).is_some_and(Option::is_some);
         if routes.len() != self.arrivals.len() || !self.arrivals.iter().zip(routes).all(usable) {
             return Err(SplitError::Assignment { drones: self.arrivals.len() });
@@ -157,7 +157,7 @@ impl Table {
         Ok(self.queued(routes.to_vec()))
     }
 
-    /// The least makespan alone, s: [`Table::split`] without its tie-break, for a fraction of the time.
+    /// The least makespan alone, s: [`ArrivalTable::split`] without its tie-break, for a fraction of the time.
     #[must_use]
     pub fn least_makespan_s(&self) -> f64 {
         let unlimited = vec![self.arrivals.len(); self.headways.len()];
@@ -165,7 +165,7 @@ impl Table {
     }
 
     /// The grouping of least makespan with at most `limits[route]` drones on each route, ties to the least total.
-    fn least(&self, limits: &[usize]) -> Result<Split, SplitError> {
+    fn least(&self, limits: &[usize]) -> Result<RouteAssignment, SplitError> {
         let costs = self.costs();
         let makespan = self.search(limits, &costs)?;
         let routes = place(&self.caps(makespan, limits), &costs, true);
@@ -229,7 +229,7 @@ impl Table {
         (0..self.headways.len()).filter_map(last).max().unwrap_or(0)
     }
 
-    fn queued(&self, routes: Vec<usize>) -> Split {
+    fn queued(&self, routes: Vec<usize>) -> RouteAssignment {
         let seconds = |micros: Cost| micros as f64 / MICROS;
         let mut pass_s = vec![0.0; routes.len()];
         let mut total = 0;
@@ -242,6 +242,6 @@ impl Table {
             }
             queues.push(queue.into_iter().map(|(_, drone)| drone).collect());
         }
-        Split { makespan_s: seconds(self.makespan(&routes)), routes, queues, pass_s, total_s: seconds(total) }
+        RouteAssignment { makespan_s: seconds(self.makespan(&routes)), routes, queues, pass_s, total_s: seconds(total) }
     }
 }

@@ -1,7 +1,7 @@
 //! What a drone says, and when: its beacon, what it leads with, and repetitions of whatever others may have missed.
 
 use crate::leading::{Leading, Own};
-use crate::ledger::Orders;
+use crate::ledger::PlanBundle;
 use crate::obstacles::{Obstacles, set_array, set_ids};
 use skein_protocol::payload::{MAX_PLACES, Obstacle, PHASE_AVOID, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime};
@@ -100,39 +100,39 @@ impl Leading {
     /// The plan of one's own; the parts of all when it is new, then of those whose beacons do not show that they obey
     /// it. A plan of the leader before, that split its group, is repeated for those alone who missed it.
     fn tell_orders(&mut self, now: SimTime, say: &mut Vec<Message>) {
-        let Some(orders) = self.ledger.obeyed() else { return };
-        let own = orders.plan.id.ballot == self.election.obeyed();
-        let new = own && self.talk.told != orders.plan.id;
+        let Some(bundle) = self.ledger.obeyed() else { return };
+        let own = bundle.plan.id.ballot == self.election.obeyed();
+        let new = own && self.talk.told != bundle.plan.id;
         if own {
-            say.push(Message::Plan(orders.plan));
+            say.push(Message::Plan(bundle.plan));
         }
-        if own || orders.plan.group != self.election.scope() {
-            self.tell_parts(orders, now, own, new, say);
+        if own || bundle.plan.group != self.election.scope() {
+            self.tell_parts(bundle, now, own, new, say);
         }
         if let Some(origin) = self.ledger.origin() {
             self.tell_parts(origin, now, false, false, say);
         }
         if own {
-            self.talk.told = orders.plan.id;
+            self.talk.told = bundle.plan.id;
         }
     }
 
     /// The parts of all, or of living members that obey an older plan, with the obstacles they may not know; the plan
     /// itself unless it is `told` already.
-    fn tell_parts(&self, orders: &Orders, now: SimTime, told_already: bool, all: bool, say: &mut Vec<Message>) {
-        let stamp = orders.plan.id;
+    fn tell_parts(&self, bundle: &PlanBundle, now: SimTime, told_already: bool, all: bool, say: &mut Vec<Message>) {
+        let stamp = bundle.plan.id;
         let late =
             |id: DroneId| self.peers.is_living(id, now) && self.peers.last(id).is_some_and(|pose| pose.obeyed < stamp);
         let first = say.len();
-        say.extend(orders.parts.iter().filter(|part| all || late(part.drone)).map(|part| Message::Assignment(*part)));
+        say.extend(bundle.parts.iter().filter(|part| all || late(part.drone)).map(|part| Message::Assignment(*part)));
         if say.len() == first {
             return;
         }
         if !told_already {
-            say.push(Message::Plan(orders.plan));
+            say.push(Message::Plan(bundle.plan));
         }
-        if orders.plan.phase == PHASE_AVOID {
-            let ids = set_ids(&orders.plan.set, orders.plan.set_count);
+        if bundle.plan.phase == PHASE_AVOID {
+            let ids = set_ids(&bundle.plan.set, bundle.plan.set_count);
             say.extend(ids.iter().filter_map(|&id| told(&self.obstacles, id)));
         }
     }

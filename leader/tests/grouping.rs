@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use skein_leader::slots::{TooFewSlots, assign};
-use skein_leader::split::{Split, SplitError, Table};
+use skein_leader::split::{ArrivalTable, RouteAssignment, SplitError};
 use skein_protocol::Vec2;
 use std::collections::BTreeSet;
 
@@ -53,7 +53,7 @@ fn brute_force(arrivals: &[Vec<f64>], headway_s: &[f64], wanted: Option<&[usize]
     best
 }
 
-fn value(split: &Split) -> (i64, i64) {
+fn value(split: &RouteAssignment) -> (i64, i64) {
     (micros(split.makespan_s), micros(split.total_s))
 }
 
@@ -84,7 +84,7 @@ proptest! {
 
     #[test]
     fn split_is_the_best_of_all_assignments((arrivals, headway_s) in any_instance()) {
-        let split = Table::new(&arrivals, &headway_s).unwrap().split();
+        let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         let (best, all) = brute_force(&arrivals, &headway_s, None).unwrap();
         prop_assert_eq!(value(&split), best);
         prop_assert_eq!(micros(split.makespan_s), makespan(&arrivals, &headway_s, &split.routes));
@@ -96,7 +96,7 @@ proptest! {
         row in prop::collection::vec((0..9i32).prop_map(f64::from), 1..4), drones in 1..8usize, headway in 0.5..3.0,
     ) {
         let (arrivals, headway_s) = (vec![row.clone(); drones], vec![headway; row.len()]);
-        let split = Table::new(&arrivals, &headway_s).unwrap().split();
+        let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         prop_assert_eq!(value(&split), brute_force(&arrivals, &headway_s, None).unwrap().0);
     }
 
@@ -105,7 +105,7 @@ proptest! {
         let routes = headway_s.len();
         let code = pick.index(routes.pow(arrivals.len() as u32));
         let wanted = counts(&assignments(arrivals.len(), routes).nth(code).unwrap(), routes);
-        let fixed = Table::new(&arrivals, &headway_s).unwrap().fixed(&wanted);
+        let fixed = ArrivalTable::new(&arrivals, &headway_s).unwrap().fixed(&wanted);
         match brute_force(&arrivals, &headway_s, Some(&wanted)) {
             Some((best, _)) => {
                 let fixed = fixed.unwrap();
@@ -118,11 +118,11 @@ proptest! {
 
     #[test]
     fn mirrored_arrivals_give_mirrored_counts((mut arrivals, mut headway_s) in any_instance()) {
-        let split = Table::new(&arrivals, &headway_s).unwrap().split();
+        let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         let (_, all) = brute_force(&arrivals, &headway_s, None).unwrap();
         arrivals.iter_mut().for_each(|row| row.reverse());
         headway_s.reverse();
-        let mirrored = Table::new(&arrivals, &headway_s).unwrap().split();
+        let mirrored = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         prop_assert_eq!(value(&split), value(&mirrored));
         let mut back = counts(&mirrored.routes, headway_s.len());
         back.reverse();
@@ -132,7 +132,7 @@ proptest! {
 
     #[test]
     fn passes_follow_the_queue((arrivals, headway_s) in any_instance()) {
-        let split = Table::new(&arrivals, &headway_s).unwrap().split();
+        let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         let mut seen = vec![false; arrivals.len()];
         for (route, queue) in split.queues.iter().enumerate() {
             for (k, &drone) in queue.iter().enumerate() {
@@ -183,7 +183,7 @@ proptest! {
     fn no_move_and_no_swap_improves_a_large_split(
         (arrivals, headway_s) in (20..50usize, 2..=4usize).prop_flat_map(|(drones, routes)| instance(drones, routes)),
     ) {
-        let table = Table::new(&arrivals, &headway_s).unwrap();
+        let table = ArrivalTable::new(&arrivals, &headway_s).unwrap();
         let split = table.split();
         let improves = |routes: &[usize]| table.assigned(routes).is_ok_and(|other| value(&other) < value(&split));
         for i in 0..arrivals.len() {
@@ -203,14 +203,14 @@ proptest! {
 
 #[test]
 fn bad_tables_are_named() {
-    let new = |rows: &[Vec<f64>], headways: &[f64]| Table::new(rows, headways).unwrap_err();
+    let new = |rows: &[Vec<f64>], headways: &[f64]| ArrivalTable::new(rows, headways).unwrap_err();
     let columns = SplitError::Columns { drone: 1, found: 1, expected: 2 };
     assert_eq!(new(&[vec![1.0, 2.0], vec![1.0]], &[1.0, 1.0]), columns);
     assert_eq!(new(&[vec![1.0]], &[-1.0]), SplitError::Headway { route: 0, headway_s: -1.0 });
     assert_eq!(new(&[vec![f64::INFINITY]], &[1.0]), SplitError::NoRoute { drone: 0 });
     assert_eq!(new(&[vec![f64::NAN]], &[1.0]), SplitError::Arrival { drone: 0, route: 0 });
     assert!(matches!(new(&[vec![1.0]], &[f64::NAN]), SplitError::Headway { route: 0, .. }));
-    let table = Table::new(&[vec![1.0, f64::INFINITY]], &[1.0, 1.0]).unwrap();
+    let table = ArrivalTable::new(&[vec![1.0, f64::INFINITY]], &[1.0, 1.0]).unwrap();
     assert_eq!(table.assigned(&[1]), Err(SplitError::Assignment { drones: 1 }));
     assert_eq!(table.assigned(&[9]), Err(SplitError::Assignment { drones: 1 }));
     assert_eq!(table.fixed(&[0, 1]), Err(SplitError::Counts { drones: 1 }));
@@ -219,9 +219,9 @@ fn bad_tables_are_named() {
 
 #[test]
 fn nobody_is_split_into_nothing() {
-    let split = Table::new(&[], &[1.0, 1.0]).unwrap().split();
+    let split = ArrivalTable::new(&[], &[1.0, 1.0]).unwrap().split();
     assert_eq!((split.makespan_s, split.queues.len()), (0.0, 2));
-    assert_eq!(Table::new(&[], &[1.0, 1.0]).unwrap().least_makespan_s(), 0.0);
+    assert_eq!(ArrivalTable::new(&[], &[1.0, 1.0]).unwrap().least_makespan_s(), 0.0);
     assert!(assign(&[], &[]).unwrap().is_empty());
     assert_eq!(assign(&[Vec2::zeros()], &[]), Err(TooFewSlots { drones: 1, slots: 0 }));
 }
@@ -230,9 +230,9 @@ fn nobody_is_split_into_nothing() {
 fn a_thousand_drones_are_split_exactly() {
     let row = |i: usize| (0..4).map(|r| ((i * 7919 + r * 104_729) % 4001) as f64 / 10.0 + 3.0 * r as f64).collect();
     let rows: Vec<Vec<f64>> = (0..1000).map(row).collect();
-    let split = Table::new(&rows, &[3.0; 4]).unwrap().split();
-    let shortest = Table::new(&rows, &[3.0; 4]).unwrap().shortest();
-    assert_eq!(Table::new(&rows, &[3.0; 4]).unwrap().least_makespan_s(), split.makespan_s);
+    let split = ArrivalTable::new(&rows, &[3.0; 4]).unwrap().split();
+    let shortest = ArrivalTable::new(&rows, &[3.0; 4]).unwrap().shortest();
+    assert_eq!(ArrivalTable::new(&rows, &[3.0; 4]).unwrap().least_makespan_s(), split.makespan_s);
     assert!(split.makespan_s < shortest.makespan_s && split.total_s >= shortest.total_s);
     // A thousand passes over four routes, three seconds apart, starting with the earliest arrival of all.
     assert!(split.makespan_s >= 249.0 * 3.0);

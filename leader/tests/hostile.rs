@@ -207,7 +207,7 @@ fn hear(swarm: &mut Swarm, source: DroneId, noise: &Noise) {
 }
 
 /// Who obeys a plan that its leader never made.
-fn belied(swarm: &Swarm) -> Option<String> {
+fn plan_conflict_seen(swarm: &Swarm) -> Option<String> {
     let leader = |ballot: Ballot| swarm.drones.get(ballot.claimant.index())?.as_ref();
     let drones = swarm.side(0);
     let liar = drones.iter().find(|(_, drone)| {
@@ -236,12 +236,12 @@ proptest! {
             }
         }
         for (_, leading) in swarm.side(0) {
-            let orders = [leading.ledger.obeyed(), leading.ledger.origin()];
-            prop_assert!(orders.into_iter().flatten().all(|orders| orders.parts.len() <= HONEST + 1));
+            let bundle = [leading.ledger.obeyed(), leading.ledger.origin()];
+            prop_assert!(bundle.into_iter().flatten().all(|bundle| bundle.parts.len() <= HONEST + 1));
             prop_assert!(leading.obstacles.iter().count() <= noise.len() + 1);
             prop_assert!(leading.ledger.sets().len() <= noise.len() + 1);
         }
-        let regained = swarm.until(20.0, |s| discord(&s.side(0)).or_else(|| belied(s)));
+        let regained = swarm.until(20.0, |s| discord(&s.side(0)).or_else(|| plan_conflict_seen(s)));
         prop_assert!(regained.is_ok(), "{regained:?}");
     }
 

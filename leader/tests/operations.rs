@@ -193,8 +193,8 @@ proptest! {
         }
         let walls = swarm.scenery.len();
         for leading in swarm.drones.iter().flatten() {
-            let orders = [leading.ledger.obeyed(), leading.ledger.origin()];
-            prop_assert!(orders.into_iter().flatten().all(|orders| orders.parts.len() <= 4));
+            let bundle = [leading.ledger.obeyed(), leading.ledger.origin()];
+            prop_assert!(bundle.into_iter().flatten().all(|bundle| bundle.parts.len() <= 4));
             prop_assert!(leading.ledger.sets().len() <= walls && leading.obstacles.iter().count() <= walls);
             prop_assert!(leading.peers.living(SimTime::ZERO).count() <= 3);
         }

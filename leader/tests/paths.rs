@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
+use skein_leader::funnel::{Corridor, RUN_OUT_M};
 use skein_leader::routes::{Body, Constraint, RouteParams, Routes, Side};
-use skein_leader::string::{Lane, RUN_OUT_M};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 use std::fmt::Write;
@@ -24,8 +24,8 @@ fn routes(shapes: &[ConvexShape]) -> Routes {
     Routes::new(&numbered, &PARAMS)
 }
 
-fn lane(routes: &Routes, route: usize, bodies: &[Body]) -> Lane {
-    Lane::new(&[(routes, route)], bodies, Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0))
+fn lane(routes: &Routes, route: usize, bodies: &[Body]) -> Corridor {
+    Corridor::new(&[(routes, route)], bodies, Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0))
 }
 
 /// Gate, exit, and for each route its walls: the path's side, the box around the wall, the number of points to pass.
@@ -195,14 +195,14 @@ fn bodies_ahead_bar_a_gap_if_they_leave_no_way_beside_them() {
 fn a_lane_past_two_sets_keeps_both() {
     let (first, second) = (routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]), routes(&[rectangle(220.0, 0.0, 10.0, 40.0)]));
     let target = Vec2::new(second.exit_x_m() + RUN_OUT_M, 0.0);
-    let crossing = Lane::new(&[(&first, 0), (&second, 1)], &[], target);
+    let crossing = Corridor::new(&[(&first, 0), (&second, 1)], &[], target);
     let position = Vec2::new(100.0, -60.0);
     let pull = crossing.pull(position, second.gate_x_m());
     // From the right of the first to the left of the second: level along the first, then across, then level again.
     assert_eq!(pull.direction, Vec2::x());
     assert!(pull.to_gate_m > Vec2::new(120.0, 120.0).norm() && pull.to_gate_m < 240.0, "{pull:?}");
     assert_eq!(crossing.pull(position, first.gate_x_m()).to_gate_m, 0.0);
-    let straight = Lane::new(&[(&second, 0), (&first, 0)], &[], target).pull(position, second.gate_x_m());
+    let straight = Corridor::new(&[(&second, 0), (&first, 0)], &[], target).pull(position, second.gate_x_m());
     assert!((straight.to_gate_m - 120.0).abs() < 1e-9);
 }
 

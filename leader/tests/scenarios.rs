@@ -4,7 +4,7 @@
 
 use skein_leader::cost::{Flight, trip};
 use skein_leader::routes::{RouteParams, Routes};
-use skein_leader::split::{Split, Table};
+use skein_leader::split::{ArrivalTable, RouteAssignment};
 use skein_protocol::formation::Shape;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
@@ -68,17 +68,17 @@ impl Scene {
         }
     }
 
-    fn table(&self) -> Table {
+    fn table(&self) -> ArrivalTable {
         let shape = ConvexShape::rectangle(self.centre_m, self.half_m, 0.0).unwrap();
         let routes = Routes::new(&[(ObstacleId(0), shape)], &PARAMS);
         let row =
             |&p: &Vec2| (0..routes.count()).map(|route| trip(&[], &routes, route, p, &FLIGHT).arrival_s).collect();
         let rows: Vec<Vec<f64>> = self.detection().iter().map(row).collect();
-        Table::new(&rows, &[1.1 * self.d_safe_m / FLIGHT.speed_mps; 2]).unwrap()
+        ArrivalTable::new(&rows, &[1.1 * self.d_safe_m / FLIGHT.speed_mps; 2]).unwrap()
     }
 }
 
-fn counts(split: &Split) -> Vec<usize> {
+fn counts(split: &RouteAssignment) -> Vec<usize> {
     split.queues.iter().map(Vec::len).collect()
 }
 
@@ -87,7 +87,7 @@ fn forecasts_are_those_of_the_published_splits() {
     let makers: [fn(f64) -> Scene; 3] = [s1, s2, s3b];
     let wanted = [(110.0, [30.10, 37.36, 27.57]), (115.0, [29.95, 38.08, 27.36]), (130.0, [28.93, 34.68, 27.60])];
     for (scene, (shift_m, [best_s, shortest_s, centred_s])) in makers.into_iter().zip(wanted) {
-        let close = |split: &Split, wanted_s: f64, wanted: [usize; 2]| {
+        let close = |split: &RouteAssignment, wanted_s: f64, wanted: [usize; 2]| {
             assert!((split.makespan_s - wanted_s).abs() < 0.15, "T* {} is not {wanted_s}", split.makespan_s);
             assert_eq!(counts(split), wanted, "T* {wanted_s}");
         };

@@ -6,10 +6,10 @@
 use crate::Vec2;
 use crate::frame::AirFrame;
 use crate::ids::{DroneId, ObstacleId};
+use crate::link_faults::LinkFaults;
 use crate::nearby::{FrameCell, FrameIndex, Locality, NearbyFrames};
 use crate::radio::DropReason;
 use crate::shape::ConvexShape;
-use crate::sides::Cuts;
 use crate::time::{SimTime, Tick};
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
@@ -63,7 +63,7 @@ pub struct SenseHead {
     /// Incarnation of its process.
     pub incarnation: u32,
     /// Its radio.
-    pub cuts: Cuts,
+    pub cuts: LinkFaults,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
     /// What its sensors say of themselves: [`BROKEN_OBSTACLES`], [`BROKEN_RANGING`].

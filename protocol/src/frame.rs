@@ -2,7 +2,7 @@
 
 use crate::Vec2;
 use crate::ids::DroneId;
-use crate::sides::Cuts;
+use crate::link_faults::LinkFaults;
 use crate::time::Tick;
 use bytemuck::{Pod, Zeroable};
 
@@ -38,7 +38,7 @@ pub struct AirFrame {
     /// How long it waited for the channel and took it, ns; [`crate::radio::NEVER_AIRED`] if it was not sent at all.
     pub queue_ns: u64,
     /// The sender's radio when it sent.
-    pub cuts: Cuts,
+    pub cuts: LinkFaults,
     /// What was sent.
     pub frame: Frame,
 }

@@ -1,14 +1,14 @@
 //! Histograms of what comes in equal steps.
 
-use crate::record::Spread;
+use crate::record::Percentiles;
 
 /// Mean, quantiles (nearest ranks) and maximum of a histogram whose bins are `width_s` wide, s. The last bin holds all that is
 /// longer too: it counts as the maximum, `max` bins.
 #[must_use]
-pub fn spread(bins: &[u32], max: u64, width_s: f64) -> Spread {
+pub fn spread(bins: &[u32], max: u64, width_s: f64) -> Percentiles {
     let count: u64 = bins.iter().map(|&n| u64::from(n)).sum();
     if count == 0 {
-        return Spread::default();
+        return Percentiles::default();
     }
     let steps = |bin: usize| if bin + 1 == bins.len() { max as f64 } else { bin as f64 };
     let mean = bins.iter().enumerate().map(|(bin, &n)| steps(bin) * f64::from(n)).sum::<f64>() / count as f64;
@@ -21,7 +21,7 @@ pub fn spread(bins: &[u32], max: u64, width_s: f64) -> Spread {
         });
         steps(reached.unwrap_or(bins.len() - 1)) * width_s
     };
-    Spread {
+    Percentiles {
         mean: Some(mean * width_s),
         p50: Some(quantile(0.5)),
         p99: Some(quantile(0.99)),

@@ -61,7 +61,7 @@ pub enum Message {
 }
 
 /// No coordinate, speed or time is greater than this, m, m/s or s.
-pub const MOST: f64 = 1e9;
+pub const MAX_ABS: f64 = 1e9;
 
 /// Why a frame is not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -75,7 +75,7 @@ pub enum DecodeError {
     /// The length does not fit the kind.
     #[error("frame of {0} bytes, expected {1}")]
     Length(u32, usize),
-    /// A number that is not finite or beyond [`MOST`], a count out of range, a group without lineage, or an unknown flag.
+    /// A number that is not finite or beyond [`MAX_ABS`], a count out of range, a group without lineage, or an unknown flag.
     #[error("frame with an invalid {0}")]
     Field(&'static str),
 }
@@ -199,7 +199,7 @@ impl<'a> MessageRef<'a> {
 
     fn check(&self) -> Result<(), DecodeError> {
         let finite = |values: &[f64], name| {
-            if values.iter().all(|v| v.abs() <= MOST) { Ok(()) } else { Err(DecodeError::Field(name)) }
+            if values.iter().all(|v| v.abs() <= MAX_ABS) { Ok(()) } else { Err(DecodeError::Field(name)) }
         };
         let below = |value: u32, limit: u32, name| if value < limit { Ok(()) } else { Err(DecodeError::Field(name)) };
         let lineage = |group: GroupId| if group.is_lineage() { Ok(()) } else { Err(DecodeError::Field("group")) };

@@ -3,9 +3,9 @@
 
 use crate::Vec2;
 use crate::frame::AirFrame;
+use crate::link_faults::LinkFaults;
 use crate::message::Topic;
 use crate::radio::NEVER_AIRED;
-use crate::sides::Cuts;
 use bytemuck::{Pod, Zeroable};
 
 /// Up to so many frames it is cheaper to look at all of them.
@@ -77,7 +77,7 @@ impl FrameIndex {
         self.cells.clear();
         self.order.clear();
         self.sorted.clear();
-        let plain = |frame: &AirFrame| frame.cuts == Cuts::default() && frame.queue_ns != NEVER_AIRED;
+        let plain = |frame: &AirFrame| frame.cuts == LinkFaults::default() && frame.queue_ns != NEVER_AIRED;
         if locality.topics == 0 || frames.len() <= FEW || !frames.iter().all(plain) {
             return;
         }

@@ -2,8 +2,8 @@
 
 use crate::frame::AirFrame;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
+use crate::link_faults::LinkFaults;
 use crate::radio::DROP_REASONS;
-use crate::sides::Cuts;
 use crate::time::{SimTime, Tick};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ pub struct DroneRow {
     /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
     /// What faults do to its radio.
-    pub cuts: Cuts,
+    pub cuts: LinkFaults,
     /// How long its step took, ns of wall time.
     pub step_ns: u32,
     /// Route, [`crate::payload::NO_ROUTE`] if none.
@@ -159,7 +159,7 @@ impl FaultKind {
 
 /// A range of counted delays or ages, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
+pub struct Percentiles {
     /// Mean, s; `None` if nothing was counted.
     pub mean: Option<f64>,
     /// Median, s.
@@ -182,9 +182,9 @@ pub struct Totals {
     /// Not heard, by [`crate::radio::DropReason`] in its order.
     pub dropped: [u64; DROP_REASONS],
     /// From sending to hearing.
-    pub delay_s: Spread,
+    pub delay_s: Percentiles,
     /// Age of a peer's last known pose.
-    pub age_s: Spread,
+    pub age_s: Percentiles,
     /// Commands that were not finite and were not carried out.
     pub rejected_commands: u64,
     /// Ticks a drone did not answer in time (wall clock only).
@@ -192,13 +192,13 @@ pub struct Totals {
     /// Wall time from the first tick opened to the last tick done, s.
     pub wall_s: f64,
     /// How late ticks opened (wall clock only).
-    pub lateness_s: Spread,
+    pub lateness_s: Percentiles,
 }
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
-pub enum Happening {
+pub enum EventKind {
     /// A living drone senses an obstacle set for the first time.
     Detected {
         /// Number of the set, from 0, in flight order.
@@ -307,7 +307,7 @@ pub struct RunEvent {
     pub t_s: f64,
     /// What.
     #[serde(flatten)]
-    pub what: Happening,
+    pub what: EventKind,
 }
 
 /// A record sample as its reader sees it, in place.

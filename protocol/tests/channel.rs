@@ -3,7 +3,7 @@
 
 use skein_protocol::frame::{AirFrame, FRAME_PAYLOAD, Frame};
 use skein_protocol::message::Topic;
-use skein_protocol::radio::{Air, Channel, Delay, DropReason, NEVER_AIRED, Queue, Radio, Verdict};
+use skein_protocol::radio::{ChannelModel, Delay, Delivery, DropReason, NEVER_AIRED, Queue, Radio, SharedChannel};
 use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// A frame of 100 bytes on the air.
@@ -23,7 +23,7 @@ fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
 #[test]
 fn frames_queue_for_the_channel_over_ticks() {
     // 100 bytes take 10 ms; ticks of 20 ms.
-    let channel = Channel { seed: 1, rate_bps: 80_000.0, limit_s: 0.05 };
+    let channel = SharedChannel { seed: 1, rate_bps: 80_000.0, limit_s: 0.05 };
     let mut queue = Queue::new(channel);
     let mut pass = |tick: u64, count: u32| {
         let mut frames: Vec<AirFrame> = (0..count).map(|source| sent(tick, source, tick as u32)).collect();
@@ -45,7 +45,7 @@ fn frames_queue_for_the_channel_over_ticks() {
 
 #[test]
 fn nobody_has_the_channel_first_by_number() {
-    let mut queue = Queue::new(Channel { seed: 1, rate_bps: 1e9, limit_s: 1.0 });
+    let mut queue = Queue::new(SharedChannel { seed: 1, rate_bps: 1e9, limit_s: 1.0 });
     let mut first = [0u32; 8];
     for tick in 0..8000u64 {
         let mut frames: Vec<AirFrame> = (0..8).flat_map(|source| (0..2).map(move |n| sent(tick, source, n))).collect();
@@ -62,10 +62,10 @@ fn nobody_has_the_channel_first_by_number() {
 
 #[test]
 fn waiting_adds_to_the_delay_and_a_frame_not_sent_has_its_reason() {
-    let air = Air { delay: Delay { mean_s: 0.1, ..Delay::default() }, ..Air::default() };
+    let air = ChannelModel { delay: Delay { mean_s: 0.1, ..Delay::default() }, ..ChannelModel::default() };
     let radio = Radio { seed: 3, air, ..Radio::default() };
-    let fate = |frame: AirFrame| radio.fate(&frame, DroneId(1), Vec2::zeros(), 20_000_000);
+    let delivery = |frame: AirFrame| radio.delivery(&frame, DroneId(1), Vec2::zeros(), 20_000_000);
     let due = SimTime(5 * 20_000_000 + 3_000_000 + 100_000_000);
-    assert_eq!(fate(AirFrame { queue_ns: 3_000_000, ..sent(5, 0, 0) }), Verdict::Deliver { due, again: None });
-    assert_eq!(fate(AirFrame { queue_ns: NEVER_AIRED, ..sent(5, 0, 0) }), Verdict::Drop(DropReason::Queue));
+    assert_eq!(delivery(AirFrame { queue_ns: 3_000_000, ..sent(5, 0, 0) }), Delivery::Deliver { due, again: None });
+    assert_eq!(delivery(AirFrame { queue_ns: NEVER_AIRED, ..sent(5, 0, 0) }), Delivery::Drop(DropReason::Queue));
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{
-    Air, BLOCK_BURSTS, Burst, Delay, DelayModel, DropReason, Link, Radio, Range, Rule, Scope, Verdict,
+    BLOCK_BURSTS, Burst, ChannelModel, Delay, DelayModel, Delivery, DropReason, Link, Radio, Range, Rule, Scope,
 };
 use skein_protocol::{DroneId, SimTime, Vec2};
 use std::collections::BTreeSet;
@@ -22,19 +22,19 @@ fn link(source: u32, destination: u32, sequence: u32) -> Link {
     Link { source: DroneId(source), destination: DroneId(destination), topic: Topic::Pose as u16, sequence }
 }
 
-fn radio(air: Air) -> Radio {
+fn radio(air: ChannelModel) -> Radio {
     Radio { seed: 3, air, ..Radio::default() }
 }
 
 /// The verdicts on frames of one link, one every [`PERIOD_S`], over `path_m`.
-fn verdicts(radio: &Radio, (source, destination): (u32, u32), path_m: f64) -> Vec<Verdict> {
+fn verdicts(radio: &Radio, (source, destination): (u32, u32), path_m: f64) -> Vec<Delivery> {
     let at = |sequence| SimTime::from_secs(f64::from(sequence) * PERIOD_S);
     (0..MANY).map(|s| radio.verdict(link(source, destination, s), Vec2::new(path_m, 0.0), at(s))).collect()
 }
 
 /// Which of them were dropped for this reason.
-fn dropped(verdicts: &[Verdict], reason: DropReason) -> Vec<bool> {
-    verdicts.iter().map(|verdict| *verdict == Verdict::Drop(reason)).collect()
+fn dropped(verdicts: &[Delivery], reason: DropReason) -> Vec<bool> {
+    verdicts.iter().map(|verdict| *verdict == Delivery::Drop(reason)).collect()
 }
 
 fn rate(hits: &[bool]) -> f64 {
@@ -44,9 +44,9 @@ fn rate(hits: &[bool]) -> f64 {
 /// Time on the air of what was delivered, s.
 fn delays(radio: &Radio, pair: (u32, u32)) -> Vec<f64> {
     let sent = |sequence: usize| SimTime::from_secs(sequence as f64 * PERIOD_S);
-    let delay = |(sequence, verdict): (usize, Verdict)| match verdict {
-        Verdict::Deliver { due, .. } => Some(due.since(sent(sequence))),
-        Verdict::Drop(_) => None,
+    let delay = |(sequence, verdict): (usize, Delivery)| match verdict {
+        Delivery::Deliver { due, .. } => Some(due.since(sent(sequence))),
+        Delivery::Drop(_) => None,
     };
     verdicts(radio, pair, 0.0).into_iter().enumerate().filter_map(delay).collect()
 }
@@ -85,12 +85,12 @@ fn assert_moments(what: &str, values: &[f64], wanted_mean: f64, wanted_variance:
 #[test]
 fn an_ideal_radio_delivers_once_and_at_once() {
     let verdict = Radio::default().verdict(link(0, 1, 0), Vec2::new(1e6, 0.0), SimTime(5));
-    assert_eq!(verdict, Verdict::Deliver { due: SimTime(5), again: None });
+    assert_eq!(verdict, Delivery::Deliver { due: SimTime(5), again: None });
 }
 
 #[test]
 fn verdicts_are_keyed_not_drawn_in_turn() {
-    let air = Air {
+    let air = ChannelModel {
         delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.05 },
         loss: 0.3,
         burst: Some(Burst { share: 0.2, length_s: 0.5, loss: 1.0, scope: Scope::Link }),
@@ -112,10 +112,10 @@ fn verdicts_are_keyed_not_drawn_in_turn() {
 /// What a fixed delay and Bernoulli losses gave before there were other models: digests of such missions rest on it.
 #[test]
 fn a_plain_loss_stays_as_it_was() {
-    let radio = Radio { seed: 9, air: Air { loss: 0.5, ..Air::default() }, ..Radio::default() };
+    let radio = Radio { seed: 9, air: ChannelModel { loss: 0.5, ..ChannelModel::default() }, ..Radio::default() };
     let lost: String = (0..32)
         .map(|s| match radio.verdict(link(2, 3, s), Vec2::zeros(), SimTime::ZERO) {
-            Verdict::Drop(DropReason::Loss) => 'x',
+            Delivery::Drop(DropReason::Loss) => 'x',
             _ => '.',
         })
         .collect();
@@ -124,7 +124,7 @@ fn a_plain_loss_stays_as_it_was() {
 
 #[test]
 fn loss_has_its_rate_on_every_link_and_no_memory() {
-    let radio = radio(Air { loss: 0.2, ..Air::default() });
+    let radio = radio(ChannelModel { loss: 0.2, ..ChannelModel::default() });
     for pair in [(0, 1), (1, 0), (6, 7)] {
         let lost = dropped(&verdicts(&radio, pair, 0.0), DropReason::Loss);
         assert_rate("loss", rate(&lost), 0.2, f64::from(MANY));
@@ -136,7 +136,10 @@ fn loss_has_its_rate_on_every_link_and_no_memory() {
 #[test]
 fn links_are_independent_of_each_other() {
     let burst = Burst { share: 0.3, length_s: 0.2, loss: 1.0, scope: Scope::Direction };
-    let airs = [Air { loss: 0.3, ..Air::default() }, Air { burst: Some(burst), ..Air::default() }];
+    let airs = [
+        ChannelModel { loss: 0.3, ..ChannelModel::default() },
+        ChannelModel { burst: Some(burst), ..ChannelModel::default() },
+    ];
     for (air, reason) in airs.into_iter().zip([DropReason::Loss, DropReason::Burst]) {
         let radio = radio(air);
         let [one, back, other] = [(0, 1), (1, 0), (0, 2)].map(|pair| dropped(&verdicts(&radio, pair, 0.0), reason));
@@ -152,7 +155,10 @@ fn links_are_independent_of_each_other() {
 fn delays_have_the_moments_of_their_models() {
     let (mean_s, jitter_s) = (0.2, 0.08);
     for model in [DelayModel::Uniform, DelayModel::Gamma] {
-        let values = delays(&radio(Air { delay: Delay { model, mean_s, jitter_s }, ..Air::default() }), (0, 1));
+        let values = delays(
+            &radio(ChannelModel { delay: Delay { model, mean_s, jitter_s }, ..ChannelModel::default() }),
+            (0, 1),
+        );
         assert_moments(&format!("{model:?}"), &values, mean_s, jitter_s * jitter_s);
         assert!(values.iter().all(|value| *value >= 0.0));
         let skew = moment(&values, 3) / moment(&values, 2).powf(1.5);
@@ -162,12 +168,16 @@ fn delays_have_the_moments_of_their_models() {
     }
     // A long tail: shape 1/4.
     let delay = Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.2 };
-    assert_moments("long tail", &delays(&radio(Air { delay, ..Air::default() }), (0, 1)), 0.1, 0.04);
+    assert_moments("long tail", &delays(&radio(ChannelModel { delay, ..ChannelModel::default() }), (0, 1)), 0.1, 0.04);
     let fixed = Delay { model: DelayModel::Fixed, mean_s: 0.25, jitter_s: 0.0 };
-    assert!(delays(&radio(Air { delay: fixed, ..Air::default() }), (0, 1)).iter().all(|value| *value == 0.25));
+    assert!(
+        delays(&radio(ChannelModel { delay: fixed, ..ChannelModel::default() }), (0, 1))
+            .iter()
+            .all(|value| *value == 0.25)
+    );
     let reach = 3f64.sqrt() * 0.08;
     let uniform = Delay { model: DelayModel::Uniform, mean_s, jitter_s };
-    let values = delays(&radio(Air { delay: uniform, ..Air::default() }), (0, 1));
+    let values = delays(&radio(ChannelModel { delay: uniform, ..ChannelModel::default() }), (0, 1));
     assert!(values.iter().all(|value| (value - mean_s).abs() <= reach + 1e-9), "uniform stays within √3 deviations");
 }
 
@@ -175,7 +185,7 @@ fn delays_have_the_moments_of_their_models() {
 fn a_normal_delay_is_cut_at_zero() {
     let of = |mean_s, jitter_s| {
         let delay = Delay { model: DelayModel::Normal, mean_s, jitter_s };
-        delays(&radio(Air { delay, ..Air::default() }), (0, 1))
+        delays(&radio(ChannelModel { delay, ..ChannelModel::default() }), (0, 1))
     };
     // Far from zero it is the whole bell: a share of 0.6827 within one deviation.
     let values = of(1.0, 0.1);
@@ -231,7 +241,7 @@ fn a_block_begins_with_a_draw_of_its_own() {
 fn bursts_befall_whom_they_should() {
     let burst = |scope| Burst { share: 0.4, length_s: 0.3, loss: 1.0, scope };
     let states = |scope, pair| -> Vec<bool> {
-        let air = Air { burst: Some(burst(scope)), ..Air::default() };
+        let air = ChannelModel { burst: Some(burst(scope)), ..ChannelModel::default() };
         dropped(&verdicts(&radio(air), pair, 0.0), DropReason::Burst)
     };
     assert_ne!(states(Scope::Direction, (0, 1)), states(Scope::Direction, (1, 0)));
@@ -240,28 +250,32 @@ fn bursts_befall_whom_they_should() {
     assert_eq!(states(Scope::Swarm, (0, 1)), states(Scope::Swarm, (7, 3)));
     // A burst that loses seven in ten, and a quiet time that loses one in ten, each with its reason.
     let partly = Burst { loss: 0.7, ..burst(Scope::Direction) };
-    let verdicts = verdicts(&radio(Air { burst: Some(partly), loss: 0.1, ..Air::default() }), (0, 1), 0.0);
+    let verdicts =
+        verdicts(&radio(ChannelModel { burst: Some(partly), loss: 0.1, ..ChannelModel::default() }), (0, 1), 0.0);
     // A burst of three periods in the mean leaves about a sixth as many independent frames.
     assert_rate("in bursts", rate(&dropped(&verdicts, DropReason::Burst)), 0.28, f64::from(MANY) / 6.0);
     assert_rate("alone", rate(&dropped(&verdicts, DropReason::Loss)), 0.072, f64::from(MANY) / 6.0);
     for (share, wanted) in [(0.0, 0.0), (1.0, 1.0)] {
-        let always = Air { burst: Some(Burst { share, ..burst(Scope::Link) }), ..Air::default() };
+        let always = ChannelModel { burst: Some(Burst { share, ..burst(Scope::Link) }), ..ChannelModel::default() };
         assert_eq!(rate(&dropped(&self::verdicts(&radio(always), (0, 1), 0.0), DropReason::Burst)), wanted);
     }
 }
 
 #[test]
 fn a_hard_range_ends_at_its_distance() {
-    let radio = radio(Air { range: Some(Range { half_m: 100.0, shadowing_db: 0.0, exponent: 2.0 }), ..Air::default() });
+    let radio = radio(ChannelModel {
+        range: Some(Range { half_m: 100.0, shadowing_db: 0.0, exponent: 2.0 }),
+        ..ChannelModel::default()
+    });
     let at = |x| radio.verdict(link(0, 1, 0), Vec2::new(x, 0.0), SimTime::ZERO);
-    assert_eq!(at(100.0), Verdict::Deliver { due: SimTime::ZERO, again: None });
-    assert_eq!(at(100.1), Verdict::Drop(DropReason::Range));
+    assert_eq!(at(100.0), Delivery::Deliver { due: SimTime::ZERO, again: None });
+    assert_eq!(at(100.1), Delivery::Drop(DropReason::Range));
 }
 
 #[test]
 fn a_gradual_range_follows_the_path_loss() {
     let range = Range { half_m: 100.0, shadowing_db: 6.0, exponent: 3.0 };
-    let radio = radio(Air { range: Some(range), ..Air::default() });
+    let radio = radio(ChannelModel { range: Some(range), ..ChannelModel::default() });
     // A deviation of the shadowing is a factor of 10^(6 / 30) in distance; the bell's tails beyond -2 … 2 deviations.
     for (deviations, heard) in [(-2.0, 0.977_25), (-1.0, 0.841_345), (0.0, 0.5), (1.0, 0.158_655), (2.0, 0.022_75)] {
         let path_m = 100.0 * 10f64.powf(0.2 * deviations);
@@ -274,10 +288,11 @@ fn a_gradual_range_follows_the_path_loss() {
 #[test]
 fn copies_come_later_and_as_often_as_told() {
     let delay = Delay { model: DelayModel::Uniform, mean_s: 0.5, jitter_s: 0.1 };
-    let verdicts = verdicts(&radio(Air { delay, loss: 0.5, duplicate: 0.15, ..Air::default() }), (0, 1), 0.0);
+    let verdicts =
+        verdicts(&radio(ChannelModel { delay, loss: 0.5, duplicate: 0.15, ..ChannelModel::default() }), (0, 1), 0.0);
     let heard = verdicts.iter().filter_map(|verdict| match *verdict {
-        Verdict::Deliver { due, again } => Some((due, again)),
-        Verdict::Drop(_) => None,
+        Delivery::Deliver { due, again } => Some((due, again)),
+        Delivery::Drop(_) => None,
     });
     let heard: Vec<(SimTime, Option<SimTime>)> = heard.collect();
     let twice: Vec<bool> = heard.iter().map(|(_, again)| again.is_some()).collect();
@@ -292,7 +307,10 @@ fn copies_come_later_and_as_often_as_told() {
 #[test]
 fn jitter_reorders_and_a_fixed_delay_does_not() {
     let overtaken = |model, jitter_s| -> Vec<bool> {
-        let values = delays(&radio(Air { delay: Delay { model, mean_s: 1.0, jitter_s }, ..Air::default() }), (0, 1));
+        let values = delays(
+            &radio(ChannelModel { delay: Delay { model, mean_s: 1.0, jitter_s }, ..ChannelModel::default() }),
+            (0, 1),
+        );
         values.windows(2).map(|pair| pair[1] + PERIOD_S < pair[0]).collect()
     };
     // Two normal delays differ by more than a period: Q(0.1 / (0.1 √2)) = 0.239 75.
@@ -303,7 +321,7 @@ fn jitter_reorders_and_a_fixed_delay_does_not() {
 #[test]
 fn the_two_directions_of_a_link_are_inversely_better_and_worse() {
     let delay = Delay { model: DelayModel::Fixed, mean_s: 0.2, jitter_s: 0.0 };
-    let radio = Radio { asymmetry: 1.5, ..radio(Air { loss: 0.2, delay, ..Air::default() }) };
+    let radio = Radio { asymmetry: 1.5, ..radio(ChannelModel { loss: 0.2, delay, ..ChannelModel::default() }) };
     let pairs = (0..100).flat_map(|a| (a + 1..100).map(move |b| (a, b)));
     let logs: Vec<f64> = pairs.map(|(a, b)| radio.factor(link(a, b, 0)).ln() / 2.5f64.ln()).collect();
     assert_moments("log of the factor", &logs, 0.0, 1.0 / 3.0);
@@ -324,7 +342,7 @@ fn the_last_rule_about_a_frame_counts() {
         topics: (!topics.is_empty()).then(|| topics.iter().copied().collect::<BTreeSet<_>>()),
         from: None,
         to: (!to.is_empty()).then(|| to.iter().copied().map(DroneId).collect::<BTreeSet<_>>()),
-        air: Air { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..Air::default() },
+        air: ChannelModel { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..ChannelModel::default() },
     };
     let rules = vec![rule(&[Topic::Pose, Topic::Plan], &[], 1.0), rule(&[], &[3], 2.0)];
     let radio = Radio { rules, ..Radio::default() };
@@ -333,8 +351,8 @@ fn the_last_rule_about_a_frame_counts() {
         Vec2::zeros(),
         SimTime::ZERO,
     ) {
-        Verdict::Deliver { due, .. } => due.secs(),
-        Verdict::Drop(reason) => panic!("{reason:?}"),
+        Delivery::Deliver { due, .. } => due.secs(),
+        Delivery::Drop(reason) => panic!("{reason:?}"),
     };
     let (pose, assignment, unknown) = (Topic::Pose as u16, Topic::Assignment as u16, 99);
     assert_eq!([due_s(pose, 1), due_s(assignment, 1), due_s(unknown, 1)], [1.0, 0.0, 0.0]);
@@ -351,7 +369,7 @@ proptest! {
         let drones = |bits: u8| (bits > 7).then(|| (0..3).filter(|i| bits >> i & 1 == 1).map(DroneId).collect());
         let topics = |bits: u8| (bits > 15).then(|| Topic::ALL.into_iter().filter(|&t| bits >> t as u16 & 1 == 1).collect());
         // Each air is known by its delay.
-        let delay = |s: usize| Air { delay: Delay { mean_s: 1.0 + s as f64, ..Delay::default() }, ..Air::default() };
+        let delay = |s: usize| ChannelModel { delay: Delay { mean_s: 1.0 + s as f64, ..Delay::default() }, ..ChannelModel::default() };
         let rule = |(i, &(t, from, to)): (usize, &(u8, u8, u8))| Rule {
             topics: topics(t),
             from: drones(from),
@@ -363,6 +381,6 @@ proptest! {
         (frame.source, frame.frame.kind) = (DroneId(source), kind);
         let (receiver, here) = (DroneId(destination), Vec2::zeros());
         let airs = radio.airs_at(receiver);
-        prop_assert_eq!(radio.fate_at(&airs, &frame, here, 20), radio.fate(&frame, receiver, here, 20));
+        prop_assert_eq!(radio.delivery_at(&airs, &frame, here, 20), radio.delivery(&frame, receiver, here, 20));
     }
 }

@@ -8,11 +8,11 @@ use crate::recorder::Ending;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
 use crate::summary::{
-    Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, Spread, StepTimes, Summary, Violation, numbers,
+    Dropped, Energy, FaultEntry, Messages, Percentiles, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers,
 };
 use crate::vicinity::Vicinity;
 use skein_protocol::payload::PHASE_REFORM;
-use skein_protocol::record::{self, DroneRow, Happening, Outcome, ROW_LATE, RecordView, RunEvent, Totals};
+use skein_protocol::record::{self, DroneRow, EventKind, Outcome, ROW_LATE, RecordView, RunEvent, Totals};
 use skein_protocol::{SimTime, Vec2};
 
 /// Time between two samples of the swarm metrics, s.
@@ -119,38 +119,38 @@ impl Accumulator {
     fn event(&mut self, event: RunEvent, rows: &[DroneRow]) {
         let t_s = event.t_s;
         match event.what {
-            Happening::Detected { stage, .. } => {
+            EventKind::Detected { stage, .. } => {
                 if self.stages.detected(stage, t_s) {
                     self.energy.detected(&self.last, self.facts.drones);
                 }
             }
-            Happening::Passed { stage } => {
+            EventKind::Passed { stage } => {
                 self.stages.passed(stage, t_s);
                 if self.stages.all_passed() {
                     self.energy.passed(rows);
                 }
             }
-            Happening::Leader { group, ballot, leader, leads: true } => {
+            EventKind::Leader { group, ballot, leader, leads: true } => {
                 self.leading.elected(t_s, group, ballot, leader)
             }
-            Happening::Fault { kind, target, scheduled, detail } => {
+            EventKind::Fault { kind, target, scheduled, detail } => {
                 if let (true, Some(row)) = (kind.stops_process(), self.last.get(target.index())) {
                     self.leading.died(t_s, row);
                 }
                 let target = (target != skein_protocol::DroneId::NONE).then_some(target.0);
                 self.faults.push(FaultEntry { t_s, kind, target, scheduled, detail });
             }
-            Happening::Violation { kind, drones, value_m } => {
+            EventKind::Violation { kind, drones, value_m } => {
                 self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
             }
-            Happening::End { outcome, reason, totals } => {
+            EventKind::End { outcome, reason, totals } => {
                 self.end = Some(End { t_s, outcome, reason, totals: *totals });
             }
             // What was decided shows in the frames, laying down in the rows, and that a fault is over in the events.
-            Happening::Leader { .. }
-            | Happening::Grouping { .. }
-            | Happening::Assigned { .. }
-            | Happening::FaultOver { .. } => {}
+            EventKind::Leader { .. }
+            | EventKind::Grouping { .. }
+            | EventKind::Assigned { .. }
+            | EventKind::FaultOver { .. } => {}
         }
     }
 
@@ -284,7 +284,7 @@ fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
     rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
 }
 
-fn lateness(late_s: &record::Spread) -> Option<StepTimes> {
+fn lateness(late_s: &record::Percentiles) -> Option<StepTimes> {
     let us = |s: Option<f64>| s.map(|s| s * 1e6);
     Some(StepTimes { p50: us(late_s.p50)?, p99: us(late_s.p99)?, max: us(late_s.max)? })
 }
@@ -306,6 +306,6 @@ fn messages(counts: &Counts, totals: Option<&Totals>) -> Messages {
     }
 }
 
-fn spread(counted: &record::Spread) -> Spread {
-    Spread { mean: counted.mean, p50: counted.p50, p99: counted.p99, max: counted.max }
+fn spread(counted: &record::Percentiles) -> Percentiles {
+    Percentiles { mean: counted.mean, p50: counted.p50, p99: counted.p99, max: counted.max }
 }

@@ -221,9 +221,9 @@ pub struct Messages {
     /// Not heard, by reason.
     pub dropped: Dropped,
     /// From sending to hearing.
-    pub delay_s: Spread,
+    pub delay_s: Percentiles,
     /// Age of a peer's last known pose.
-    pub age_s: Spread,
+    pub age_s: Percentiles,
 }
 
 /// Frames that were not heard, over all receivers.
@@ -247,7 +247,7 @@ pub struct Dropped {
 
 /// A range of counted times, s; null if nothing was counted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Spread {
+pub struct Percentiles {
     /// Mean, s.
     pub mean: Option<f64>,
     /// Median, s.

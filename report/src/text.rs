@@ -1,6 +1,6 @@
 //! A summary for people: the verdict first, then what they ask next.
 
-use crate::summary::{Spread, Stage, Summary};
+use crate::summary::{Percentiles, Stage, Summary};
 use skein_protocol::record::Outcome;
 use std::fmt::Write;
 
@@ -161,7 +161,7 @@ fn messages(summary: &Summary) -> String {
     for (reason, count) in reasons {
         text.extend(count.filter(|&count| count > 0).map(|count| format!(", {count} dropped ({reason})")));
     }
-    if let Spread { p50: Some(p50), p99: Some(p99), .. } = messages.delay_s {
+    if let Percentiles { p50: Some(p50), p99: Some(p99), .. } = messages.delay_s {
         let _ = write!(text, "; delay {:.0} ms, p99 {:.0} ms", p50 * 1e3, p99 * 1e3);
     }
     text

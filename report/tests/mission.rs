@@ -118,27 +118,27 @@ fn frames(tick: u64) -> Vec<AirFrame> {
 fn events(tick: u64) -> Vec<RunEvent> {
     let at = |t_s: f64, what| RunEvent { t_s, what };
     let leader =
-        |leader, leads| Happening::Leader { group: "N1".to_owned(), ballot: BALLOT, leader: DroneId(leader), leads };
+        |leader, leads| EventKind::Leader { group: "N1".to_owned(), ballot: BALLOT, leader: DroneId(leader), leads };
     match tick {
         9 => vec![at(1.0, leader(3, true))],
         10 => vec![at(
             1.0,
-            Happening::Detected { stage: 0, drone: DroneId(2), obstacle: ObstacleId(0), distance_m: 30.0 },
+            EventKind::Detected { stage: 0, drone: DroneId(2), obstacle: ObstacleId(0), distance_m: 30.0 },
         )],
         30 => vec![at(
             3.1,
-            Happening::Violation {
+            EventKind::Violation {
                 kind: ViolationKind::Separation,
                 drones: vec![DroneId(0), DroneId(1)],
                 value_m: 24.0,
             },
         )],
-        49 => vec![at(5.0, Happening::Passed { stage: 0 })],
+        49 => vec![at(5.0, EventKind::Passed { stage: 0 })],
         DEATH => vec![
             at(6.1, leader(3, false)),
             at(
                 6.1,
-                Happening::Fault {
+                EventKind::Fault {
                     kind: FaultKind::Kill,
                     target: DroneId(3),
                     scheduled: false,
@@ -157,14 +157,14 @@ fn end() -> RunEvent {
         delivered: 30,
         duplicates: 8,
         dropped: [1, 2, 3, 4, 5, 6, 7],
-        delay_s: Spread { mean: Some(0.02), p50: Some(0.02), p99: Some(0.04), max: Some(0.04) },
+        delay_s: Percentiles { mean: Some(0.02), p50: Some(0.02), p99: Some(0.04), max: Some(0.04) },
         rejected_commands: 1,
         wall_s: 2.0,
         ..Totals::default()
     };
     RunEvent {
         t_s: 10.0,
-        what: Happening::End { outcome: Outcome::Reached, reason: "goal met".to_owned(), totals: Box::new(totals) },
+        what: EventKind::End { outcome: Outcome::Reached, reason: "goal met".to_owned(), totals: Box::new(totals) },
     }
 }
 

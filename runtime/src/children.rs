@@ -1,6 +1,6 @@
 //! The processes a launcher has started. All are gone when this is dropped.
 
-use crate::drone_process::Crew;
+use crate::drone_process::DroneRange;
 use crate::supervisor::{Launch, ProcessInfo};
 use crate::{Clock, PilotKind, RuntimeError};
 use rustix::event::{Timespec, epoll};
@@ -19,15 +19,15 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     World,
-    Drones(Crew),
+    Drones(DroneRange),
 }
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::World => f.write_str("the world"),
-            Self::Drones(Crew { first, count: 1, .. }) => write!(f, "drone {first}"),
-            Self::Drones(Crew { first, count, .. }) => {
+            Self::Drones(DroneRange { first, count: 1, .. }) => write!(f, "drone {first}"),
+            Self::Drones(DroneRange { first, count, .. }) => {
                 write!(f, "the process of drones {first} to {}", first.0 + count - 1)
             }
         }
@@ -62,7 +62,7 @@ struct Running {
 
 impl Running {
     fn is_of(&self, drone: DroneId) -> bool {
-        matches!(self.role, Role::Drones(crew) if crew.ids().any(|id| id == drone))
+        matches!(self.role, Role::Drones(range) if range.ids().any(|id| id == drone))
     }
 }
 
@@ -99,7 +99,7 @@ impl Children {
         let mut command = Command::new(&self.executable);
         match role {
             Role::World => command.args(["world", "--clock", &clock.to_string()]),
-            Role::Drones(Crew { first, count, incarnation, first_tick }) => command.args([
+            Role::Drones(DroneRange { first, count, incarnation, first_tick }) => command.args([
                 "drone",
                 "--pilot",
                 self.pilot.name(),
@@ -160,13 +160,13 @@ impl Children {
     }
 
     /// Kills a drone's process and reaps it; all drones that were in it, `None` if there is none.
-    pub(crate) fn kill_drone(&mut self, drone: DroneId) -> Option<Crew> {
+    pub(crate) fn kill_drone(&mut self, drone: DroneId) -> Option<DroneRange> {
         let place = self.running.iter().position(|running| running.is_of(drone))?;
         let mut running = self.running.remove(place);
         // It may have ended by itself just now: the wait tells either way.
         let _ = running.child.kill();
-        let Role::Drones(crew) = running.role else { return None };
-        running.child.wait().is_ok().then_some(crew)
+        let Role::Drones(range) = running.role else { return None };
+        running.child.wait().is_ok().then_some(range)
     }
 
     /// Stops a drone's process; true once it is stopped, false if there is none.
@@ -213,7 +213,7 @@ impl Children {
         self.running.iter().flat_map(|running| {
             let (role, ids) = match running.role {
                 Role::World => ("world", vec![None]),
-                Role::Drones(crew) => ("drone", crew.ids().map(|id| Some(id.0)).collect()),
+                Role::Drones(range) => ("drone", range.ids().map(|id| Some(id.0)).collect()),
             };
             let pid = running.child.id();
             ids.into_iter().map(move |id| ProcessInfo { role, id, pid })

@@ -1,7 +1,7 @@
 //! Lockstep and wall clock.
 
 use skein_protocol::histogram;
-use skein_protocol::record::Spread;
+use skein_protocol::record::Percentiles;
 use std::fmt;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -84,7 +84,7 @@ impl Lateness {
 
     /// Mean, median, 99th percentile and maximum, s.
     #[must_use]
-    pub fn spread(&self) -> Spread {
+    pub fn spread(&self) -> Percentiles {
         histogram::spread(&self.bins, self.max_us, 1e-6)
     }
 }

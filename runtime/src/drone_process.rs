@@ -1,6 +1,6 @@
 //! A drone's process, or that of several: it waits for a tick, hears, steps its pilots, speaks, answers.
 
-use crate::cockpit::{Cockpit, Desk};
+use crate::pilot_host::{PilotHost, StepScratch};
 use crate::{PilotKind, RuntimeError, mission};
 use skein_bus::{
     BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, SHARD_DRONES, Services, TickSignal, UplinkHeader,
@@ -64,7 +64,7 @@ pub fn scenario_path(domain: &Path) -> PathBuf {
 
 /// The drones of one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Crew {
+pub struct DroneRange {
     /// The first of them.
     pub first: DroneId,
     /// How many, by id.
@@ -75,7 +75,7 @@ pub struct Crew {
     pub first_tick: Tick,
 }
 
-impl Crew {
+impl DroneRange {
     /// Their ids.
     pub fn ids(&self) -> impl Iterator<Item = DroneId> + use<> {
         (self.first.0..self.first.0 + self.count).map(DroneId)
@@ -86,10 +86,10 @@ impl Crew {
 ///
 /// # Errors
 /// [`RuntimeError`]; the launcher sees the process end.
-pub fn run(args: &ChildArgs, crew: Crew, pilot: PilotKind) -> Result<(), RuntimeError> {
-    fly(args, crew, |scenario, id| {
-        let start = SimTime(crew.first_tick as i64 * mission::dt_ns(scenario));
-        mission::Yard::new(scenario, pilot).cockpit(id, crew.incarnation, start)
+pub fn run(args: &ChildArgs, range: DroneRange, pilot: PilotKind) -> Result<(), RuntimeError> {
+    fly(args, range, |scenario, id| {
+        let start = SimTime(range.first_tick as i64 * mission::dt_ns(scenario));
+        mission::DroneFactory::new(scenario, pilot).pilot_host(id, range.incarnation, start)
     })
 }
 
@@ -99,39 +99,39 @@ pub fn run(args: &ChildArgs, crew: Crew, pilot: PilotKind) -> Result<(), Runtime
 /// [`RuntimeError`].
 pub fn fly(
     args: &ChildArgs,
-    crew: Crew,
-    mut make: impl FnMut(&Scenario, DroneId) -> Cockpit,
+    range: DroneRange,
+    mut make: impl FnMut(&Scenario, DroneId) -> PilotHost,
 ) -> Result<(), RuntimeError> {
     args.bind_to_parent()?;
     raise_file_limit()?;
     let scenario = args.scenario()?;
     let control = Arc::new(Control::attach(args.control)?);
-    pin_to_core(control.core_of(crew.first.index()), args.pin)?;
+    pin_to_core(control.core_of(range.first.index()), args.pin)?;
     let domain = Domain::join(&args.domain)?;
-    let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", crew.first))?;
-    let seat = |id: DroneId| -> Result<Seat, RuntimeError> {
+    let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", range.first))?;
+    let seat = |id: DroneId| -> Result<DroneHandle, RuntimeError> {
         let barrier = DroneEnd::new(Arc::clone(&control), id.index())?.bound();
-        Ok(Seat { id, cockpit: make(&scenario, id), barrier, slot: Slot::default() })
+        Ok(DroneHandle { id, pilot_host: make(&scenario, id), barrier, slot: Slot::default() })
     };
-    let seats: Vec<Seat> = crew.ids().map(seat).collect::<Result<_, _>>()?;
+    let handles: Vec<DroneHandle> = range.ids().map(seat).collect::<Result<_, _>>()?;
     let shard = |id: DroneId| id.index() / SHARD_DRONES;
-    let shards = shard(crew.first)..=seats.last().map_or(0, |seat| shard(seat.id));
+    let shards = shard(range.first)..=handles.last().map_or(0, |seat| shard(seat.id));
     let mut process = DroneProcess {
         first_shard: *shards.start(),
         speaks: shards.map(|shard| services.uplink_publisher(shard * SHARD_DRONES)).collect::<Result<_, _>>()?,
         hears: services.downlink_subscriber()?,
-        incarnation: crew.incarnation,
-        seats,
-        desk: Desk::default(),
+        incarnation: range.incarnation,
+        handles,
+        desk: StepScratch::default(),
     };
-    process.seats.iter().for_each(|seat| seat.barrier.announce(crew.incarnation));
+    process.handles.iter().for_each(|seat| seat.barrier.announce(range.incarnation));
     process.fly()
 }
 
 /// One drone of the process.
-struct Seat {
+struct DroneHandle {
     id: DroneId,
-    cockpit: Cockpit,
+    pilot_host: PilotHost,
     barrier: DroneEnd,
     slot: Slot,
 }
@@ -143,14 +143,14 @@ struct DroneProcess {
     /// One a shard, from the first one's on.
     speaks: Vec<UplinkPublisher>,
     first_shard: usize,
-    seats: Vec<Seat>,
-    desk: Desk,
+    handles: Vec<DroneHandle>,
+    desk: StepScratch,
 }
 
 impl DroneProcess {
     fn fly(&mut self) -> Result<(), RuntimeError> {
         loop {
-            let Some((first, others)) = self.seats.split_first_mut() else { return Ok(()) };
+            let Some((first, others)) = self.handles.split_first_mut() else { return Ok(()) };
             let TickSignal::Tick(tick) = first.barrier.wait_tick(|| true) else { return Ok(()) };
             others.iter_mut().for_each(|seat| _ = seat.barrier.join_tick(tick));
             self.answer(tick)?;
@@ -160,7 +160,7 @@ impl DroneProcess {
     /// Reads the downlinks up to the newest, and answers that one.
     fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
         let desk = &mut self.desk;
-        let resume_from = self.seats.first().map_or(0, |seat| seat.barrier.resume_from());
+        let resume_from = self.handles.first().map_or(0, |seat| seat.barrier.resume_from());
         while let Some(sample) = self.hears.receive()? {
             if sample.tick() < resume_from {
                 // Sent while this process was stopped: nobody heard it.
@@ -169,32 +169,34 @@ impl DroneProcess {
             let down = DownlinkView::parse(sample.bytes())
                 .map_err(|error| RuntimeError::Process(format!("drone process: {error}")))?;
             if sample.tick() < tick {
-                self.seats.iter_mut().for_each(|seat| seat.cockpit.overhear(&down, desk, seat.barrier.stats_mut()));
+                self.handles
+                    .iter_mut()
+                    .for_each(|seat| seat.pilot_host.overhear(&down, desk, seat.barrier.stats_mut()));
                 continue;
             }
-            for seat in &mut self.seats {
+            for seat in &mut self.handles {
                 let header = UplinkHeader { tick, source: seat.id.0, incarnation: self.incarnation };
                 seat.step(&down, desk, header, &self.speaks[seat.id.index() / SHARD_DRONES - self.first_shard])?;
             }
             // The world waits for them in turn: when the first has answered, all have.
-            self.seats.iter_mut().rev().for_each(|seat| _ = seat.barrier.finish(tick, &seat.slot));
+            self.handles.iter_mut().rev().for_each(|seat| _ = seat.barrier.finish(tick, &seat.slot));
             break;
         }
         Ok(())
     }
 }
 
-impl Seat {
+impl DroneHandle {
     fn step(
         &mut self,
         down: &DownlinkView<'_>,
-        desk: &mut Desk,
+        desk: &mut StepScratch,
         header: UplinkHeader,
         speaks: &UplinkPublisher,
     ) -> Result<(), RuntimeError> {
         let watch = self.barrier.stopwatch();
         let lap = watch.start();
-        let said = self.cockpit.step(down, desk, &mut self.slot, self.barrier.stats_mut());
+        let said = self.pilot_host.step(down, desk, &mut self.slot, self.barrier.stats_mut());
         if !said.is_empty() {
             let encode = |(frame, message): (&mut Frame, &Message)| *frame = message.encode();
             match speaks.send(header, said.len(), |out| out.iter_mut().zip(said).for_each(encode)) {

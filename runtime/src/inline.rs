@@ -1,7 +1,7 @@
 //! The inline runtime: the same pilots and the same world, stepped by function calls in one thread. The oracle for
 //! determinism, and the engine for large sweeps.
 
-use crate::cockpit::{Cockpit, Desk};
+use crate::pilot_host::{PilotHost, StepScratch};
 use crate::{PilotKind, RunEnd, RuntimeError, mission};
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
@@ -9,13 +9,13 @@ use skein_protocol::record::RecordSink;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_scenario::Scenario;
-use skein_world::faults::ProcessOrder;
+use skein_world::faults::ProcessCommand;
 use std::time::Instant;
 
 /// One drone and what it answered in the current tick.
-struct Seat {
+struct DroneHandle {
     /// `None`: its process is gone.
-    cockpit: Option<Cockpit>,
+    pilot_host: Option<PilotHost>,
     frozen: bool,
     slot: Slot,
     frames: Vec<Frame>,
@@ -44,28 +44,27 @@ pub fn run_with(
     sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
-    let (yard, mut desk) = (mission::Yard::new(scenario, pilot), Desk::default());
+    let (yard, mut desk) = (mission::DroneFactory::new(scenario, pilot), StepScratch::default());
     let started = Instant::now();
     let mut world = mission::world(scenario)?;
-    let seat = |id| Seat {
-        cockpit: Some(yard.cockpit(DroneId(id), 1, SimTime::ZERO)),
+    let seat = |id| DroneHandle {
+        pilot_host: Some(yard.pilot_host(DroneId(id), 1, SimTime::ZERO)),
         frozen: false,
         slot: Slot::default(),
         frames: Vec::new(),
         stats: LinkStats::default(),
     };
-    let mut seats: Vec<Seat> = (0..scenario.formation.drones).map(seat).collect();
+    let mut handles: Vec<DroneHandle> = (0..scenario.formation.drones).map(seat).collect();
     let startup_s = started.elapsed().as_secs_f64();
     let (opened, mut signal, mut sink_error) = (Instant::now(), None, None);
     while world.ended().is_none() {
         let start = world.now();
-        world
-            .orders()
-            .iter()
-            .for_each(|&order| carry_out(order, &mut seats, |id, incarnation| yard.cockpit(id, incarnation, start)));
+        world.orders().iter().for_each(|&order| {
+            carry_out(order, &mut handles, |id, incarnation| yard.pilot_host(id, incarnation, start))
+        });
         let down = world.downlink().view();
-        seats.iter_mut().for_each(|seat| seat.answer(&down, &mut desk));
-        for (seat, id) in seats.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
+        handles.iter_mut().for_each(|seat| seat.answer(&down, &mut desk));
+        for (seat, id) in handles.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
             world.take_slot(DroneId(id), &seat.slot);
             world.take_frames(DroneId(id), &seat.frames);
         }
@@ -78,37 +77,37 @@ pub fn run_with(
     }
     let wall_s = opened.elapsed().as_secs_f64();
     let mut stats = LinkStats::default();
-    seats.iter().for_each(|seat| stats.merge(&seat.stats));
+    handles.iter().for_each(|seat| stats.merge(&seat.stats));
     world.finish(&stats, wall_s);
     keep(sink, &world, &mut sink_error);
     Ok(RunEnd { startup_s, signal, sink_error, ..RunEnd::default() })
 }
 
-impl Seat {
+impl DroneHandle {
     /// Whether it has a process, and one that is not stopped.
     fn flies(&self) -> bool {
-        self.cockpit.is_some() && !self.frozen
+        self.pilot_host.is_some() && !self.frozen
     }
 
-    fn answer(&mut self, down: &DownlinkView<'_>, desk: &mut Desk) {
-        let Some(cockpit) = self.cockpit.as_mut().filter(|_| !self.frozen) else { return };
-        let said = cockpit.step(down, desk, &mut self.slot, &mut self.stats);
+    fn answer(&mut self, down: &DownlinkView<'_>, desk: &mut StepScratch) {
+        let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
+        let said = pilot_host.step(down, desk, &mut self.slot, &mut self.stats);
         self.frames.clear();
         self.frames.extend(said.iter().map(Message::encode));
     }
 }
 
 /// Does to a pilot what the process runtime does to a process; `make` makes a new one.
-fn carry_out(order: ProcessOrder, seats: &mut [Seat], make: impl Fn(DroneId, u32) -> Cockpit) {
+fn carry_out(order: ProcessCommand, handles: &mut [DroneHandle], make: impl Fn(DroneId, u32) -> PilotHost) {
     match order {
-        ProcessOrder::Kill(id) => {
-            let seat = &mut seats[id.index()];
-            (seat.cockpit, seat.frozen) = (None, false);
+        ProcessCommand::Kill(id) => {
+            let seat = &mut handles[id.index()];
+            (seat.pilot_host, seat.frozen) = (None, false);
         }
-        ProcessOrder::Freeze(id) => seats[id.index()].frozen = true,
-        ProcessOrder::Resume(id) => seats[id.index()].frozen = false,
-        ProcessOrder::Restart(id, incarnation) => {
-            seats[id.index()].cockpit = Some(make(id, incarnation));
+        ProcessCommand::Freeze(id) => handles[id.index()].frozen = true,
+        ProcessCommand::Resume(id) => handles[id.index()].frozen = false,
+        ProcessCommand::Restart(id, incarnation) => {
+            handles[id.index()].pilot_host = Some(make(id, incarnation));
         }
     }
 }

@@ -3,7 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`mission`] | from a scenario to world, pilots and radios |
-//! | [`cockpit`] | what both runtimes put around a pilot: radio, queue, tally |
+//! | [`pilot_host`] | what both runtimes put around a pilot: radio, queue, tally |
 //! | [`beacon`] | the trivial pilot, to measure the runtime with |
 //! | [`inline`] | all in one thread |
 //! | [`supervisor`] | starts a process for the world and one for each drone, and looks after them |
@@ -13,13 +13,13 @@
 pub mod beacon;
 mod children;
 pub mod clock;
-pub mod cockpit;
 pub mod drone_process;
-mod ear;
 mod error;
 pub mod inline;
 pub mod mission;
+pub mod pilot_host;
 mod plan;
+mod radio_receiver;
 pub mod supervisor;
 pub mod world_process;
 

@@ -1,7 +1,7 @@
 //! From a scenario to what flies it: the world, the drones' parameters, their cockpits. Both runtimes start here.
 
 use crate::beacon::BeaconPilot;
-use crate::cockpit::Cockpit;
+use crate::pilot_host::PilotHost;
 use crate::{RuntimeError, plan};
 use skein_agent::danger::Braking;
 use skein_agent::guidance::GuidanceParams;
@@ -121,11 +121,11 @@ fn planner(scenario: &Scenario) -> PlannerParams {
     let (drone, avoidance) = (&scenario.drone, &scenario.avoidance);
     PlannerParams {
         strategy: match scenario.strategy {
-            StrategyKey::CongestionAware => Strategy::Rehearsed(Objective {
+            StrategyKey::CongestionAware => Strategy::LookAhead(Objective {
                 energy_per_kj: scenario.objective.energy_per_kj,
                 time_per_s: scenario.objective.time_per_s,
             }),
-            StrategyKey::CongestionAwarePaper => Strategy::CongestionAware,
+            StrategyKey::CongestionAwarePaper => Strategy::PaperRule,
             StrategyKey::ShortestPath => Strategy::ShortestPath,
             StrategyKey::Fixed { left, right } => Strategy::Fixed { left: left as usize, right: right as usize },
         },
@@ -170,13 +170,13 @@ impl PilotKind {
 }
 
 /// Makes the drones of a swarm, or of a process, which share what is the same for all.
-pub struct Yard<'s> {
+pub struct DroneFactory<'s> {
     scenario: &'s Scenario,
     kind: PilotKind,
     radio: Arc<Radio>,
 }
 
-impl<'s> Yard<'s> {
+impl<'s> DroneFactory<'s> {
     /// Makes drones with pilots of this kind.
     #[must_use]
     pub fn new(scenario: &'s Scenario, kind: PilotKind) -> Self {
@@ -185,12 +185,12 @@ impl<'s> Yard<'s> {
 
     /// One drone, ready for the tick that begins at `start`.
     #[must_use]
-    pub fn cockpit(&self, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
+    pub fn pilot_host(&self, me: DroneId, incarnation: u32, start: SimTime) -> PilotHost {
         let pilot: Box<dyn Pilot> = match self.kind {
             PilotKind::Swarm => Box::new(SwarmPilot::new(pilot_params(self.scenario, me, incarnation, start))),
             PilotKind::Beacon => Box::new(BeaconPilot::new(me, incarnation, self.beacon_ticks())),
         };
-        Cockpit::new(me, self.scenario.time.dt_s, Arc::clone(&self.radio), pilot)
+        PilotHost::new(me, self.scenario.time.dt_s, Arc::clone(&self.radio), pilot)
     }
 
     fn beacon_ticks(&self) -> u64 {
@@ -200,6 +200,6 @@ impl<'s> Yard<'s> {
 
 /// One drone with the paper's pilot, ready for the tick that begins at `start`.
 #[must_use]
-pub fn cockpit(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> Cockpit {
-    Yard::new(scenario, PilotKind::Swarm).cockpit(me, incarnation, start)
+pub fn pilot_host(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotHost {
+    DroneFactory::new(scenario, PilotKind::Swarm).pilot_host(me, incarnation, start)
 }

@@ -2,7 +2,7 @@
 
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Fault as Keys, FaultEvent, FaultKind, FaultTarget, Scenario, Sensor};
-use skein_world::faults::{Effect, Event, Fault, FaultPlan, Noise, When, Whom, Wind};
+use skein_world::faults::{Effect, Fault, FaultPlan, FaultTrigger, Noise, When, Whom, Wind};
 
 /// How long a gust lasts unless the scenario says, s.
 const GUST_S: f64 = 1.0;
@@ -53,14 +53,14 @@ fn effect(keys: &Keys, drones: u32) -> Effect {
 fn when(keys: &Keys) -> When {
     let Some(event) = keys.on else { return When::At(keys.at_s.unwrap_or(0.0)) };
     let event = match event {
-        FaultEvent::Detected => Event::Detected,
-        FaultEvent::Grouped => Event::Grouped,
-        FaultEvent::Queued => Event::Queued,
-        FaultEvent::Gate => Event::Gate,
-        FaultEvent::Passed => Event::Passed,
-        FaultEvent::Reforming => Event::Reforming,
-        FaultEvent::LeaderElected => Event::LeaderElected,
-        FaultEvent::GroupLeaderElected => Event::GroupLeaderElected,
+        FaultEvent::Detected => FaultTrigger::Detected,
+        FaultEvent::Grouped => FaultTrigger::Grouped,
+        FaultEvent::Queued => FaultTrigger::Queued,
+        FaultEvent::Gate => FaultTrigger::Gate,
+        FaultEvent::Passed => FaultTrigger::Passed,
+        FaultEvent::Reforming => FaultTrigger::Reforming,
+        FaultEvent::LeaderElected => FaultTrigger::LeaderElected,
+        FaultEvent::GroupLeaderElected => FaultTrigger::GroupLeaderElected,
     };
     When::On { event, stage: keys.stage as usize, after_s: keys.after_s }
 }

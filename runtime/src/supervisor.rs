@@ -2,12 +2,12 @@
 //! after them until the last one has ended.
 
 use crate::children::{Children, Role};
-use crate::drone_process::{Crew, scenario_path};
+use crate::drone_process::{DroneRange, scenario_path};
 use crate::world_process::DISMISSED;
 use crate::{Clock, PilotKind, RunEnd, RuntimeError, mission};
 use skein_bus::{
-    Control, ControlSpec, Domain, Order, OrderKind, PinMode, RecordSubscriber, Services, WaitMode, WorldState,
-    allowed_cores, clean_dead_nodes, raise_file_limit,
+    Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, WaitMode,
+    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
 };
 use skein_protocol::record::{RecordSink, RecordView};
 use skein_protocol::{DroneId, Tick};
@@ -119,8 +119,8 @@ impl Supervisor<'_, '_, '_> {
         let (drones_u32, step) = (drones as u32, self.launch.per_process.max(1));
         for first in (0..drones_u32).step_by(step as usize) {
             let count = step.min(drones_u32 - first);
-            let crew = Crew { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
-            self.children.spawn(Role::Drones(crew), self.launch.clock)?;
+            let range = DroneRange { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
+            self.children.spawn(Role::Drones(range), self.launch.clock)?;
         }
         let limit = Instant::now() + START_LIMIT + START_LIMIT_PER_DRONE * drones as u32;
         let mut ready = 0;
@@ -203,7 +203,7 @@ impl Supervisor<'_, '_, '_> {
     fn reap(&mut self) {
         for (role, how) in self.children.wait_any(LOOK) {
             match role {
-                Role::Drones(crew) => crew.ids().for_each(|id| self.control.mark_dead(id.index())),
+                Role::Drones(range) => range.ids().for_each(|id| self.control.mark_dead(id.index())),
                 Role::World => self.world_ended = Some(how),
             }
         }
@@ -212,18 +212,18 @@ impl Supervisor<'_, '_, '_> {
     /// What the world asks for in a tick. The reply to a restart is the new incarnation, to all else 1; 0 if there is no
     /// such process.
     fn carry_out_orders(&mut self) {
-        let Some(Order { kind, drone, tick }) = self.control.next_order(Duration::ZERO) else { return };
+        let Some(ProcessRequest { kind, drone, tick }) = self.control.next_order(Duration::ZERO) else { return };
         let reply = match kind {
-            OrderKind::Kill => u32::from(self.kill(drone)),
-            OrderKind::Freeze => {
+            RequestKind::Kill => u32::from(self.kill(drone)),
+            RequestKind::Freeze => {
                 self.control.freeze(drone.index());
                 u32::from(self.children.freeze_drone(drone))
             }
-            OrderKind::Resume => {
+            RequestKind::Resume => {
                 self.control.set_resume_from(drone.index(), tick);
                 u32::from(self.children.resume_drone(drone))
             }
-            OrderKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
+            RequestKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
                 tracing::error!(%error, "drone {drone} was not started again");
                 0
             }),
@@ -233,7 +233,7 @@ impl Supervisor<'_, '_, '_> {
 
     fn kill(&mut self, drone: DroneId) -> bool {
         let killed = self.children.kill_drone(drone);
-        killed.into_iter().flat_map(|crew| crew.ids()).for_each(|id| self.control.mark_dead(id.index()));
+        killed.into_iter().flat_map(|range| range.ids()).for_each(|id| self.control.mark_dead(id.index()));
         killed.is_some()
     }
 
@@ -245,8 +245,8 @@ impl Supervisor<'_, '_, '_> {
         // Its predecessor still has its places in the services.
         clean_dead_nodes(self.domain)?;
         self.control.revive(drone, first_tick);
-        let crew = Crew { first: id, count: 1, incarnation, first_tick };
-        self.children.spawn(Role::Drones(crew), self.launch.clock)?;
+        let range = DroneRange { first: id, count: 1, incarnation, first_tick };
+        self.children.spawn(Role::Drones(range), self.launch.clock)?;
         let limit = Instant::now() + START_LIMIT;
         while self.control.ready(drone) != Some(incarnation) {
             self.reap();

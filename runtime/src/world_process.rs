@@ -3,14 +3,15 @@
 use crate::drone_process::ChildArgs;
 use crate::{Clock, RuntimeError, clock::Pacer, mission};
 use skein_bus::{
-    Answer, Control, Domain, DownlinkPublisher, Order, OrderKind, Patience, RecordPolicy, RecordPublisher,
-    SHARD_DRONES, Services, UplinkSubscriber, WatchPublisher, WorldState, pin_to_core, raise_file_limit, shards,
+    Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind,
+    SHARD_DRONES, Services, TickOutcome, UplinkSubscriber, WatchPublisher, WorldState, pin_to_core, raise_file_limit,
+    shards,
 };
 use skein_protocol::DroneId;
 use skein_protocol::record::{FaultKind, RecordHead, RecordView};
 use skein_protocol::slot::LinkStats;
 use skein_world::World;
-use skein_world::faults::ProcessOrder;
+use skein_world::faults::ProcessCommand;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -43,43 +44,43 @@ pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
         Clock::Lockstep => RecordPolicy::Wait(Box::new(|| true)),
         Clock::Realtime { .. } => RecordPolicy::Drop,
     };
-    let mut air = Air {
+    let mut server = WorldServer {
         down: services.downlink_publisher()?,
         up: (0..shards(drones)).map(|shard| services.uplink_subscriber(shard)).collect::<Result<_, _>>()?,
         record: services.record_publisher(policy)?,
         watch: services.watch_publisher()?,
         control,
         world: mission::world(&scenario)?,
-        answers: vec![Answer::Pending; drones],
+        answers: vec![TickOutcome::Pending; drones],
         taken: vec![0; drones],
         due: vec![0; drones],
         lost: 0,
         untold: Vec::new(),
         wall_clock: clock != Clock::Lockstep,
     };
-    air.control.set_world_state(WorldState::Ready);
-    if air.control.wait_go(|| true) {
-        air.control.set_world_state(WorldState::Flying);
-        air.connect()?;
-        air.fly(clock, scenario.time.dt_s)?;
+    server.control.set_world_state(WorldState::Ready);
+    if server.control.wait_go(|| true) {
+        server.control.set_world_state(WorldState::Flying);
+        server.connect()?;
+        server.fly(clock, scenario.time.dt_s)?;
     }
-    air.control.set_world_state(WorldState::Finished);
+    server.control.set_world_state(WorldState::Finished);
     // A publisher takes its last samples with it: wait until the launcher has read them. This process dies with it.
-    while air.control.stop_requested() != Some(DISMISSED) {
+    while server.control.stop_requested() != Some(DISMISSED) {
         std::thread::sleep(DISMISSAL_LOOK);
     }
     Ok(())
 }
 
 /// The world and its ports.
-struct Air {
+struct WorldServer {
     down: DownlinkPublisher,
     up: Vec<UplinkSubscriber>,
     record: RecordPublisher,
     watch: WatchPublisher,
     control: Arc<Control>,
     world: World,
-    answers: Vec<Answer>,
+    answers: Vec<TickOutcome>,
     /// Frames taken from each drone so far, and frames it has announced.
     taken: Vec<u64>,
     due: Vec<u64>,
@@ -90,7 +91,7 @@ struct Air {
     wall_clock: bool,
 }
 
-impl Air {
+impl WorldServer {
     /// Joins all ports now rather than in the midst of the first tick.
     fn connect(&self) -> Result<(), RuntimeError> {
         self.down.connect()?;
@@ -146,29 +147,29 @@ impl Air {
     }
 
     /// Has the supervisor do what the tick's faults do to processes, and waits until it is done.
-    fn carry_out(&mut self, order: ProcessOrder) -> Result<(), RuntimeError> {
+    fn carry_out(&mut self, order: ProcessCommand) -> Result<(), RuntimeError> {
         let (kind, id) = match order {
-            ProcessOrder::Kill(id) => (OrderKind::Kill, id),
-            ProcessOrder::Freeze(id) => (OrderKind::Freeze, id),
-            ProcessOrder::Resume(id) => (OrderKind::Resume, id),
-            ProcessOrder::Restart(id, _) => (OrderKind::Restart, id),
+            ProcessCommand::Kill(id) => (RequestKind::Kill, id),
+            ProcessCommand::Freeze(id) => (RequestKind::Freeze, id),
+            ProcessCommand::Resume(id) => (RequestKind::Resume, id),
+            ProcessCommand::Restart(id, _) => (RequestKind::Restart, id),
         };
-        let limit = if kind == OrderKind::Restart { RESTART_LIMIT } else { ORDER_LIMIT };
-        let reply = self.control.give_order(Order { kind, drone: id, tick: self.world.tick() }, limit)?;
+        let limit = if kind == RequestKind::Restart { RESTART_LIMIT } else { ORDER_LIMIT };
+        let reply = self.control.give_order(ProcessRequest { kind, drone: id, tick: self.world.tick() }, limit)?;
         let drone = id.index();
         match order {
             // Whoever is gone already is as dead as can be.
-            ProcessOrder::Kill(_) => self.answers[drone] = Answer::Dead,
-            ProcessOrder::Freeze(_) => self.answers[drone] = Answer::Absent,
+            ProcessCommand::Kill(_) => self.answers[drone] = TickOutcome::Dead,
+            ProcessCommand::Freeze(_) => self.answers[drone] = TickOutcome::Absent,
             // Gone meanwhile: it is found dead in this tick.
-            ProcessOrder::Resume(_) => self.answers[drone] = Answer::Pending,
-            ProcessOrder::Restart(_, incarnation) => {
+            ProcessCommand::Resume(_) => self.answers[drone] = TickOutcome::Pending,
+            ProcessCommand::Restart(_, incarnation) => {
                 if reply != incarnation {
                     let what =
                         format!("drone {id} was not started again: expected incarnation {incarnation}, got {reply}");
                     return Err(RuntimeError::Process(what));
                 }
-                self.answers[drone] = Answer::Pending;
+                self.answers[drone] = TickOutcome::Pending;
                 (self.taken[drone], self.due[drone]) = (0, 0);
                 self.connect()?;
             }
@@ -181,21 +182,21 @@ impl Air {
         for drone in 0..self.answers.len() {
             let id = DroneId(drone as u32);
             match self.answers[drone] {
-                Answer::Done => {
+                TickOutcome::Done => {
                     let slot = self.control.slot(drone);
                     self.due[drone] = slot.frames_total;
                     self.world.take_slot(id, &slot);
                 }
-                Answer::Late => self.world.hold(id),
-                Answer::Dead => self.mark_dead(drone),
-                Answer::Hung => {
-                    let order = Order { kind: OrderKind::Kill, drone: id, tick: self.world.tick() };
+                TickOutcome::Late => self.world.hold(id),
+                TickOutcome::Dead => self.mark_dead(drone),
+                TickOutcome::Hung => {
+                    let order = ProcessRequest { kind: RequestKind::Kill, drone: id, tick: self.world.tick() };
                     self.control.give_order(order, ORDER_LIMIT)?;
                     self.world.mark_dead(id, FaultKind::Hung, false, "it did not answer for 5 s and was killed");
                 }
                 // Stopped, and killed by somebody else meanwhile.
-                Answer::Absent if self.control.is_dead(drone) => self.mark_dead(drone),
-                Answer::Pending | Answer::Absent => {}
+                TickOutcome::Absent if self.control.is_dead(drone) => self.mark_dead(drone),
+                TickOutcome::Pending | TickOutcome::Absent => {}
             }
         }
         Ok(())
@@ -208,7 +209,7 @@ impl Air {
     /// Drains each shard of just what its drones have announced: every further call would look through all of them. Of
     /// a late drone, whatever is there: its buffer must not fill up.
     fn take_frames(&mut self) -> Result<(), RuntimeError> {
-        let late = self.answers.contains(&Answer::Late);
+        let late = self.answers.contains(&TickOutcome::Late);
         for (shard, port) in self.up.iter().enumerate() {
             let first = shard * SHARD_DRONES;
             let drones = first..(first + SHARD_DRONES).min(self.due.len());

@@ -5,8 +5,8 @@ use skein_protocol::frame::Frame;
 use skein_protocol::record::{FaultKind, Outcome};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::cockpit::Desk;
 use skein_runtime::mission;
+use skein_runtime::pilot_host::StepScratch;
 use skein_scenario::{Scenario, Source};
 use skein_world::World;
 
@@ -20,15 +20,15 @@ fn scenario(name: &str) -> Scenario {
 fn fly(scenario: &Scenario, dead: DroneId, at: u64) -> World {
     let mut world = mission::world(scenario).unwrap();
     let mut cockpits: Vec<_> =
-        (0..scenario.formation.drones).map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
-    let (mut desk, mut stats) = (Desk::default(), LinkStats::default());
+        (0..scenario.formation.drones).map(|id| mission::pilot_host(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
+    let (mut desk, mut stats) = (StepScratch::default(), LinkStats::default());
     while world.ended().is_none() {
         let tick = world.tick();
         let down = world.downlink().view();
         let mut answers: Vec<(DroneId, Slot, Vec<Frame>)> = Vec::new();
-        for (cockpit, id) in cockpits.iter_mut().zip(0..).filter(|(_, id)| tick < at || DroneId(*id) != dead) {
+        for (pilot_host, id) in cockpits.iter_mut().zip(0..).filter(|(_, id)| tick < at || DroneId(*id) != dead) {
             let mut slot = Slot::default();
-            let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+            let said = pilot_host.step(&down, &mut desk, &mut slot, &mut stats);
             let frames = said.iter().map(Message::encode).collect();
             answers.push((DroneId(id), slot, frames));
         }

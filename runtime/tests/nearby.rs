@@ -6,10 +6,10 @@ use skein_protocol::downlink::{Downlink, SenseHead, Senses};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::Leadership;
-use skein_protocol::radio::{Air, Radio, Range, Rule};
+use skein_protocol::radio::{ChannelModel, Radio, Range, Rule};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::cockpit::{Cockpit, Desk};
+use skein_runtime::pilot_host::{PilotHost, StepScratch};
 
 /// Does nothing.
 struct Idle;
@@ -46,9 +46,9 @@ fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
 }
 
 fn hear(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
-    let mut cockpit = Cockpit::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
+    let mut pilot_host = PilotHost::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
-    cockpit.step(&down.view(), &mut Desk::default(), &mut slot, &mut stats);
+    pilot_host.step(&down.view(), &mut StepScratch::default(), &mut slot, &mut stats);
     (slot, stats)
 }
 
@@ -61,9 +61,9 @@ proptest! {
         loss in 0.0..0.5,
     ) {
         let short = Range { half_m: 80.0, shadowing_db: 0.0, exponent: 2.0 };
-        let air = Air { loss, range: Some(short), ..Air::default() };
-        let leading = Rule { topics: Some([Topic::Leadership].into()), air: Air { range: None, ..air }, ..Rule::default() };
-        let base = Rule { to: Some([DroneId(far)].into()), air: Air { range: None, ..air }, ..Rule::default() };
+        let air = ChannelModel { loss, range: Some(short), ..ChannelModel::default() };
+        let leading = Rule { topics: Some([Topic::Leadership].into()), air: ChannelModel { range: None, ..air }, ..Rule::default() };
+        let base = Rule { to: Some([DroneId(far)].into()), air: ChannelModel { range: None, ..air }, ..Rule::default() };
         let radio = Radio { seed: 7, air, rules: vec![leading, base], ..Radio::default() };
         let plain = downlink(&points);
         let mut sorted = plain.clone();

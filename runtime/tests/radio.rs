@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use skein_protocol::SimTime;
-use skein_protocol::radio::{DROP_REASONS, DropReason, Radio, Verdict};
-use skein_protocol::record::{Happening, RecordSink, RecordView, RunEvent, Totals};
+use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio};
+use skein_protocol::record::{EventKind, RecordSink, RecordView, RunEvent, Totals};
 use skein_runtime::{inline, mission};
 use skein_scenario::{Scenario, Source};
 
@@ -18,8 +18,8 @@ fn scenario(sets: &[(&str, &str)]) -> Scenario {
 struct Lookup {
     radio: Radio,
     dt_ns: i64,
-    verdicts: Vec<Verdict>,
-    last_tick: Vec<Verdict>,
+    verdicts: Vec<Delivery>,
+    last_tick: Vec<Delivery>,
     /// When the last tick opened.
     opened: SimTime,
     totals: Option<Totals>,
@@ -29,13 +29,13 @@ impl RecordSink for Lookup {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
         let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line);
         for event in record.parse_events(parse).map_err(|error| error.to_string())? {
-            if let Happening::End { totals, .. } = event.what {
+            if let EventKind::End { totals, .. } = event.what {
                 self.totals = Some(*totals);
                 return Ok(());
             }
         }
         self.verdicts.append(&mut self.last_tick);
-        self.last_tick = self.radio.fates(record, self.dt_ns).map(|(_, _, verdict)| verdict).collect();
+        self.last_tick = self.radio.deliveries(record, self.dt_ns).map(|(_, _, verdict)| verdict).collect();
         self.opened = SimTime(record.head.tick as i64 * self.dt_ns);
         Ok(())
     }
@@ -54,8 +54,8 @@ fn fly(sets: &[(&str, &str)]) -> Totals {
     let (mut delivered, mut duplicates) = (0, 0);
     for verdict in lookup.verdicts {
         match verdict {
-            Verdict::Drop(reason) => dropped[reason as usize] += 1,
-            Verdict::Deliver { due, again } => {
+            Delivery::Drop(reason) => dropped[reason as usize] += 1,
+            Delivery::Deliver { due, again } => {
                 delivered += u64::from(due <= by);
                 duplicates += u64::from(again.is_some_and(|again| again <= by));
             }

@@ -5,8 +5,8 @@ use skein_protocol::frame::Frame;
 use skein_protocol::record::Outcome;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::cockpit::Desk;
 use skein_runtime::mission;
+use skein_runtime::pilot_host::StepScratch;
 use skein_scenario::{Scenario, Source};
 use skein_world::World;
 
@@ -28,14 +28,14 @@ fn fly(name: &str, lambda: &str) -> u64 {
 fn to_the_end(scenario: &Scenario) -> World {
     let mut world = mission::world(scenario).unwrap();
     let ids = 0..scenario.formation.drones;
-    let mut cockpits: Vec<_> = ids.map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
-    let (mut desk, mut stats) = (Desk::default(), LinkStats::default());
+    let mut cockpits: Vec<_> = ids.map(|id| mission::pilot_host(scenario, DroneId(id), 1, SimTime::ZERO)).collect();
+    let (mut desk, mut stats) = (StepScratch::default(), LinkStats::default());
     while world.ended().is_none() {
         let down = world.downlink().view();
         let mut answers: Vec<(Slot, Vec<Frame>)> = Vec::new();
-        for cockpit in &mut cockpits {
+        for pilot_host in &mut cockpits {
             let mut slot = Slot::default();
-            let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+            let said = pilot_host.step(&down, &mut desk, &mut slot, &mut stats);
             let frames = said.iter().map(Message::encode).collect();
             answers.push((slot, frames));
         }

@@ -1,7 +1,7 @@
 //! A leader that rehearses: what it foresees is what happens, and what it chooses is no worse than what it left.
 #![allow(clippy::unwrap_used)]
 
-use skein_protocol::record::{Happening, Outcome, RecordSink, RecordView, RunEvent};
+use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, RunEvent};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, Source};
 use std::collections::BTreeMap;
@@ -32,14 +32,14 @@ impl RecordSink for Watch {
         let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line).map_err(|error| error.to_string());
         for event in record.parse_events(parse)? {
             match event.what {
-                Happening::Grouping { predicted_s: Some(predicted_s), .. } => {
+                EventKind::Grouping { predicted_s: Some(predicted_s), .. } => {
                     self.plans.push((event.t_s, predicted_s));
                 }
-                Happening::Assigned { drone, group, route: Some(_), .. } => {
+                EventKind::Assigned { drone, group, route: Some(_), .. } => {
                     self.groups.insert(drone.0, group.to_string());
                 }
-                Happening::Passed { .. } => self.passed_s = event.t_s,
-                Happening::End { outcome, .. } => (self.outcome, self.end_s) = (Some(outcome), event.t_s),
+                EventKind::Passed { .. } => self.passed_s = event.t_s,
+                EventKind::End { outcome, .. } => (self.outcome, self.end_s) = (Some(outcome), event.t_s),
                 _ => {}
             }
         }

@@ -4,8 +4,8 @@
 
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::cockpit::{Cockpit, Desk};
 use skein_runtime::mission;
+use skein_runtime::pilot_host::{PilotHost, StepScratch};
 use skein_scenario::{Scenario, Source};
 use skein_world::World;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -52,8 +52,8 @@ fn scenario(drones: u32, more: &str) -> Scenario {
 
 struct Swarm {
     world: World,
-    cockpits: Vec<Cockpit>,
-    desk: Desk,
+    cockpits: Vec<PilotHost>,
+    desk: StepScratch,
     slots: Vec<Slot>,
     stats: LinkStats,
 }
@@ -63,8 +63,8 @@ impl Swarm {
         let ids = 0..scenario.formation.drones;
         Self {
             world: mission::world(scenario).unwrap(),
-            cockpits: ids.map(|id| mission::cockpit(scenario, DroneId(id), 1, SimTime::ZERO)).collect(),
-            desk: Desk::default(),
+            cockpits: ids.map(|id| mission::pilot_host(scenario, DroneId(id), 1, SimTime::ZERO)).collect(),
+            desk: StepScratch::default(),
             slots: vec![Slot::default(); scenario.formation.drones as usize],
             stats: LinkStats::default(),
         }
@@ -81,9 +81,9 @@ impl Swarm {
         // The test's own copy.
         let down = down.clone();
         let mut said = Vec::with_capacity(self.cockpits.len());
-        for (cockpit, slot) in self.cockpits.iter_mut().zip(&mut self.slots) {
+        for (pilot_host, slot) in self.cockpits.iter_mut().zip(&mut self.slots) {
             let before = COUNT.get();
-            let words = cockpit.step(&down.view(), &mut self.desk, slot, &mut self.stats);
+            let words = pilot_host.step(&down.view(), &mut self.desk, slot, &mut self.stats);
             count(0, before);
             // As the wire does it.
             said.push(words.iter().map(Message::encode).collect::<Vec<_>>());

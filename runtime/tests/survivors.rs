@@ -1,7 +1,7 @@
 //! Whatever goes wrong, those who still fly keep their distances and get there.
 #![allow(clippy::unwrap_used)]
 
-use skein_protocol::record::{Happening, Outcome, RecordSink, RecordView};
+use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, Source};
 
@@ -16,7 +16,7 @@ impl RecordSink for Ending {
             .parse_events(|line| serde_json::from_slice(line))
             .map_err(|error: serde_json::Error| error.to_string())?
         {
-            if let Happening::End { outcome, reason, .. } = event.what {
+            if let EventKind::End { outcome, reason, .. } = event.what {
                 self.0 = Some((outcome, reason));
             }
         }

@@ -3,7 +3,7 @@
 use crate::faults::{Fault, FaultEvent, FaultKind};
 use crate::keys::Scenario;
 use crate::rules::Broken;
-use skein_protocol::sides::MAX_PARTITIONS;
+use skein_protocol::link_faults::MAX_PARTITIONS;
 use std::collections::BTreeSet;
 
 /// All broken rules of a scenario's faults.

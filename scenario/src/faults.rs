@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use skein_protocol::GroupId;
 use skein_protocol::ids::GROUP_DEPTH;
-use skein_protocol::sides::MAX_SIDES;
+use skein_protocol::link_faults::MAX_SIDES;
 use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;

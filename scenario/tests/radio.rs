@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_protocol::message::Topic;
-use skein_protocol::radio::{Air, Burst, Channel, Delay, DelayModel, Link, Radio, Range, Scope};
+use skein_protocol::radio::{Burst, ChannelModel, Delay, DelayModel, Link, Radio, Range, Scope, SharedChannel};
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Preset, Scenario, Source};
 
@@ -30,7 +30,7 @@ fn every_key_gets_to_the_radio() {
          burst = { share = 0.2, length_s = 0.3, loss = 0.9, scope = \"link\" }",
         &[],
     );
-    let air = Air {
+    let air = ChannelModel {
         delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.02 },
         loss: 0.1,
         burst: Some(Burst { share: 0.2, length_s: 0.3, loss: 0.9, scope: Scope::Link }),
@@ -38,7 +38,7 @@ fn every_key_gets_to_the_radio() {
         duplicate: 0.05,
     };
     assert_eq!(s.radio(), Radio { seed: 7, air, asymmetry: 0.5, rules: Vec::new() });
-    assert_eq!(s.channel(), Some(Channel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
+    assert_eq!(s.channel(), Some(SharedChannel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
 }
 
 #[test]

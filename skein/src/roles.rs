@@ -3,7 +3,7 @@
 use crate::cli::{self, DroneArgs, WorldArgs};
 use crate::exit::{Exit, Failure};
 use skein_protocol::DroneId;
-use skein_runtime::drone_process::{self, ChildArgs, Crew};
+use skein_runtime::drone_process::{self, ChildArgs, DroneRange};
 use skein_runtime::world_process;
 
 /// Runs the world.
@@ -15,7 +15,7 @@ pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
 /// Runs one drone.
 pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
     let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
-    let crew = Crew { first: DroneId(id), count, incarnation, first_tick };
+    let crew = DroneRange { first: DroneId(id), count, incarnation, first_tick };
     let run = drone_process::run(&child(&args.child), crew, args.pilot.into());
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
 }

@@ -3,7 +3,7 @@
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_AVOID, PHASE_CRUISE, Plan};
-use skein_protocol::record::Happening;
+use skein_protocol::record::EventKind;
 use skein_protocol::slot::{SLOT_LEADS, Slot};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
 use std::collections::BTreeSet;
@@ -56,7 +56,7 @@ impl Decisions {
         }
         for (term, leads) in [(before, false), (leads, true)] {
             if let Some((group, ballot)) = term {
-                log.push(at, Happening::Leader { group: group.to_string(), ballot, leader: drone, leads });
+                log.push(at, EventKind::Leader { group: group.to_string(), ballot, leader: drone, leads });
             }
         }
     }
@@ -89,13 +89,13 @@ impl Decisions {
     }
 }
 
-fn grouping(plan: &Plan) -> Happening {
+fn grouping(plan: &Plan) -> EventKind {
     let phase = match plan.phase {
         PHASE_CRUISE => "cruise",
         PHASE_AVOID => "avoid",
         _ => "reform",
     };
-    Happening::Grouping {
+    EventKind::Grouping {
         plan: plan.id,
         group: plan.group.to_string(),
         phase: phase.to_owned(),
@@ -106,8 +106,8 @@ fn grouping(plan: &Plan) -> Happening {
     }
 }
 
-fn assigned(part: &Assignment) -> Happening {
-    Happening::Assigned {
+fn assigned(part: &Assignment) -> EventKind {
+    EventKind::Assigned {
         plan: part.id,
         drone: part.drone,
         group: part.group.to_string(),
@@ -178,7 +178,7 @@ mod tests {
         }))
     }
 
-    fn told(frames: &[AirFrame]) -> Vec<Happening> {
+    fn told(frames: &[AirFrame]) -> Vec<EventKind> {
         let (mut decisions, mut log) = (Decisions::new(8), Log::default());
         frames.iter().for_each(|frame| decisions.follow_frame(frame, SimTime::ZERO, &mut log));
         happenings(read(&mut log))
@@ -197,12 +197,12 @@ mod tests {
             assignment(second, 5, NO_ROUTE),
         ]);
         assert_eq!(events.len(), 4);
-        let Happening::Assigned { route: Some(1), rank: 3, group, .. } = &events[0] else { panic!("{:?}", events[0]) };
+        let EventKind::Assigned { route: Some(1), rank: 3, group, .. } = &events[0] else { panic!("{:?}", events[0]) };
         assert_eq!(group, "N1");
-        let Happening::Grouping { phase, obstacles, predicted_s, .. } = &events[1] else { panic!("{:?}", events[1]) };
+        let EventKind::Grouping { phase, obstacles, predicted_s, .. } = &events[1] else { panic!("{:?}", events[1]) };
         assert_eq!((phase.as_str(), &obstacles[..], *predicted_s), ("avoid", &[ObstacleId(4)][..], Some(28.5)));
-        assert!(matches!(&events[2], Happening::Grouping { phase, predicted_s: None, .. } if phase == "reform"));
-        assert!(matches!(events[3], Happening::Assigned { route: None, .. }));
+        assert!(matches!(&events[2], EventKind::Grouping { phase, predicted_s: None, .. } if phase == "reform"));
+        assert!(matches!(events[3], EventKind::Assigned { route: None, .. }));
     }
 
     #[test]
@@ -222,7 +222,7 @@ mod tests {
         for slot in [leads, next_plan, next_term, Slot::default()] {
             decisions.follow_slot(DroneId(2), &slot, SimTime::ZERO, &mut log);
         }
-        let event = |round, leads| Happening::Leader {
+        let event = |round, leads| EventKind::Leader {
             group: "N".into(),
             ballot: stamp(round, 1).ballot,
             leader: DroneId(2),

@@ -93,7 +93,7 @@ pub enum When {
     /// After an event.
     On {
         /// Which.
-        event: Event,
+        event: FaultTrigger,
         /// Of which obstacle set, from 0, in flight order; of elections, which one, from 0.
         stage: usize,
         /// How long after it, s.
@@ -103,7 +103,7 @@ pub enum When {
 
 /// What a fault waits for: seen by the world at the beginning of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
+pub enum FaultTrigger {
     /// A living drone senses the obstacle set for the first time.
     Detected,
     /// A drone obeys a plan to avoid the set: one that it did not obey when the set was detected.
@@ -145,7 +145,7 @@ pub enum Whom {
 
 /// What a runtime has to do to a drone's process before the tick goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ProcessOrder {
+pub enum ProcessCommand {
     /// Kill it.
     Kill(DroneId),
     /// Stop it: it hears and answers nothing until it is resumed.

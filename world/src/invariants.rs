@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::grid::closest_pair_squared;
 use crate::log::Log;
 use crate::senses::Surroundings;
-use skein_protocol::record::{Happening, ViolationKind};
+use skein_protocol::record::{EventKind, ViolationKind};
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
 use std::collections::BTreeMap;
@@ -139,7 +139,7 @@ impl Obedience {
 }
 
 fn violation(kind: ViolationKind, drones: &[DroneId], value_m: f64, at: SimTime, log: &mut Log) {
-    log.push(at, Happening::Violation { kind, drones: drones.to_vec(), value_m });
+    log.push(at, EventKind::Violation { kind, drones: drones.to_vec(), value_m });
 }
 
 #[cfg(test)]
@@ -154,7 +154,7 @@ mod tests {
     const REACH: Reach = Reach { bodies_m: 100.0, detection_m: 0.0, clearance_m: 100.0 };
 
     /// The violations of bodies that stand at these positions in turn.
-    fn violations(steps: &[&[[f64; 2]]]) -> (Distances, Vec<Vec<Happening>>) {
+    fn violations(steps: &[&[[f64; 2]]]) -> (Distances, Vec<Vec<EventKind>>) {
         let outline = Outline::new(&rectangle(0.0, 0.0, 10.0, 10.0));
         let mut distances = Distances::new(&bodies(steps[0]), 33.0, 15.0);
         let (mut around, mut log) = (Surroundings::default(), Log::default());
@@ -167,8 +167,8 @@ mod tests {
         (distances, told)
     }
 
-    fn of(kind: ViolationKind, drones: &[u32], value_m: f64) -> Vec<Happening> {
-        vec![Happening::Violation { kind, drones: drones.iter().map(|&d| DroneId(d)).collect(), value_m }]
+    fn of(kind: ViolationKind, drones: &[u32], value_m: f64) -> Vec<EventKind> {
+        vec![EventKind::Violation { kind, drones: drones.iter().map(|&d| DroneId(d)).collect(), value_m }]
     }
 
     #[test]

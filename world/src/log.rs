@@ -1,7 +1,7 @@
 //! Events as JSON lines, in reused memory.
 
 use skein_protocol::SimTime;
-use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::record::{EventKind, RunEvent};
 
 /// Gathers a tick's events, then tells them while those of the next are gathered.
 #[derive(Clone, Debug, Default)]
@@ -12,7 +12,7 @@ pub(crate) struct Log {
 
 impl Log {
     /// Adds an event.
-    pub fn push(&mut self, at: SimTime, what: Happening) {
+    pub fn push(&mut self, at: SimTime, what: EventKind) {
         serde_json::to_writer(&mut self.gathered, &RunEvent { t_s: at.secs(), what })
             .expect("an event's keys are strings, and a Vec takes every write");
         self.gathered.push(b'\n');
@@ -44,10 +44,10 @@ pub(crate) mod tests {
     #[test]
     fn events_are_told_once_and_in_order() {
         let mut log = Log::default();
-        log.push(SimTime::from_secs(1.5), Happening::Passed { stage: 0 });
-        log.push(SimTime::from_secs(1.5), Happening::Passed { stage: 1 });
+        log.push(SimTime::from_secs(1.5), EventKind::Passed { stage: 0 });
+        log.push(SimTime::from_secs(1.5), EventKind::Passed { stage: 1 });
         let told = read(&mut log);
-        assert_eq!(told[1], RunEvent { t_s: 1.5, what: Happening::Passed { stage: 1 } });
+        assert_eq!(told[1], RunEvent { t_s: 1.5, what: EventKind::Passed { stage: 1 } });
         assert_eq!(told.len(), 2);
         assert_eq!(read(&mut log), []);
     }

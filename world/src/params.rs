@@ -4,7 +4,7 @@ use crate::faults::FaultPlan;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::Channel;
+use skein_protocol::radio::SharedChannel;
 use skein_protocol::shape::ShapeError;
 use thiserror::Error;
 
@@ -60,7 +60,7 @@ pub struct WorldParams {
     /// Neighbours within this distance are sensed, m; `None`: no ranging.
     pub ranging_m: Option<f64>,
     /// The channel that all drones share; `None`: its bandwidth is no limit.
-    pub channel: Option<Channel>,
+    pub channel: Option<SharedChannel>,
     /// Which frames are heard in a neighbourhood alone: they are sorted for their receivers.
     pub locality: Locality,
     /// What a drone does whose process is gone.
@@ -152,7 +152,7 @@ mod tests {
     fn bad_parameters_are_named() {
         assert_eq!(params().check(), Ok(()));
         assert_eq!(WorldParams { dt_ns: 0, ..params() }.check(), Err(WorldError::Tick(0)));
-        let channel = Some(Channel { seed: 1, rate_bps: 0.0, limit_s: 1.0 });
+        let channel = Some(SharedChannel { seed: 1, rate_bps: 0.0, limit_s: 1.0 });
         assert_eq!(WorldParams { channel, ..params() }.check(), Err(WorldError::Rate(0.0)));
         let error = WorldParams { clearance_m: -1.0, ..params() }.check().unwrap_err();
         assert_eq!(error.to_string(), "clearance_m is -1, expected a number of at least 0");

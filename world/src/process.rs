@@ -2,8 +2,8 @@
 
 use crate::body::Body;
 use crate::invariants::Obedience;
+use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED};
-use skein_protocol::sides::Cuts;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
 
 /// How a drone has answered in the current tick.
@@ -68,7 +68,7 @@ impl Process {
     }
 
     /// The drone at the end of a tick. Of a dead one's answers only what it obeyed is left.
-    pub fn row(&self, body: &Body, cuts: Cuts) -> DroneRow {
+    pub fn row(&self, body: &Body, cuts: LinkFaults) -> DroneRow {
         let (slot, alive) = (&self.slot, u32::from(body.alive));
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let flags = flag(slot.flags & SLOT_LEADS != 0, ROW_LEADS)

@@ -6,8 +6,8 @@ use crate::grid::Neighbours;
 use skein_protocol::downlink::{
     BROKEN_OBSTACLES, BROKEN_RANGING, Downlink, SenseHead, SensedNeighbour, SensedObstacle, SensedShape,
 };
+use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::sides::Cuts;
 use skein_protocol::{DroneId, ObstacleId, Vec2};
 
 /// An obstacle that a living drone senses.
@@ -72,9 +72,9 @@ impl Surroundings {
 
 /// What a drone is told differently from the truth.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Hindrance {
+pub(crate) struct SensorFault {
     /// Its radio.
-    pub cuts: Cuts,
+    pub cuts: LinkFaults,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
     /// It senses no obstacles.
@@ -87,7 +87,7 @@ pub(crate) struct Hindrance {
     pub velocity_error_mps: Vec2,
 }
 
-impl Hindrance {
+impl SensorFault {
     /// What the drone's sensors say of themselves. One that it does not have is not broken.
     fn broken(&self, ranging: bool) -> u32 {
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
@@ -97,13 +97,13 @@ impl Hindrance {
 
 /// Writes senses into a downlink, each sensed shape once.
 #[derive(Clone, Debug)]
-pub(crate) struct Teller {
+pub(crate) struct SenseWriter {
     shapes: Vec<ConvexShape>,
     /// Place of each shape in the downlink; `u32::MAX`: not yet there.
     places: Vec<u32>,
 }
 
-impl Teller {
+impl SenseWriter {
     /// For these obstacles.
     pub fn new(shapes: &[ConvexShape]) -> Self {
         Self { shapes: shapes.to_vec(), places: vec![u32::MAX; shapes.len()] }
@@ -113,7 +113,7 @@ impl Teller {
     pub fn tell(
         &mut self,
         bodies: &[Body],
-        drones: impl Iterator<Item = (u32, Hindrance)>,
+        drones: impl Iterator<Item = (u32, SensorFault)>,
         around: &Surroundings,
         ranging_m: Option<f64>,
         down: &mut Downlink,
@@ -124,26 +124,26 @@ impl Teller {
         down.shapes.clear();
         self.places.fill(u32::MAX);
         let mut contacts = around.contacts.iter().peekable();
-        for ((drone, body), (incarnation, hindrance)) in bodies.iter().enumerate().zip(drones) {
+        for ((drone, body), (incarnation, sensor_fault)) in bodies.iter().enumerate().zip(drones) {
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
-                self.tell_contact(contact, hindrance.position_error_m, down);
+                self.tell_contact(contact, sensor_fault.position_error_m, down);
             }
-            if let (true, Some(range)) = (body.alive && !hindrance.no_ranging, ranging_m) {
+            if let (true, Some(range)) = (body.alive && !sensor_fault.no_ranging, ranging_m) {
                 tell_neighbours(body, bodies, around.neighbours.of(drone), range, down);
             }
             down.drones.push(SenseHead {
-                position_m: (body.position + hindrance.position_error_m).into(),
-                velocity_mps: (body.velocity + hindrance.velocity_error_mps).into(),
+                position_m: (body.position + sensor_fault.position_error_m).into(),
+                velocity_mps: (body.velocity + sensor_fault.velocity_error_mps).into(),
                 obstacle_first,
                 obstacle_count: down.obstacles.len() as u32 - obstacle_first,
                 neighbour_first,
                 neighbour_count: down.neighbours.len() as u32 - neighbour_first,
                 alive: u32::from(body.alive),
                 incarnation,
-                cuts: hindrance.cuts,
-                extra_reaction_s: hindrance.extra_reaction_s,
-                broken: hindrance.broken(ranging_m.is_some()),
+                cuts: sensor_fault.cuts,
+                extra_reaction_s: sensor_fault.extra_reaction_s,
+                broken: sensor_fault.broken(ranging_m.is_some()),
                 reserved: 0,
             });
         }
@@ -188,15 +188,15 @@ mod tests {
     const REACH: Reach = Reach { bodies_m: 66.0, detection_m: 90.0, clearance_m: 15.0 };
 
     fn told(bodies: &[Body], shapes: &[ConvexShape], ranging_m: Option<f64>) -> Downlink {
-        told_to(bodies, shapes, ranging_m, Hindrance::default())
+        told_to(bodies, shapes, ranging_m, SensorFault::default())
     }
 
-    fn told_to(bodies: &[Body], shapes: &[ConvexShape], ranging_m: Option<f64>, hindrance: Hindrance) -> Downlink {
+    fn told_to(bodies: &[Body], shapes: &[ConvexShape], ranging_m: Option<f64>, sensor_fault: SensorFault) -> Downlink {
         let outlines: Vec<Outline> = shapes.iter().map(Outline::new).collect();
         let (mut around, mut down) = (Surroundings::default(), Downlink::default());
         around.survey(bodies, &outlines, REACH);
-        let drones = std::iter::repeat((1, hindrance));
-        Teller::new(shapes).tell(bodies, drones, &around, ranging_m, &mut down);
+        let drones = std::iter::repeat((1, sensor_fault));
+        SenseWriter::new(shapes).tell(bodies, drones, &around, ranging_m, &mut down);
         down.seal(0, SimTime::ZERO);
         down
     }
@@ -229,9 +229,9 @@ mod tests {
     #[test]
     fn an_error_of_ones_own_position_leaves_what_is_ranged_right() {
         let (position_error_m, velocity_error_mps) = (Vec2::new(3.0, -1.0), Vec2::new(0.5, 0.0));
-        let hindrance = Hindrance { position_error_m, velocity_error_mps, ..Hindrance::default() };
+        let sensor_fault = SensorFault { position_error_m, velocity_error_mps, ..SensorFault::default() };
         let all = bodies(&[[0.0, 0.0], [50.0, 0.0]]);
-        let down = told_to(&all, &[rectangle(80.0, 0.0, 10.0, 10.0)], Some(66.0), hindrance);
+        let down = told_to(&all, &[rectangle(80.0, 0.0, 10.0, 10.0)], Some(66.0), sensor_fault);
         let senses = down.view().senses(DroneId(0)).unwrap();
         assert_eq!((senses.position, senses.velocity), (position_error_m, velocity_error_mps));
         assert_eq!((senses.obstacles[0].nearest_m, senses.obstacles[0].distance_m), ([73.0, -1.0], 70.0));
@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn ranging_can_be_off() {
-        let blind = Hindrance { no_ranging: true, ..Hindrance::default() };
+        let blind = SensorFault { no_ranging: true, ..SensorFault::default() };
         let down = told_to(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), blind);
         assert!(down.neighbours.is_empty());
         assert_eq!(down.view().senses(DroneId(1)).unwrap().broken, BROKEN_RANGING);

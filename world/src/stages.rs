@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::geometry::Outline;
 use crate::log::Log;
 use crate::senses::Contact;
-use skein_protocol::record::Happening;
+use skein_protocol::record::EventKind;
 use skein_protocol::{DroneId, ObstacleId, SimTime};
 
 /// Obstacles that overlap in flight direction, or nearly.
@@ -84,7 +84,7 @@ impl Stages {
         for contact in contacts {
             let number = self.set_of[contact.obstacle as usize];
             if !std::mem::replace(&mut self.stages[number].detected, true) {
-                let what = Happening::Detected {
+                let what = EventKind::Detected {
                     stage: number as u32,
                     drone: DroneId(contact.drone),
                     obstacle: ObstacleId(contact.obstacle),
@@ -102,7 +102,7 @@ impl Stages {
         for (number, stage) in self.stages.iter_mut().enumerate() {
             if !stage.passed && last >= stage.centre_x_m {
                 stage.passed = true;
-                log.push(end, Happening::Passed { stage: number as u32 });
+                log.push(end, EventKind::Passed { stage: number as u32 });
             }
         }
     }
@@ -154,7 +154,7 @@ mod tests {
         let (mut stages, mut log) = (forest(), Log::default());
         stages.detect(&[contact(3, 0), contact(4, 1)], SimTime(5), &mut log);
         stages.detect(&[contact(0, 1), contact(0, 2)], SimTime(6), &mut log);
-        let detected = |stage, drone, obstacle| Happening::Detected {
+        let detected = |stage, drone, obstacle| EventKind::Detected {
             stage,
             drone: DroneId(drone),
             obstacle: ObstacleId(obstacle),
@@ -172,7 +172,7 @@ mod tests {
         all[1].alive = false;
         stages.pass(&all, SimTime(2), &mut log);
         stages.pass(&all, SimTime(3), &mut log);
-        assert_eq!(happenings(read(&mut log)), [Happening::Passed { stage: 0 }]);
+        assert_eq!(happenings(read(&mut log)), [EventKind::Passed { stage: 0 }]);
         assert!(!stages.all_passed());
         all[0].alive = false;
         all[0].position.x = 700.0;

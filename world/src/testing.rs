@@ -6,7 +6,7 @@ use crate::params::{End, Failsafe, WorldParams};
 use crate::world::World;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
-use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::record::{EventKind, RunEvent};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, Vec2};
@@ -61,7 +61,7 @@ pub(crate) fn events(world: &World) -> Vec<RunEvent> {
 }
 
 /// The events themselves, without their times.
-pub(crate) fn happenings(events: Vec<RunEvent>) -> Vec<Happening> {
+pub(crate) fn happenings(events: Vec<RunEvent>) -> Vec<EventKind> {
     events.into_iter().map(|event| event.what).collect()
 }
 

@@ -24,12 +24,12 @@ pub(crate) fn tally(counted: &mut Totals, slot: &Slot) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_protocol::record::Spread;
+    use skein_protocol::record::Percentiles;
 
     #[test]
     fn nothing_counted_has_no_spread() {
         let totals = close(&Totals::default(), &LinkStats::default(), 0.02, 1.5);
-        assert_eq!((totals.delay_s, totals.wall_s), (Spread::default(), 1.5));
+        assert_eq!((totals.delay_s, totals.wall_s), (Percentiles::default(), 1.5));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use crate::body::Body;
 use crate::decisions::Decisions;
-use crate::faults::ProcessOrder;
+use crate::faults::ProcessCommand;
 use crate::faults::engine::Engine;
 use crate::finish::Finish;
 use crate::geometry::Outline;
@@ -14,7 +14,7 @@ use crate::invariants::Distances;
 use crate::log::Log;
 use crate::params::{WorldError, WorldParams};
 use crate::process::{Answer, Process};
-use crate::senses::{Reach, Surroundings, Teller};
+use crate::senses::{Reach, SenseWriter, Surroundings};
 use crate::stages::Stages;
 use crate::totals;
 use skein_protocol::digest::Digest;
@@ -22,7 +22,7 @@ use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DropReason, Queue};
-use skein_protocol::record::{DroneRow, FaultKind, Happening, Outcome, RecordHead, RecordView, Spread, Totals};
+use skein_protocol::record::{DroneRow, EventKind, FaultKind, Outcome, Percentiles, RecordHead, RecordView, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
@@ -40,13 +40,13 @@ pub struct World {
     processes: Vec<Process>,
     outlines: Vec<Outline>,
     around: Surroundings,
-    teller: Teller,
+    teller: SenseWriter,
     distances: Distances,
     stages: Stages,
     decisions: Decisions,
     faults: Engine,
     /// What the tick's faults do to processes.
-    orders: Vec<ProcessOrder>,
+    orders: Vec<ProcessCommand>,
     /// Whether the current tick is open.
     open: bool,
     finish: Finish,
@@ -80,7 +80,7 @@ impl World {
             tick: 0,
             processes: vec![Process::default(); bodies.len()],
             around: Surroundings::default(),
-            teller: Teller::new(obstacles),
+            teller: SenseWriter::new(obstacles),
             distances: Distances::new(&bodies, params.safe_distance_m, params.clearance_m),
             stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
             decisions: Decisions::new(bodies.len()),
@@ -122,7 +122,7 @@ impl World {
     pub fn downlink(&mut self) -> &Downlink {
         self.open();
         let (tick, faults) = (self.tick, &self.faults);
-        let told = |(process, id): (&Process, u32)| (process.incarnation, faults.hindrance(DroneId(id), tick));
+        let told = |(process, id): (&Process, u32)| (process.incarnation, faults.sensor_fault(DroneId(id), tick));
         let drones = self.processes.iter().zip(0..).map(told);
         self.teller.tell(&self.bodies, drones, &self.around, self.params.ranging_m, &mut self.down);
         // In a queue for the channel frames lose their order, by which a drone counts its own.
@@ -175,7 +175,7 @@ impl World {
         body.alive = false;
         self.processes[id.index()].frozen = false;
         self.decisions.forget(id);
-        self.log.push(now, Happening::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
+        self.log.push(now, EventKind::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
     }
 
     /// The incarnation of a drone's process, from 1, as its senses tell it. A new one may begin with an older plan.
@@ -236,7 +236,7 @@ impl World {
         self.abort("the mission was stopped");
         let Some((outcome, reason)) = self.end.clone() else { return };
         let totals = Box::new(totals::close(&self.totals, stats, self.params.dt_s(), wall_s));
-        self.log.push(self.now(), Happening::End { outcome, reason, totals });
+        self.log.push(self.now(), EventKind::End { outcome, reason, totals });
         self.log.turn();
         self.rows.clear();
         let events_len = self.log.told().len() as u32;
@@ -244,7 +244,7 @@ impl World {
     }
 
     /// How late ticks opened by the wall clock: for [`World::finish`].
-    pub fn note_lateness(&mut self, lateness_s: Spread) {
+    pub fn note_lateness(&mut self, lateness_s: Percentiles) {
         self.totals.lateness_s = lateness_s;
     }
 

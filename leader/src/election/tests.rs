@@ -9,7 +9,10 @@ fn at(seconds: f64) -> SimTime {
 
 /// One that doubts the air no more.
 fn machine(id: u32) -> Election {
-    Election { rhythm: Rhythm::new(SimTime::ZERO), ..Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO) }
+    Election {
+        adaptive_timeout: AdaptiveTimeout::new(SimTime::ZERO),
+        ..Election::new(DroneId(id), 1, PARAMS, SimTime::ZERO)
+    }
 }
 
 fn ballot(round: u32, claimant: u32) -> Ballot {

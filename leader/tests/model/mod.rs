@@ -335,7 +335,7 @@ impl Model for Mission {
                 (1..=2).all(|number| led.contains(&GroupId::ALL.child(number)))
             }),
             Property::sometimes("all fly in formation again", |_, s: &State| {
-                let part = |l: &Leading| l.ledger.obeyed().is_some_and(|orders| orders.plan.phase == PHASE_REFORM);
+                let part = |l: &Leading| l.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM);
                 let all = s.processes.iter().all(|p| p.machine.as_ref().is_some_and(|l| part(l)));
                 all && s.sides().iter().all(|side| discord(side).is_none())
             }),

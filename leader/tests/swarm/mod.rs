@@ -57,7 +57,7 @@ pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTim
             wait_s: p.wait_s,
         },
         planner: PlannerParams {
-            strategy: Strategy::CongestionAware,
+            strategy: Strategy::PaperRule,
             speed_mps: SPEED_MPS,
             headway_s: 4.0,
             routes: RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 },
@@ -86,10 +86,10 @@ pub fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
 pub fn step(leading: &mut Leading, now: SimTime, own: &Own, me: DroneId, say: &mut Vec<Message>) {
     leading.elect(now, own, say);
     if leading.election.leads() {
-        leading.muster(now, own);
-        let mut orders = leading.decide(now, &[], say);
-        if !orders.is_empty() {
-            leading.adopt(now, orders.swap_remove(0));
+        leading.refresh_members(now, own);
+        let mut bundle = leading.decide(now, &[], say);
+        if !bundle.is_empty() {
+            leading.adopt(now, bundle.swap_remove(0));
         }
     }
     for set in leading.ledger.sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m()) {
@@ -139,9 +139,9 @@ impl Watch {
         if stamp.ballot > term {
             return Err(Breach::NotOfTheTerm { drone, term, stamp });
         }
-        let Some(orders) = leading.ledger.obeyed() else { return Ok(()) };
-        let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&orders.plan)));
-        let parts = orders.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(part))));
+        let Some(bundle) = leading.ledger.obeyed() else { return Ok(()) };
+        let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&bundle.plan)));
+        let parts = bundle.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(part))));
         for (of, value) in std::iter::once(plan).chain(parts) {
             if *self.parts.entry((stamp, of)).or_insert(value) != value {
                 return Err(Breach::TwoPlans { drone, of, stamp });
@@ -182,7 +182,7 @@ pub fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
     let all: Vec<_> = drones.iter().map(terms).collect();
     let (_, ballot, _, stamp) = *all.first()?;
     let one = all.iter().all(|(_, other, _, plan)| (*other, *plan) == (ballot, stamp));
-    let members = drones[0].1.ledger.obeyed().map_or(0, |orders| orders.plan.members as usize);
+    let members = drones[0].1.ledger.obeyed().map_or(0, |bundle| bundle.plan.members as usize);
     (!one || members != drones.len() || stamp.ballot != ballot)
         .then(|| format!("{} drones, a plan for {members}, terms {all:?}", drones.len()))
 }

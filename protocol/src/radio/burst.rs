@@ -1,7 +1,7 @@
 //! Losses that come together: Gilbert and Elliott's two states in continuous time, without a memory.
 
 use super::Link;
-use super::key::Draws;
+use super::key::KeyedRng;
 use crate::ids::DroneId;
 use crate::time::SimTime;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ impl Burst {
         }
         let block_ns = SimTime::from_secs(self.block_s()).0.max(1);
         let (block, mut left_s) = (at.0.div_euclid(block_ns), SimTime(at.0.rem_euclid(block_ns)).secs());
-        let mut draws = Draws::of_pair(seed, self.pair(link), block, b"brst");
+        let mut draws = KeyedRng::of_pair(seed, self.pair(link), block, b"brst");
         let (burst_s, quiet_s) = self.means_s();
         let mut rages = draws.unit() < self.share;
         loop {

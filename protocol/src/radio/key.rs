@@ -9,9 +9,9 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 const TRIES: usize = 64;
 
 /// Numbers of one key, in their order.
-pub(super) struct Draws(u64);
+pub(super) struct KeyedRng(u64);
 
-impl Draws {
+impl KeyedRng {
     /// For one frame at one receiver; `purpose` keeps its draws apart from each other.
     pub fn of_frame(seed: u64, link: Link, purpose: &[u8; 4]) -> Self {
         let mut key = [0; 20];

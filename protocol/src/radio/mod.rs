@@ -2,16 +2,16 @@
 //! shared generator or memory, so that it does not matter which process asks first, and that any verdict can be looked up
 //! afterwards. `docs/radio.md` has the models with their formulas.
 
-mod air;
 mod burst;
-mod channel;
+mod channel_model;
 mod key;
 mod rule;
+mod shared_channel;
 
-pub use air::{Air, Delay, DelayModel, Range};
 pub use burst::{BLOCK_BURSTS, Burst, Scope};
-pub use channel::{Channel, NEVER_AIRED, Queue};
+pub use channel_model::{ChannelModel, Delay, DelayModel, Range};
 pub use rule::Rule;
+pub use shared_channel::{NEVER_AIRED, Queue, SharedChannel};
 
 use crate::Vec2;
 use crate::frame::AirFrame;
@@ -20,7 +20,7 @@ use crate::message::Topic;
 use crate::nearby::Locality;
 use crate::record::RecordView;
 use crate::time::SimTime;
-use key::Draws;
+use key::KeyedRng;
 use serde::{Deserialize, Serialize};
 
 /// Number of [`DropReason`]s.
@@ -59,7 +59,7 @@ pub struct Radio {
     /// Key of all verdicts.
     pub seed: u64,
     /// What the air does where no rule says otherwise.
-    pub air: Air,
+    pub air: ChannelModel,
     /// How different the directions of a link are, from 0: one has its delay and its loss multiplied, the other
     /// divided, by a factor drawn for each pair of drones, log-uniformly from 1 to 1 + this.
     pub asymmetry: f64,
@@ -67,12 +67,12 @@ pub struct Radio {
     pub rules: Vec<Rule>,
 }
 
-/// In [`AirsAt::places`]: the air where no rule says otherwise.
+/// In [`TransmitTimes::places`]: the air where no rule says otherwise.
 const GENERAL: u16 = u16::MAX;
 
 /// What air each topic goes through to one receiver: rules are looked up once, not for every frame.
 #[derive(Clone, Copy, Debug)]
-pub struct AirsAt {
+pub struct TransmitTimes {
     receiver: DroneId,
     /// A rule's place; `None`: it depends on who sends.
     places: [Option<u16>; Topic::ALL.len()],
@@ -107,7 +107,7 @@ impl Link {
 
 /// What becomes of a frame at one receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Delivery {
     /// Not heard.
     Drop(DropReason),
     /// Heard.
@@ -122,47 +122,47 @@ pub enum Verdict {
 impl Radio {
     /// What becomes of a frame that went on the air at `aired` and flew over `path` (from sender to receiver, m).
     #[must_use]
-    pub fn verdict(&self, link: Link, path: Vec2, aired: SimTime) -> Verdict {
+    pub fn verdict(&self, link: Link, path: Vec2, aired: SimTime) -> Delivery {
         self.verdict_in(self.air_of(link), link, path, aired)
     }
 
-    fn verdict_in(&self, air: &Air, link: Link, path: Vec2, aired: SimTime) -> Verdict {
-        let chance = |purpose| Draws::of_frame(self.seed, link, purpose).unit();
+    fn verdict_in(&self, air: &ChannelModel, link: Link, path: Vec2, aired: SimTime) -> Delivery {
+        let chance = |purpose| KeyedRng::of_frame(self.seed, link, purpose).unit();
         if let Some(range) = air.range {
             let heard = range.heard(path.norm_squared());
             if heard < 1.0 && chance(b"rnge") >= heard {
-                return Verdict::Drop(DropReason::Range);
+                return Delivery::Drop(DropReason::Range);
             }
         }
         if let Some(burst) = air.burst
             && burst.rages(self.seed, link, aired)
             && chance(b"lstb") < burst.loss
         {
-            return Verdict::Drop(DropReason::Burst);
+            return Delivery::Drop(DropReason::Burst);
         }
         let factor = self.factor(link);
         if air.loss > 0.0 && chance(b"loss") < air.loss * factor {
-            return Verdict::Drop(DropReason::Loss);
+            return Delivery::Drop(DropReason::Loss);
         }
-        let arrival = |purpose| aired.after(factor * air.delay.draw(|| Draws::of_frame(self.seed, link, purpose)));
+        let arrival = |purpose| aired.after(factor * air.delay.draw(|| KeyedRng::of_frame(self.seed, link, purpose)));
         let due = arrival(b"dely");
         if air.duplicate > 0.0 && chance(b"dupl") < air.duplicate {
             let copy = arrival(b"copy");
-            return Verdict::Deliver { due: due.min(copy), again: Some(due.max(copy)) };
+            return Delivery::Deliver { due: due.min(copy), again: Some(due.max(copy)) };
         }
-        Verdict::Deliver { due, again: None }
+        Delivery::Deliver { due, again: None }
     }
 
     /// What becomes of a frame, as the world stamped it, at a receiver that is `here` (m) one tick after it was sent.
     #[must_use]
-    pub fn fate(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Verdict {
+    pub fn delivery(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, receiver);
         self.fate_in(self.air_of(link), frame, (link, here), dt_ns)
     }
 
     /// The same for a receiver whose airs were looked up beforehand.
     #[must_use]
-    pub fn fate_at(&self, airs: &AirsAt, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Verdict {
+    pub fn delivery_at(&self, airs: &TransmitTimes, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, airs.receiver);
         let place = airs.places.get(usize::from(link.topic).wrapping_sub(1)).copied().flatten();
         let known = place.and_then(|place| match place {
@@ -172,9 +172,9 @@ impl Radio {
         self.fate_in(known.unwrap_or_else(|| self.air_of(link)), frame, (link, here), dt_ns)
     }
 
-    fn fate_in(&self, air: &Air, frame: &AirFrame, (link, here): (Link, Vec2), dt_ns: i64) -> Verdict {
+    fn fate_in(&self, air: &ChannelModel, frame: &AirFrame, (link, here): (Link, Vec2), dt_ns: i64) -> Delivery {
         if frame.queue_ns == NEVER_AIRED {
-            return Verdict::Drop(DropReason::Queue);
+            return Delivery::Drop(DropReason::Queue);
         }
         let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
         let aired = sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX);
@@ -183,26 +183,26 @@ impl Radio {
 
     /// What air each topic goes through to a receiver, where that is the same for all senders.
     #[must_use]
-    pub fn airs_at(&self, receiver: DroneId) -> AirsAt {
+    pub fn airs_at(&self, receiver: DroneId) -> TransmitTimes {
         let at = |rule: &Rule, topic| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
         let place = |topic| {
             let Some(last) = self.rules.iter().rposition(|rule| at(rule, topic)) else { return Some(GENERAL) };
             u16::try_from(last).ok().filter(|&place| place != GENERAL && self.rules[last].from.is_none())
         };
-        AirsAt { receiver, places: Topic::ALL.map(place) }
+        TransmitTimes { receiver, places: Topic::ALL.map(place) }
     }
 
     /// Looks up what became of every frame in a tick's record, at every other drone that was alive at the tick's end.
     /// What is dropped for other reasons than the radio's (a partition, a deaf receiver) is not known here.
-    pub fn fates<'a>(
+    pub fn deliveries<'a>(
         &'a self,
         record: RecordView<'a>,
         dt_ns: i64,
-    ) -> impl Iterator<Item = (&'a AirFrame, DroneId, Verdict)> + 'a {
+    ) -> impl Iterator<Item = (&'a AirFrame, DroneId, Delivery)> + 'a {
         let receivers = (0u32..).map(DroneId).zip(record.rows).filter(|(_, row)| row.alive());
         receivers.flat_map(move |(receiver, row)| {
             let others = record.frames.iter().filter(move |frame| frame.source != receiver);
-            others.map(move |frame| (frame, receiver, self.fate(frame, receiver, row.position_m.into(), dt_ns)))
+            others.map(move |frame| (frame, receiver, self.delivery(frame, receiver, row.position_m.into(), dt_ns)))
         })
     }
 
@@ -233,7 +233,7 @@ impl Radio {
         reach_m.max(self.air.reach_m())
     }
 
-    fn air_of(&self, link: Link) -> &Air {
+    fn air_of(&self, link: Link) -> &ChannelModel {
         self.rules.iter().rev().find(|rule| rule.covers(link)).map_or(&self.air, |rule| &rule.air)
     }
 
@@ -244,7 +244,7 @@ impl Radio {
             return 1.0;
         }
         let (low, high) = (link.source.min(link.destination), link.source.max(link.destination));
-        let part = 2.0 * Draws::of_pair(self.seed, [low, high], 0, b"asym").unit() - 1.0;
+        let part = 2.0 * KeyedRng::of_pair(self.seed, [low, high], 0, b"asym").unit() - 1.0;
         let part = if link.source == low { part } else { -part };
         libm::pow(1.0 + self.asymmetry, part)
     }

@@ -1,6 +1,6 @@
 //! Another air for some topics, some senders, some receivers.
 
-use super::{Air, Link};
+use super::{ChannelModel, Link};
 use crate::ids::DroneId;
 use crate::message::Topic;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct Rule {
     /// At these receivers; `None`: at all.
     pub to: Option<BTreeSet<DroneId>>,
     /// What the air does to them.
-    pub air: Air,
+    pub air: ChannelModel,
 }
 
 impl Rule {

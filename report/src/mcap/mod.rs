@@ -29,7 +29,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use skein_protocol::SimTime;
-use skein_protocol::record::{Happening, RecordView, RunEvent};
+use skein_protocol::record::{EventKind, RecordView, RunEvent};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -198,8 +198,8 @@ impl McapWriter {
         let file = String::new();
         self.put(To::Log, at, &Log { timestamp: at.into(), level, message, name, file, line: 0 })?;
         let topic = match event.what {
-            Happening::Leader { .. } => To::Leadership,
-            Happening::Grouping { .. } | Happening::Assigned { .. } => To::Groups,
+            EventKind::Leader { .. } => To::Leadership,
+            EventKind::Grouping { .. } | EventKind::Assigned { .. } => To::Groups,
             _ => To::Events,
         };
         self.put(topic, at, &timeless(event))
@@ -220,8 +220,8 @@ impl McapWriter {
 /// The run's last event tells how long it took on the wall: no part of a recording.
 fn timeless(event: &RunEvent) -> Cow<'_, RunEvent> {
     let mut event = Cow::Borrowed(event);
-    if matches!(event.what, Happening::End { .. })
-        && let Happening::End { totals, .. } = &mut event.to_mut().what
+    if matches!(event.what, EventKind::End { .. })
+        && let EventKind::End { totals, .. } = &mut event.to_mut().what
     {
         totals.wall_s = 0.0;
     }

@@ -32,8 +32,8 @@ fn record(folder: &Path, wall: u32) -> PathBuf {
 fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
     let totals = Totals { wall_s: f64::from(wall), ..Totals::default() };
     let what = match tick {
-        40 => Happening::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: "asked".into() },
-        99 => Happening::End { outcome: Outcome::Reached, reason: "there".into(), totals: Box::new(totals) },
+        40 => EventKind::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: "asked".into() },
+        99 => EventKind::End { outcome: Outcome::Reached, reason: "there".into(), totals: Box::new(totals) },
         _ => return Vec::new(),
     };
     vec![RunEvent { t_s: (tick + 1) as f64 * 0.02, what }]
@@ -101,7 +101,7 @@ fn a_recording_reads_back_even_cut_short() {
     };
     let (times, events) = look();
     assert_eq!((times.len(), times[0], times[19]), (20, 0.1, 2.0));
-    assert!(matches!(events[0].what, Happening::Fault { target: DroneId(2), .. }));
+    assert!(matches!(events[0].what, EventKind::Fault { target: DroneId(2), .. }));
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
     assert_eq!(look().0.len(), 20);

@@ -12,7 +12,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use serde::Serialize;
 use serde_json::json;
-use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::record::{EventKind, RunEvent};
 use std::io::Write;
 
 /// Most numbers of drones and samples in a page: beyond, samples are left out evenly.
@@ -40,7 +40,7 @@ pub fn sample_line(sample: &Sample) -> String {
 /// An event and what it means in words; `None` for a drone's part in a plan, of which there are too many to read.
 #[must_use]
 pub fn event_line(event: &RunEvent) -> Option<String> {
-    if matches!(event.what, Happening::Assigned { .. }) {
+    if matches!(event.what, EventKind::Assigned { .. }) {
         return None;
     }
     let weight = match words::weight(event) {

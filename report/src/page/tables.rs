@@ -1,7 +1,7 @@
 //! The summary of a run in tables.
 
 use super::escaped;
-use crate::summary::{Spread, Summary};
+use crate::summary::{Percentiles, Summary};
 use crate::text;
 
 /// The outcome's name.
@@ -51,7 +51,7 @@ fn messages(summary: &Summary) -> String {
     table(&[], lines)
 }
 
-fn spread(spread: &Spread) -> String {
+fn spread(spread: &Percentiles) -> String {
     let ms = |value: Option<f64>| value.map_or("unknown".to_owned(), |s| format!("{:.0} ms", s * 1e3));
     format!(
         "mean {}, median {}, 99 % within {}, at most {}",

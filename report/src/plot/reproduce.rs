@@ -29,7 +29,7 @@ struct Seen {
 
 /// How far the swarm is spread in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct Percentiles {
     /// When, s.
     pub t_s: f64,
     /// Extent across the flight direction, m.
@@ -45,7 +45,7 @@ pub struct Snapshots {
     /// Where drones were, m: lower left and upper right corner.
     corners: (Vec2, Vec2),
     /// Of every tick.
-    spreads: Vec<Spread>,
+    spreads: Vec<Percentiles>,
 }
 
 impl Snapshots {
@@ -90,11 +90,11 @@ impl Snapshots {
         let total: f64 = (0..rows.len()).flat_map(pair).sum();
         let pairs = rows.len() * (rows.len() - 1) / 2;
         let distance_m = total / pairs.max(1) as f64;
-        self.spreads.push(Spread { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
+        self.spreads.push(Percentiles { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
     }
 
     /// The ticks between these times, s.
-    pub fn spreads(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Spread> {
+    pub fn spreads(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Percentiles> {
         self.spreads.iter().filter(move |spread| (from_s..=to_s).contains(&spread.t_s))
     }
 
@@ -339,7 +339,7 @@ mod tests {
         let found = Snapshots::read(&folder, &[0.0, 0.5, 9.0]).unwrap();
         assert_eq!(found.moments.iter().map(|moment| moment.0).collect::<Vec<_>>(), [0.02, 1.0, 2.0]);
         assert_eq!((found.groups(0), found.groups(1)), (vec!["N"], vec!["N", "N1"]));
-        let spread = |t_s, m| Spread { t_s, width_m: m, distance_m: m };
+        let spread = |t_s, m| Percentiles { t_s, width_m: m, distance_m: m };
         assert_eq!(found.spreads(0.5, 9.0).copied().collect::<Vec<_>>(), [spread(1.0, 40.0), spread(2.0, 20.0)]);
         let svg = found.draw(&facts(2), "a < b");
         assert_eq!(svg.matches("<g ").count(), 3);

@@ -3,7 +3,7 @@
 use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, text, words};
 use crate::facts::RunFacts;
 use plotters::prelude::*;
-use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::record::{EventKind, RunEvent};
 use std::collections::BTreeMap;
 
 /// Height of a row, and of the bar in it as a share.
@@ -24,7 +24,7 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
     let (mut terms, mut open): (Vec<Term>, BTreeMap<(u32, String), usize>) = Default::default();
     for event in events {
         match &event.what {
-            Happening::Leader { group, leader, leads: true, .. } => {
+            EventKind::Leader { group, leader, leads: true, .. } => {
                 let from = terms.len();
                 let key = (leader.0, group.clone());
                 // A new term of the same leader goes on where the last one was laid down.
@@ -38,12 +38,12 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
                     open.insert(key, from);
                 }
             }
-            Happening::Leader { group, leader, leads: false, .. } => {
+            EventKind::Leader { group, leader, leads: false, .. } => {
                 if let Some(place) = open.remove(&(leader.0, group.clone())) {
                     terms[place].to_s = event.t_s;
                 }
             }
-            Happening::Fault { target, .. } => {
+            EventKind::Fault { target, .. } => {
                 for (_, place) in open.extract_if((target.0, String::new()).., |key, _| key.0 == target.0) {
                     terms[place].to_s = event.t_s;
                 }
@@ -60,7 +60,7 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
     groups.sort_unstable();
     groups.dedup();
     let title = format!("Leadership: {}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
-    let faults: Vec<f64> = events.iter().filter(|e| matches!(e.what, Happening::Fault { .. })).map(|e| e.t_s).collect();
+    let faults: Vec<f64> = events.iter().filter(|e| matches!(e.what, EventKind::Fault { .. })).map(|e| e.t_s).collect();
     let mut signs = vec![(Sign::Block(PALETTE[0]), "leads the group; the leader's number in the bar".to_owned())];
     signs.extend((!faults.is_empty()).then(|| (Sign::Line(RED), "fault".to_owned())));
     let rows = groups.len() as f64;
@@ -98,13 +98,13 @@ mod tests {
 
     fn leads(t_s: f64, leader: u32, round: u32, leads: bool) -> RunEvent {
         let ballot = Ballot { round, incarnation: 1, claimant: DroneId(leader) };
-        RunEvent { t_s, what: Happening::Leader { group: "N".into(), ballot, leader: DroneId(leader), leads } }
+        RunEvent { t_s, what: EventKind::Leader { group: "N".into(), ballot, leader: DroneId(leader), leads } }
     }
 
     #[test]
     fn terms_end_when_laid_down_or_with_a_death_and_renewed_ones_are_one() {
         let kill =
-            Happening::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: String::new() };
+            EventKind::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: String::new() };
         let events = [
             leads(1.0, 2, 1, true),
             leads(2.0, 2, 1, false),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE};
-use skein_protocol::radio::{DropReason, Verdict};
+use skein_protocol::radio::{Delivery, DropReason};
 use skein_protocol::record::DroneRow;
 use skein_protocol::{DroneId, Message, Vec2};
 use std::sync::LazyLock;
@@ -24,9 +24,9 @@ pub(super) fn fate(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows
     if let Some(reason) = row.cuts.cut_off(frame.cuts) {
         return letter(reason);
     }
-    match scene.radio.fate(frame, receiver, Vec2::from(row.position_m), dt_ns) {
-        Verdict::Deliver { .. } => 'h',
-        Verdict::Drop(reason) => letter(reason),
+    match scene.radio.delivery(frame, receiver, Vec2::from(row.position_m), dt_ns) {
+        Delivery::Deliver { .. } => 'h',
+        Delivery::Drop(reason) => letter(reason),
     }
 }
 
@@ -86,7 +86,7 @@ mod tests {
     use crate::testing::row;
     use skein_protocol::SimTime;
     use skein_protocol::payload::Passed;
-    use skein_protocol::radio::{Air, Radio, Range};
+    use skein_protocol::radio::{ChannelModel, Radio, Range};
 
     fn frame(sequence: u32) -> AirFrame {
         let said = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), reserved: 0 };
@@ -109,14 +109,17 @@ mod tests {
     fn a_frame_has_a_fate_at_each_receiver() {
         let rows = [row(0.0, 0.0), row(10.0, 0.0), row(50.0, 0.0), DroneRow::default()];
         let near = scene(Radio {
-            air: Air { range: Some(Range { half_m: 20.0, shadowing_db: 0.0, exponent: 2.0 }), ..Air::default() },
+            air: ChannelModel {
+                range: Some(Range { half_m: 20.0, shadowing_db: 0.0, exponent: 2.0 }),
+                ..ChannelModel::default()
+            },
             ..Radio::default()
         });
         let fates = |scene: &SceneFacts, frame: &AirFrame| -> String {
             (0..4).map(|drone| fate(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
         };
         assert_eq!(fates(&near, &frame(0)), "-hr-");
-        let lossy = scene(Radio { air: Air { loss: 1.0, ..Air::default() }, ..Radio::default() });
+        let lossy = scene(Radio { air: ChannelModel { loss: 1.0, ..ChannelModel::default() }, ..Radio::default() });
         assert_eq!(fates(&lossy, &frame(0)), "-ll-");
         let mut broken = frame(0);
         broken.frame.len = 1;

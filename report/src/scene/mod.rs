@@ -10,5 +10,5 @@ pub mod words;
 
 pub use facts::{SceneFacts, SetOutline};
 pub(crate) use observer::fine;
-pub use observer::{FATES_MAX, Observer};
+pub use observer::{MAX_DELIVERIES, Observer};
 pub use sample::{EnergySample, RadioSample, Sample, SentFrame, State};

@@ -12,7 +12,7 @@ use skein_protocol::{DroneId, SimTime};
 use std::collections::BTreeMap;
 
 /// Up to this many drones every frame is listed, with its fate at every receiver.
-pub const FATES_MAX: usize = 64;
+pub const MAX_DELIVERIES: usize = 64;
 /// Most frames in a sample: beyond, the oldest are left out.
 const FRAMES_MAX: usize = 4096;
 
@@ -34,9 +34,9 @@ impl Observer {
         Self { facts, dt_ns, slots: Slots::default(), radio: RadioSample::default(), receiver: None, last_tick: None }
     }
 
-    /// In a swarm of more than [`FATES_MAX`] drones, lists what this one hears from now on, or nothing.
+    /// In a swarm of more than [`MAX_DELIVERIES`] drones, lists what this one hears from now on, or nothing.
     pub fn listen(&mut self, receiver: Option<DroneId>) {
-        self.receiver = receiver.filter(|_| self.facts.drones as usize > FATES_MAX);
+        self.receiver = receiver.filter(|_| self.facts.drones as usize > MAX_DELIVERIES);
         self.radio.frames.clear();
     }
 
@@ -76,7 +76,7 @@ impl Observer {
                 radio.dropped_by[drone] += count;
             }
         }
-        let listed = self.facts.drones as usize <= FATES_MAX || self.receiver.is_some();
+        let listed = self.facts.drones as usize <= MAX_DELIVERIES || self.receiver.is_some();
         for frame in record.frames {
             let kind = air::kind(frame);
             if listed {

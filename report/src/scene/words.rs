@@ -1,7 +1,7 @@
 //! The run's events in words, for people.
 
 use skein_protocol::DroneId;
-use skein_protocol::record::{Happening, RunEvent};
+use skein_protocol::record::{EventKind, RunEvent};
 
 /// How much an event matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,8 +18,8 @@ pub enum Weight {
 #[must_use]
 pub fn weight(event: &RunEvent) -> Weight {
     match event.what {
-        Happening::Fault { .. } => Weight::Warning,
-        Happening::Violation { .. } => Weight::Error,
+        EventKind::Fault { .. } => Weight::Warning,
+        EventKind::Violation { .. } => Weight::Error,
         _ => Weight::Info,
     }
 }
@@ -28,30 +28,30 @@ pub fn weight(event: &RunEvent) -> Weight {
 #[must_use]
 pub fn line(event: &RunEvent) -> String {
     match &event.what {
-        Happening::Detected { stage, drone, obstacle, distance_m } => {
+        EventKind::Detected { stage, drone, obstacle, distance_m } => {
             format!("drone {drone} senses obstacle {} of set {} at {distance_m:.1} m", obstacle.0, stage + 1)
         }
-        Happening::Passed { stage } => format!("all are past set {}", stage + 1),
-        Happening::Leader { group, ballot, leader, leads } => {
+        EventKind::Passed { stage } => format!("all are past set {}", stage + 1),
+        EventKind::Leader { group, ballot, leader, leads } => {
             let what = if *leads { "leads" } else { "no longer leads" };
             format!("drone {leader} {what} {group} (round {})", ballot.round)
         }
-        Happening::Grouping { plan, group, phase, members, predicted_s, .. } => {
+        EventKind::Grouping { plan, group, phase, members, predicted_s, .. } => {
             let forecast = predicted_s.map_or(String::new(), |s| format!(", forecast {s:.1} s"));
             format!("plan for {group} by drone {}: {phase}, {members} drones{forecast}", plan.ballot.claimant)
         }
-        Happening::Assigned { drone, group, leader, route, rank, .. } => {
+        EventKind::Assigned { drone, group, leader, route, rank, .. } => {
             let route = route.map_or(String::new(), |route| format!(", route {route}, place {rank}"));
             format!("drone {drone} is in {group} under drone {leader}{route}")
         }
-        Happening::Fault { kind, target, detail, .. } => format!("{} of {}: {detail}", name(kind), whom(*target)),
-        Happening::FaultOver { kind, target, detail } => {
+        EventKind::Fault { kind, target, detail, .. } => format!("{} of {}: {detail}", name(kind), whom(*target)),
+        EventKind::FaultOver { kind, target, detail } => {
             format!("{} of {} is over: {detail}", name(kind), whom(*target))
         }
-        Happening::Violation { kind, drones, value_m } => {
+        EventKind::Violation { kind, drones, value_m } => {
             format!("{} broken by drones {}: {value_m:.2}", name(kind), list(drones))
         }
-        Happening::End { outcome, reason, .. } => format!("{}: {reason}", name(outcome)),
+        EventKind::End { outcome, reason, .. } => format!("{}: {reason}", name(outcome)),
     }
 }
 
@@ -76,10 +76,10 @@ mod tests {
     #[test]
     fn events_are_told_and_weighed() {
         let kill =
-            Happening::Fault { kind: FaultKind::Kill, target: DroneId(3), scheduled: true, detail: "signal 9".into() };
+            EventKind::Fault { kind: FaultKind::Kill, target: DroneId(3), scheduled: true, detail: "signal 9".into() };
         let kill = RunEvent { t_s: 1.0, what: kill };
         assert_eq!((line(&kill).as_str(), weight(&kill)), ("kill of drone 3: signal 9", Weight::Warning));
-        let broken = Happening::Violation {
+        let broken = EventKind::Violation {
             kind: ViolationKind::Separation,
             drones: vec![DroneId(1), DroneId(2)],
             value_m: 24.5,

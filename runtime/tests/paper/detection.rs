@@ -2,21 +2,21 @@
 
 use super::flown::{Flown, fly_file, scenario, velocity};
 use skein_agent::danger::Braking;
-use skein_protocol::record::Happening;
+use skein_protocol::record::EventKind;
 use skein_scenario::{Scenario, Source};
 
 #[test]
 fn a1_the_routine_is_flown_in_its_order() {
     let flown = fly_file("paper/s2-right", &[]);
-    let phase = |wanted: &'static str| move |what: &Happening| matches!(what, Happening::Grouping { phase, .. } if phase == wanted);
+    let phase = |wanted: &'static str| move |what: &EventKind| matches!(what, EventKind::Grouping { phase, .. } if phase == wanted);
     let steps = [
-        flown.when(|what| matches!(what, Happening::Leader { leads: true, .. })),
+        flown.when(|what| matches!(what, EventKind::Leader { leads: true, .. })),
         flown.when(phase("cruise")),
         flown.detected_s(0),
         flown.when(phase("avoid")),
         flown.passed_s(0),
         flown.when(phase("reform")),
-        flown.when(|what| matches!(what, Happening::End { .. })),
+        flown.when(|what| matches!(what, EventKind::End { .. })),
     ];
     assert!(steps.is_sorted(), "{steps:?}");
 }
@@ -26,7 +26,7 @@ fn a2_an_obstacle_is_detected_in_the_tick_in_which_it_is_in_range() {
     for (name, range_m) in [("paper/s1-right", 115.0), ("paper/s2-right", 90.0), ("paper/forest", 70.0)] {
         let flown = fly_file(name, &[]);
         let first = flown.events.iter().find_map(|event| match event.what {
-            Happening::Detected { distance_m, .. } => Some(distance_m),
+            EventKind::Detected { distance_m, .. } => Some(distance_m),
             _ => None,
         });
         // At 10 m/s a tick is 0.2 m.

@@ -1,6 +1,6 @@
 //! A mission, flown and remembered.
 
-use skein_protocol::record::{DroneRow, Happening, Outcome, RecordSink, RecordView, RunEvent};
+use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent};
 use skein_protocol::{DroneId, Vec2};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, Source};
@@ -63,29 +63,29 @@ pub fn velocity(row: &DroneRow) -> Vec2 {
 impl Flown {
     pub fn outcome(&self) -> Outcome {
         let end = |event: &RunEvent| match event.what {
-            Happening::End { outcome, .. } => Some(outcome),
+            EventKind::End { outcome, .. } => Some(outcome),
             _ => None,
         };
         self.events.iter().find_map(end).unwrap()
     }
 
     /// Time of the first event of which this is true, s.
-    pub fn when(&self, what: impl Fn(&Happening) -> bool) -> f64 {
+    pub fn when(&self, what: impl Fn(&EventKind) -> bool) -> f64 {
         self.events.iter().find(|event| what(&event.what)).unwrap().t_s
     }
 
     pub fn detected_s(&self, set: u32) -> f64 {
-        self.when(|what| matches!(what, Happening::Detected { stage, .. } if *stage == set))
+        self.when(|what| matches!(what, EventKind::Detected { stage, .. } if *stage == set))
     }
 
     pub fn passed_s(&self, set: u32) -> f64 {
-        self.when(|what| matches!(what, Happening::Passed { stage } if *stage == set))
+        self.when(|what| matches!(what, EventKind::Passed { stage } if *stage == set))
     }
 
     /// Of the first plan to avoid something: forecast, s, and time, s.
     pub fn grouping(&self) -> (f64, f64) {
         let avoid = |event: &RunEvent| match &event.what {
-            Happening::Grouping { phase, predicted_s, .. } if phase == "avoid" => {
+            EventKind::Grouping { phase, predicted_s, .. } if phase == "avoid" => {
                 Some((predicted_s.unwrap(), event.t_s))
             }
             _ => None,
@@ -96,7 +96,7 @@ impl Flown {
     /// Routes of the last plan to avoid something: it knows all obstacles, those that were seen late too.
     pub fn routes(&self) -> u32 {
         let avoid = |event: &RunEvent| match &event.what {
-            Happening::Grouping { phase, routes, .. } if phase == "avoid" => Some(*routes),
+            EventKind::Grouping { phase, routes, .. } if phase == "avoid" => Some(*routes),
             _ => None,
         };
         self.events.iter().rev().find_map(avoid).unwrap()

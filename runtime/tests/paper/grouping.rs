@@ -1,7 +1,7 @@
 //! Grouping: A3, C1. That the split is the best of all assignments is shown against brute force in `leader`.
 
 use super::flown::{Flown, fly, fly_file, scenario};
-use skein_protocol::record::Happening;
+use skein_protocol::record::EventKind;
 use std::collections::BTreeMap;
 
 /// What the leader forecasts for a split, s: the mission need not be flown for it.
@@ -24,7 +24,7 @@ fn groups(flown: &Flown) -> BTreeMap<String, (Vec<usize>, usize)> {
     let mut groups: BTreeMap<String, (Vec<usize>, usize)> = BTreeMap::new();
     let decided_s = flown.grouping().1;
     for event in flown.events.iter().filter(|event| (decided_s..decided_s + 0.5).contains(&event.t_s)) {
-        if let Happening::Assigned { drone, group, leader, route: Some(_), .. } = &event.what {
+        if let EventKind::Assigned { drone, group, leader, route: Some(_), .. } = &event.what {
             let group = groups.entry(group.clone()).or_insert_with(|| (Vec::new(), leader.index()));
             group.0.push(drone.index());
             assert_eq!(group.1, leader.index(), "one leader a group");

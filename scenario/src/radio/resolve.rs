@@ -5,7 +5,7 @@ use crate::keys::Scenario;
 use serde_json::{Map, Value as Json};
 use skein_protocol::DroneId;
 use skein_protocol::message::Topic;
-use skein_protocol::radio::{self, Air, Channel, Delay, Radio, Range, Rule};
+use skein_protocol::radio::{self, ChannelModel, Delay, Radio, Range, Rule, SharedChannel};
 
 /// What the presets set: tables of keys.
 const PRESETS: &str = include_str!("presets.toml");
@@ -45,15 +45,15 @@ impl Scenario {
 
     /// The channel that all drones share; `None` if its bandwidth is no limit.
     #[must_use]
-    pub fn channel(&self) -> Option<Channel> {
+    pub fn channel(&self) -> Option<SharedChannel> {
         let limit_s = self.radio.queue_limit_s;
-        self.radio.rate_bps.map(|rate_bps| Channel { seed: self.seed, rate_bps, limit_s })
+        self.radio.rate_bps.map(|rate_bps| SharedChannel { seed: self.seed, rate_bps, limit_s })
     }
 }
 
 impl RadioKeys {
-    fn air(&self) -> Air {
-        Air {
+    fn air(&self) -> ChannelModel {
+        ChannelModel {
             delay: Delay { model: self.delay_model.into(), mean_s: self.delay_s, jitter_s: self.jitter_s },
             loss: self.loss,
             burst: self.burst.as_ref().map(radio::Burst::from),

@@ -7,7 +7,7 @@ mod witness;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use clap::{Args, ValueEnum};
-use flight::{Air, fly};
+use flight::{ChannelSetting, fly};
 use outcome::{Row, table};
 use serde_json::json;
 use std::io::Write;
@@ -72,7 +72,7 @@ pub fn failover(args: &FailoverArgs) -> Result<Exit, Failure> {
     for clock in clocks {
         for &delay_s in delays_s {
             for &loss in &args.losses {
-                let air = Air { clock, loss, delay_s, kills, seed: args.seed };
+                let air = ChannelSetting { clock, loss, delay_s, kills, seed: args.seed };
                 rows.push(fly(&air, &interrupt)?);
                 if let Some(signal) = interrupt.signal() {
                     return Ok(Exit::Interrupted(signal));

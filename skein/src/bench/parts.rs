@@ -5,11 +5,11 @@ use super::runtime::median;
 use crate::exit::{Exit, Failure};
 use clap::Args;
 use serde::Serialize;
-use skein_leader::split::Table;
+use skein_leader::split::ArrivalTable;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime, Vec2};
-use skein_runtime::cockpit::Desk;
+use skein_runtime::pilot_host::StepScratch;
 use skein_runtime::{PilotKind, mission};
 use skein_scenario::{Scenario, Source};
 use std::hint::black_box;
@@ -110,9 +110,9 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
     const TICKS: u32 = 50;
     let mut world = mission::world(scenario).map_err(Failure::environment)?;
     let drones = scenario.formation.drones;
-    let (yard, mut desk) = (mission::Yard::new(scenario, PilotKind::Beacon), Desk::default());
-    let cockpit = |id| yard.cockpit(DroneId(id), 1, SimTime::ZERO);
-    let mut cockpits: Vec<_> = (0..drones).map(cockpit).collect();
+    let (yard, mut desk) = (mission::DroneFactory::new(scenario, PilotKind::Beacon), StepScratch::default());
+    let pilot_host = |id| yard.pilot_host(DroneId(id), 1, SimTime::ZERO);
+    let mut cockpits: Vec<_> = (0..drones).map(pilot_host).collect();
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     Ok(median((0..rounds).map(|_| {
         let mut spent_s = 0.0;
@@ -120,8 +120,8 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
             let mut answers = Vec::new();
             let down = world.downlink().view();
             let started = Instant::now();
-            for cockpit in &mut cockpits {
-                let said = cockpit.step(&down, &mut desk, &mut slot, &mut stats);
+            for pilot_host in &mut cockpits {
+                let said = pilot_host.step(&down, &mut desk, &mut slot, &mut stats);
                 answers.push((slot, said.iter().map(Message::encode).collect::<Vec<_>>()));
             }
             spent_s += started.elapsed().as_secs_f64();
@@ -140,7 +140,7 @@ fn grouping(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), F
     for routes in [2usize, 4] {
         let arrival = |i: usize, r: usize| ((i * 7919 + r * 104_729) % 4001) as f64 / 10.0 + 3.0 * r as f64;
         let rows: Vec<Vec<f64>> = (0..drones as usize).map(|i| (0..routes).map(|r| arrival(i, r)).collect()).collect();
-        let table = Table::new(&rows, &vec![3.5; routes]).map_err(Failure::environment)?;
+        let table = ArrivalTable::new(&rows, &vec![3.5; routes]).map_err(Failure::environment)?;
         let least = timed(rounds, 1000.0, || _ = black_box(table.least_makespan_s()));
         let whole = timed(rounds, 1000.0, || _ = black_box(table.split()));
         figures.push(Figure { drones, what: format!("least makespan, {routes} routes"), value: least, unit: "ms" });

@@ -12,7 +12,7 @@ use skein_protocol::energy::power_w;
 use skein_protocol::record::Outcome;
 use skein_report::Summary;
 use skein_report::morph::Morph;
-use skein_report::plot::reproduce::Spread;
+use skein_report::plot::reproduce::Percentiles;
 
 /// A row of reproduction.json.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -163,7 +163,7 @@ impl Rows<'_> {
         let detected = |stage: &Option<skein_report::Stage>| stage.as_ref().and_then(|stage| stage.detected_s);
         let passed = |stage: &Option<skein_report::Stage>| stage.as_ref().and_then(|stage| stage.passed_s);
         let between = detected(&first).zip(detected(&second));
-        let peak = |of: fn(&Spread) -> f64| {
+        let peak = |of: fn(&Percentiles) -> f64| {
             let (from_s, to_s) = between?;
             forest.snapshots.spreads(from_s, to_s).max_by(|a, b| of(a).total_cmp(&of(b))).map(|spread| spread.t_s)
         };

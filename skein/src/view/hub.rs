@@ -3,7 +3,7 @@
 use crate::tap::{Tap, running};
 use skein_bus::BusError;
 use skein_protocol::DroneId;
-use skein_protocol::record::{Happening, RecordView, RunEvent};
+use skein_protocol::record::{EventKind, RecordView, RunEvent};
 use skein_report::page;
 use skein_report::scene::{Observer, Sample};
 use std::collections::VecDeque;
@@ -249,7 +249,7 @@ impl Watcher {
         let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line);
         let events = record.parse_events(parse).unwrap_or_default();
         for event in &events {
-            if let Happening::End { reason, .. } = &event.what {
+            if let EventKind::End { reason, .. } = &event.what {
                 self.ended = Some(format!("ended at {:.2} s: {reason}", event.t_s));
             }
         }

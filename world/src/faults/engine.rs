@@ -4,7 +4,7 @@ use super::chance::Chance;
 use super::moments::Moments;
 use super::targets::Scene;
 use super::{Effect, Fault, FaultPlan, When, Whom};
-use crate::senses::Hindrance;
+use crate::senses::SensorFault;
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
 
 /// A fault in force.
@@ -36,14 +36,14 @@ pub(crate) struct Engine {
     waiting: Vec<usize>,
     active: Vec<Active>,
     /// What is in force for each drone, but for noise, which is drawn anew in each tick.
-    standing: Vec<Hindrance>,
+    standing: Vec<SensorFault>,
 }
 
 impl Engine {
     /// For a swarm of so many drones.
     pub fn new(plan: FaultPlan, drones: usize) -> Self {
         let waiting = (0..plan.faults.len()).collect();
-        let standing = vec![Hindrance::default(); drones];
+        let standing = vec![SensorFault::default(); drones];
         Self { plan, moments: Moments::default(), waiting, active: Vec::new(), standing }
     }
 
@@ -112,20 +112,20 @@ impl Engine {
     }
 
     /// What a drone is told differently from the truth in a tick.
-    pub fn hindrance(&self, drone: DroneId, tick: Tick) -> Hindrance {
-        let mut hindrance = self.standing[drone.index()];
+    pub fn sensor_fault(&self, drone: DroneId, tick: Tick) -> SensorFault {
+        let mut sensor_fault = self.standing[drone.index()];
         for active in self.active.iter().filter(|active| active.has(drone)) {
             if let Effect::Noise(noise) = &self.plan.faults[active.fault].effect {
                 let mut chance = self.chance(active.fault, u64::from(drone.0), tick);
-                hindrance.position_error_m += noise.position_bias_m + chance.vector(noise.position_std_m);
-                hindrance.velocity_error_mps += noise.velocity_bias_mps + chance.vector(noise.velocity_std_mps);
+                sensor_fault.position_error_m += noise.position_bias_m + chance.vector(noise.position_std_m);
+                sensor_fault.velocity_error_mps += noise.velocity_bias_mps + chance.vector(noise.velocity_std_mps);
             }
         }
-        hindrance
+        sensor_fault
     }
 
     /// What of its radio is cut.
-    pub fn standing(&self, drone: DroneId) -> &Hindrance {
+    pub fn standing(&self, drone: DroneId) -> &SensorFault {
         &self.standing[drone.index()]
     }
 
@@ -178,7 +178,7 @@ impl Engine {
 
     /// Works out anew what is in force for each drone.
     fn settle(&mut self) {
-        self.standing.fill(Hindrance::default());
+        self.standing.fill(SensorFault::default());
         for active in &self.active {
             let effect = &self.plan.faults[active.fault].effect;
             if let Effect::Partition(sides) = effect {
@@ -200,7 +200,7 @@ impl Active {
     }
 }
 
-impl Hindrance {
+impl SensorFault {
     fn add(&mut self, effect: &Effect) {
         match effect {
             Effect::Slow(extra_s) => self.extra_reaction_s += extra_s,

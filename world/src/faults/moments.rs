@@ -1,6 +1,6 @@
 //! When the events were that faults wait for: seen at the beginning of each tick.
 
-use super::Event;
+use super::FaultTrigger;
 use super::targets::Scene;
 use skein_protocol::payload::{PHASE_AVOID, PHASE_REFORM};
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
@@ -40,17 +40,17 @@ impl Moments {
     }
 
     /// When the event was, if it was.
-    pub fn of(&self, event: Event, stage: usize) -> Option<SimTime> {
+    pub fn of(&self, event: FaultTrigger, stage: usize) -> Option<SimTime> {
         let set = self.sets.get(stage);
         match event {
-            Event::Detected => set?.detected,
-            Event::Grouped => set?.grouped,
-            Event::Queued => set?.queued,
-            Event::Gate => set?.gate,
-            Event::Passed => set?.passed,
-            Event::Reforming => set?.reforming,
-            Event::LeaderElected => self.elected.get(stage).copied(),
-            Event::GroupLeaderElected => self.group_elected.get(stage).copied(),
+            FaultTrigger::Detected => set?.detected,
+            FaultTrigger::Grouped => set?.grouped,
+            FaultTrigger::Queued => set?.queued,
+            FaultTrigger::Gate => set?.gate,
+            FaultTrigger::Passed => set?.passed,
+            FaultTrigger::Reforming => set?.reforming,
+            FaultTrigger::LeaderElected => self.elected.get(stage).copied(),
+            FaultTrigger::GroupLeaderElected => self.group_elected.get(stage).copied(),
         }
     }
 

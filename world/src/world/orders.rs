@@ -3,15 +3,15 @@
 use super::World;
 use crate::faults::engine::Turn;
 use crate::faults::targets::Scene;
-use crate::faults::{Effect, ProcessOrder, Whom};
+use crate::faults::{Effect, ProcessCommand, Whom};
 use skein_protocol::DroneId;
-use skein_protocol::record::{FaultKind, Happening};
+use skein_protocol::record::{EventKind, FaultKind};
 use skein_protocol::slot::Slot;
 
 impl World {
     /// What the faults of the current tick do to drones' processes: to be done, in this order, before the tick's
     /// downlink goes out. The world counts it as done.
-    pub fn orders(&mut self) -> &[ProcessOrder] {
+    pub fn orders(&mut self) -> &[ProcessCommand] {
         self.open();
         &self.orders
     }
@@ -72,12 +72,12 @@ impl World {
         for &drone in &turn.drones {
             match kind {
                 FaultKind::Kill | FaultKind::Restart if self.is_alive(drone) => {
-                    self.orders.push(ProcessOrder::Kill(drone));
+                    self.orders.push(ProcessCommand::Kill(drone));
                     self.mark_dead(drone, kind, true, &words);
                     continue;
                 }
                 FaultKind::Freeze => {
-                    self.orders.push(ProcessOrder::Freeze(drone));
+                    self.orders.push(ProcessCommand::Freeze(drone));
                     self.processes[drone.index()].frozen = true;
                 }
                 _ => {}
@@ -111,7 +111,7 @@ impl World {
         if !std::mem::replace(&mut process.frozen, false) || !self.bodies[drone.index()].alive {
             return None;
         }
-        self.orders.push(ProcessOrder::Resume(drone));
+        self.orders.push(ProcessCommand::Resume(drone));
         Some("continued".to_owned())
     }
 
@@ -125,17 +125,17 @@ impl World {
         let incarnation = self.processes[drone.index()].incarnation + 1;
         self.set_incarnation(drone, incarnation);
         self.processes[drone.index()].slot = Slot::default();
-        self.orders.push(ProcessOrder::Restart(drone, incarnation));
+        self.orders.push(ProcessCommand::Restart(drone, incarnation));
         Some(format!("a new process, incarnation {incarnation}"))
     }
 
     fn log_fault(&mut self, kind: FaultKind, target: DroneId, words: &str) {
-        let what = Happening::Fault { kind, target, scheduled: true, detail: words.to_owned() };
+        let what = EventKind::Fault { kind, target, scheduled: true, detail: words.to_owned() };
         self.log.push(self.now(), what);
     }
 
     fn log_over(&mut self, kind: FaultKind, target: DroneId, detail: String) {
-        self.log.push(self.now(), Happening::FaultOver { kind, target, detail });
+        self.log.push(self.now(), EventKind::FaultOver { kind, target, detail });
     }
 }
 

@@ -61,12 +61,12 @@ fn detection_is_told_at_the_opening_and_passing_at_the_end_of_a_tick() {
     let obstacle = rectangle(140.0, 0.0, 10.0, 5.0);
     let mut world = eight(WorldParams { timeout_s: 30.0, ..params() }, &[obstacle]);
     let told = fly(&mut world, &Slot::default());
-    let Some(RunEvent { t_s, what: Happening::Detected { stage: 0, drone, distance_m, .. } }) = told.first() else {
+    let Some(RunEvent { t_s, what: EventKind::Detected { stage: 0, drone, distance_m, .. } }) = told.first() else {
         panic!("{told:?}");
     };
     assert_eq!(*drone, DroneId(0));
     assert!((1.5..=1.521).contains(t_s) && (114.79..=115.0).contains(distance_m), "{t_s} s, {distance_m} m");
-    let passed = told.iter().find(|event| event.what == Happening::Passed { stage: 0 }).unwrap();
+    let passed = told.iter().find(|event| event.what == EventKind::Passed { stage: 0 }).unwrap();
     // The last drone starts 3·35/√2 behind.
     let wanted = (140.0 + 3.0 * 35.0 / 2f64.sqrt()) / 10.0;
     assert!((0.0..=0.021).contains(&(passed.t_s - wanted)), "{} s", passed.t_s);
@@ -92,7 +92,7 @@ fn bad_commands_are_counted_and_huge_ones_clipped() {
 fn totals_of(world: &mut World) -> Totals {
     world.finish(&LinkStats::default(), 2.5);
     match happenings(events(world)).pop() {
-        Some(Happening::End { totals, .. }) => *totals,
+        Some(EventKind::End { totals, .. }) => *totals,
         other => panic!("{other:?}"),
     }
 }
@@ -156,7 +156,7 @@ fn a_dead_drone_brakes_stays_and_says_nothing() {
     world.take_slot(DroneId(7), &command(5.0, 0.0));
     world.advance();
     let fault =
-        Happening::Fault { kind: FaultKind::Kill, target: DroneId(7), scheduled: true, detail: "SIGKILL".into() };
+        EventKind::Fault { kind: FaultKind::Kill, target: DroneId(7), scheduled: true, detail: "SIGKILL".into() };
     assert_eq!(events(&world), [RunEvent { t_s: 0.02, what: fault }]);
     let row = world.record().rows[7];
     assert_eq!((row.flags, world.record().frames.len(), world.is_alive(DroneId(7))), (0, 0, false));
@@ -188,7 +188,7 @@ fn with_nobody_alive_the_mission_is_over() {
     world.advance();
     assert_eq!(world.ended(), Some(Outcome::Timeout));
     world.finish(&LinkStats::default(), 0.0);
-    let Some(Happening::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    let Some(EventKind::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
     assert_eq!(reason, "no drone is left alive");
 }
 
@@ -210,7 +210,7 @@ fn a_held_formation_is_reached_and_told_in_a_last_record() {
     assert_eq!((record.rows.len(), record.frames.len(), record.head.tick, record.head.digest), (0, 0, 140, digest));
     let told = events(&world);
     assert!((told[0].t_s - 2.82).abs() < 1e-9, "{told:?}");
-    let Happening::End { outcome: Outcome::Reached, totals, .. } = &told[0].what else { panic!("{told:?}") };
+    let EventKind::End { outcome: Outcome::Reached, totals, .. } = &told[0].what else { panic!("{told:?}") };
     assert_eq!(totals.wall_s, 2.5);
 }
 
@@ -221,7 +221,7 @@ fn a_mission_can_be_stopped_once() {
     world.abort("SIGTERM");
     assert_eq!(world.ended(), Some(Outcome::Aborted));
     world.finish(&LinkStats::default(), 0.0);
-    let Some(Happening::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    let Some(EventKind::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
     assert_eq!(reason, "SIGINT");
 }
 
@@ -244,7 +244,7 @@ fn obeying_backwards_is_unsafe_except_after_a_restart() {
     };
     assert_eq!(told(true), (vec![], Some(Outcome::Timeout)));
     let (events, outcome) = told(false);
-    let back = |drone| Happening::Violation {
+    let back = |drone| EventKind::Violation {
         kind: ViolationKind::BallotWentBack,
         drones: vec![DroneId(drone)],
         value_m: 0.0,

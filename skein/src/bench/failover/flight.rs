@@ -34,7 +34,7 @@ const PER_DELAY: f64 = 10.0;
 
 /// What is flown.
 #[derive(Clone, Copy, Debug)]
-pub struct Air {
+pub struct ChannelSetting {
     /// What paces it.
     pub clock: ClockChoice,
     /// Share of frames that are lost.
@@ -47,7 +47,7 @@ pub struct Air {
     pub seed: u64,
 }
 
-impl Air {
+impl ChannelSetting {
     fn interval_s(&self) -> f64 {
         INTERVAL_S + PER_LOSS_S * self.loss + PER_DELAY * self.delay_s
     }
@@ -81,7 +81,7 @@ impl Air {
 }
 
 /// Flies it to the end, and tells what came of it.
-pub fn fly(air: &Air, interrupt: &Interrupt) -> Result<Row, Failure> {
+pub fn fly(air: &ChannelSetting, interrupt: &Interrupt) -> Result<Row, Failure> {
     let scenario = air.scenario()?;
     let (runtime, clock) = match air.clock {
         ClockChoice::Lockstep => ("inline", Clock::Lockstep),

@@ -1,7 +1,7 @@
 //! A line of the bench's table.
 
 use super::ClockChoice;
-use super::flight::Air;
+use super::flight::ChannelSetting;
 use super::witness::Found;
 use serde::Serialize;
 use skein_report::Summary;
@@ -49,7 +49,7 @@ pub struct Row {
 
 impl Row {
     /// From what was seen of a flight.
-    pub fn new(air: &Air, found: &Found, summary: &Summary) -> Self {
+    pub fn new(air: &ChannelSetting, found: &Found, summary: &Summary) -> Self {
         let (times, on_time) = (ascending(&found.followed_s), ascending(&found.on_time_s));
         let rate = |count: f64, seconds: f64| if seconds > 0.0 { count / seconds } else { 0.0 };
         Self {

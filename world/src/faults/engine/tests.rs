@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Body;
-use crate::faults::{Event, Noise, Wind};
+use crate::faults::{FaultTrigger, Noise, Wind};
 use crate::geometry::Outline;
 use crate::log::Log;
 use crate::process::Process;
@@ -123,8 +123,8 @@ fn a_role_is_waited_for_and_the_named_dead_are_left_out() {
 }
 
 /// A fault that follows each event at once.
-fn waiting_for(events: &[(Event, usize)]) -> Engine {
-    let when = |&(event, stage): &(Event, usize)| When::On { event, stage, after_s: 0.0 };
+fn waiting_for(events: &[(FaultTrigger, usize)]) -> Engine {
+    let when = |&(event, stage): &(FaultTrigger, usize)| When::On { event, stage, after_s: 0.0 };
     engine(events.iter().map(|event| fault(Effect::Deaf, when(event), Whom::All, 1.0)).collect())
 }
 
@@ -136,13 +136,13 @@ fn places(engine: &mut Engine, now: SimTime, stage: &Stage) -> Vec<usize> {
 fn events_of_an_obstacle_set_are_seen_in_their_order() {
     let mut stage = Stage::new();
     let mut engine = waiting_for(&[
-        (Event::Detected, 0),
-        (Event::Grouped, 0),
-        (Event::Queued, 0),
-        (Event::Gate, 0),
-        (Event::Reforming, 0),
-        (Event::Passed, 0),
-        (Event::Detected, 1),
+        (FaultTrigger::Detected, 0),
+        (FaultTrigger::Grouped, 0),
+        (FaultTrigger::Queued, 0),
+        (FaultTrigger::Gate, 0),
+        (FaultTrigger::Reforming, 0),
+        (FaultTrigger::Passed, 0),
+        (FaultTrigger::Detected, 1),
     ]);
     // An old plan to avoid is no plan for a set that is detected later.
     stage.obey(0, 1, PHASE_AVOID, SLOT_QUEUED);
@@ -168,8 +168,11 @@ fn events_of_an_obstacle_set_are_seen_in_their_order() {
 #[test]
 fn elections_are_counted() {
     let mut stage = Stage::new();
-    let mut engine =
-        waiting_for(&[(Event::LeaderElected, 0), (Event::LeaderElected, 1), (Event::GroupLeaderElected, 0)]);
+    let mut engine = waiting_for(&[
+        (FaultTrigger::LeaderElected, 0),
+        (FaultTrigger::LeaderElected, 1),
+        (FaultTrigger::GroupLeaderElected, 0),
+    ]);
     assert_eq!(places(&mut engine, at(0.0), &stage), [0usize; 0]);
     stage.obey(0, 1, 0, SLOT_LEADS);
     assert_eq!(places(&mut engine, at(1.0), &stage), [0]);
@@ -183,7 +186,7 @@ fn elections_are_counted() {
 #[test]
 fn after_an_event_counts_from_it() {
     let mut stage = Stage::new();
-    let when = When::On { event: Event::Detected, stage: 0, after_s: 0.5 };
+    let when = When::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.5 };
     let mut engine = engine(vec![fault(Effect::Deaf, when, Whom::All, 1.0)]);
     stage.detect();
     assert_eq!(places(&mut engine, at(2.0), &stage), [0usize; 0]);
@@ -202,12 +205,12 @@ fn noise_is_drawn_each_tick_and_gusts_last() {
         fault(Effect::Wind(wind), When::At(0.0), Whom::Drones(vec![DroneId(2), DroneId(0)]), f64::INFINITY),
     ]);
     begun(&mut engine, at(0.0), &Stage::new());
-    let errors: Vec<Vec2> = (0..1000).map(|tick| engine.hindrance(DroneId(0), tick).position_error_m).collect();
+    let errors: Vec<Vec2> = (0..1000).map(|tick| engine.sensor_fault(DroneId(0), tick).position_error_m).collect();
     let mean = errors.iter().sum::<Vec2>() / 1000.0;
     // Five standard errors of a mean of 1000.
     assert!((mean - bias).amax() < 5.0 * 0.5 / 1000f64.sqrt(), "{mean}");
-    assert_eq!(engine.hindrance(DroneId(0), 7).velocity_error_mps, Vec2::zeros());
-    assert_eq!(engine.hindrance(DroneId(1), 7).position_error_m, Vec2::zeros());
+    assert_eq!(engine.sensor_fault(DroneId(0), 7).velocity_error_mps, Vec2::zeros());
+    assert_eq!(engine.sensor_fault(DroneId(1), 7).position_error_m, Vec2::zeros());
     let blown = |drone, seconds| engine.wind_mps2(DroneId(drone), at(seconds));
     assert_eq!(blown(0, 0.1), blown(0, 1.9));
     assert_ne!(blown(0, 1.9), blown(0, 2.1));

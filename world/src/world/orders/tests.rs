@@ -1,10 +1,10 @@
 //! Faults in whole worlds, flown by hand.
 
-use crate::faults::{Effect, Event, Fault, FaultPlan, ProcessOrder, When, Whom, Wind};
+use crate::faults::{Effect, Fault, FaultPlan, FaultTrigger, ProcessCommand, When, Whom, Wind};
 use crate::params::{Failsafe, WorldParams};
 use crate::testing::{command, events, happenings, params, rectangle, starts};
 use crate::world::World;
-use skein_protocol::record::{FaultKind, Happening, ROW_ALIVE, ROW_FROZEN, RunEvent};
+use skein_protocol::record::{EventKind, FaultKind, ROW_ALIVE, ROW_FROZEN, RunEvent};
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, Vec2};
 
@@ -17,7 +17,7 @@ fn world(effect: Effect, when: When, for_s: f64, params: WorldParams) -> World {
 }
 
 /// Flies so many ticks; the orders and the events with the ticks in which they came.
-fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessOrder)>, Vec<RunEvent>) {
+fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessCommand)>, Vec<RunEvent>) {
     let (mut orders, mut told) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
         let tick = world.tick();
@@ -32,8 +32,8 @@ fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessOrder)>, Vec<RunEvent
 
 fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
     let time = |event: &RunEvent| match &event.what {
-        Happening::Fault { target, scheduled: true, .. } if *target == ID => Some((event.t_s, true)),
-        Happening::FaultOver { target, .. } if *target == ID => Some((event.t_s, false)),
+        EventKind::Fault { target, scheduled: true, .. } if *target == ID => Some((event.t_s, true)),
+        EventKind::FaultOver { target, .. } if *target == ID => Some((event.t_s, false)),
         _ => None,
     };
     events.iter().filter_map(time).collect()
@@ -43,7 +43,7 @@ fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
 fn a_kill_is_ordered_once_at_its_tick() {
     let mut world = world(Effect::Kill, When::At(1.0), f64::INFINITY, params());
     let (orders, told) = fly(&mut world, 100);
-    assert_eq!(orders, [(50, ProcessOrder::Kill(ID))]);
+    assert_eq!(orders, [(50, ProcessCommand::Kill(ID))]);
     assert_eq!(fault_times(&told), [(1.0, true)]);
     assert!(!world.is_alive(ID));
 }
@@ -59,7 +59,7 @@ fn a_frozen_drone_holds_and_flies_on_later() {
     let other = world.record().rows[2];
     assert!(row.energy_j > other.energy_j, "hovering costs more than cruising, and is counted");
     let (orders, told) = fly(&mut world, 30);
-    assert_eq!(orders, [(200, ProcessOrder::Resume(ID))]);
+    assert_eq!(orders, [(200, ProcessCommand::Resume(ID))]);
     assert_eq!(fault_times(&told), [(4.0, false)]);
     world.orders();
     world.downlink();
@@ -83,7 +83,7 @@ fn a_frozen_drone_that_is_killed_is_not_resumed() {
 fn a_restarted_drone_has_the_next_incarnation() {
     let mut world = world(Effect::Restart, When::At(1.0), 2.0, params());
     let (orders, told) = fly(&mut world, 151);
-    assert_eq!(orders, [(50, ProcessOrder::Kill(ID)), (150, ProcessOrder::Restart(ID, 2))]);
+    assert_eq!(orders, [(50, ProcessCommand::Kill(ID)), (150, ProcessCommand::Restart(ID, 2))]);
     assert_eq!(fault_times(&told), [(1.0, true), (3.0, false)]);
     assert!(world.is_alive(ID));
     assert_eq!(world.incarnation(ID), Some(2));
@@ -96,7 +96,7 @@ fn who_has_landed_is_not_started_again() {
     let land = WorldParams { failsafe: Failsafe::Land, timeout_s: 60.0, ..params() };
     let mut world = world(Effect::Restart, When::At(0.0), 14.0, land);
     let (orders, _) = fly(&mut world, 800);
-    assert_eq!(orders, [(0, ProcessOrder::Kill(ID))]);
+    assert_eq!(orders, [(0, ProcessCommand::Kill(ID))]);
     assert!(!world.is_alive(ID));
 }
 
@@ -120,7 +120,7 @@ fn who_is_blind_detects_nothing() {
     let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &shape).unwrap();
     let (_, told) = fly(&mut world, 300);
     let detected = happenings(told).into_iter().find_map(|what| match what {
-        Happening::Detected { drone, .. } => Some(drone),
+        EventKind::Detected { drone, .. } => Some(drone),
         _ => None,
     });
     assert_eq!(detected, Some(DroneId(1)));
@@ -131,10 +131,10 @@ fn who_is_blind_detects_nothing() {
 
 #[test]
 fn a_fault_on_detection_begins_in_the_tick_that_detects() {
-    let when = When::On { event: Event::Detected, stage: 0, after_s: 0.0 };
+    let when = When::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.0 };
     let mut world = world(Effect::Slow(0.4), when, 1.0, params());
     let (_, told) = fly(&mut world, 80);
-    let detected = told.iter().find(|event| matches!(event.what, Happening::Detected { .. })).unwrap();
+    let detected = told.iter().find(|event| matches!(event.what, EventKind::Detected { .. })).unwrap();
     assert_eq!(fault_times(&told), [(detected.t_s, true)]);
     assert_eq!(world.downlink().drones[ID.index()].extra_reaction_s, 0.4);
 }

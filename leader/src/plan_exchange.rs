@@ -31,7 +31,7 @@ struct Question {
 
 /// Rows heard, and the question asked. Bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Council {
+pub struct PlanExchange {
     drones: u32,
     repeat_s: f64,
     heard: BTreeMap<DroneId, Arrivals>,
@@ -44,7 +44,7 @@ pub struct Council {
     next_answer: SimTime,
 }
 
-impl Council {
+impl PlanExchange {
     /// Nothing heard, in a swarm of `drones`; what has to be repeated is repeated every `repeat_s`.
     #[must_use]
     pub fn new(drones: u32, repeat_s: f64) -> Self {
@@ -186,65 +186,65 @@ mod tests {
         row(at(stamp_s), ballot, GroupId::ALL.child(1), DroneId(drone), set, &[1.0, f64::INFINITY])
     }
 
-    fn asking(council: &mut Council, now_s: f64) -> Vec<Arrivals> {
+    fn asking(plan_exchange: &mut PlanExchange, now_s: f64) -> Vec<Arrivals> {
         let mut said = Vec::new();
-        council.ask(at(now_s), 7, || vec![row_of(0, now_s, 7)], &mut said);
+        plan_exchange.ask(at(now_s), 7, || vec![row_of(0, now_s, 7)], &mut said);
         said
     }
 
     #[test]
     fn a_table_is_whole_once_everybody_has_a_row() {
-        let mut council = Council::new(4, 0.2);
-        assert_eq!(asking(&mut council, 1.0).len(), 1);
-        assert!(council.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none());
-        council.hear(at(1.1), &row_of(2, 1.05, 8));
-        assert!(council.answer(at(1.1), &[DroneId(2)], 2, 0.0).is_none());
-        council.hear(at(1.1), &row_of(2, 1.06, 7));
-        let table = council.answer(at(1.1), &[DroneId(2)], 2, 0.0).unwrap();
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
+        assert_eq!(asking(&mut plan_exchange, 1.0).len(), 1);
+        assert!(plan_exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none());
+        plan_exchange.hear(at(1.1), &row_of(2, 1.05, 8));
+        assert!(plan_exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).is_none());
+        plan_exchange.hear(at(1.1), &row_of(2, 1.06, 7));
+        let table = plan_exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).unwrap();
         assert_eq!(table.iter().map(|row| row.drone.0).collect::<Vec<_>>(), [0, 2]);
         assert!((arrivals_s(&table[1])[0] - 2.06).abs() < 1e-9 && arrivals_s(&table[1])[1].is_infinite());
     }
 
     #[test]
     fn rows_stay_the_same_are_repeated_and_nobody_waits_for_ever() {
-        let mut council = Council::new(4, 0.2);
-        let first = asking(&mut council, 1.0);
-        assert!(asking(&mut council, 1.1).is_empty());
-        assert_eq!(asking(&mut council, 1.2), first);
-        assert!(council.answer(at(1.29), &[DroneId(2)], 2, 0.0).is_none());
-        assert_eq!(council.answer(at(1.3), &[DroneId(2)], 2, 0.0).unwrap().len(), 1);
-        assert!(council.answer(at(2.3), &[DroneId(2)], 2, 1.0).is_none());
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
+        let first = asking(&mut plan_exchange, 1.0);
+        assert!(asking(&mut plan_exchange, 1.1).is_empty());
+        assert_eq!(asking(&mut plan_exchange, 1.2), first);
+        assert!(plan_exchange.answer(at(1.29), &[DroneId(2)], 2, 0.0).is_none());
+        assert_eq!(plan_exchange.answer(at(1.3), &[DroneId(2)], 2, 0.0).unwrap().len(), 1);
+        assert!(plan_exchange.answer(at(2.3), &[DroneId(2)], 2, 1.0).is_none());
     }
 
     #[test]
     fn whoever_asks_late_is_answered_but_not_in_every_tick() {
-        let mut council = Council::new(4, 0.2);
-        council.hear(at(1.0), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.0, 7) });
-        assert_eq!(council.asked(at(1.0)), Some(7));
-        council.hear(at(1.1), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.1, 7) });
-        assert_eq!((council.asked(at(1.1)), council.asked(at(1.2))), (None, Some(7)));
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
+        plan_exchange.hear(at(1.0), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.0, 7) });
+        assert_eq!(plan_exchange.asked(at(1.0)), Some(7));
+        plan_exchange.hear(at(1.1), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.1, 7) });
+        assert_eq!((plan_exchange.asked(at(1.1)), plan_exchange.asked(at(1.2))), (None, Some(7)));
     }
 
     #[test]
     fn a_choice_counts_from_the_one_who_thinks_for_all_and_not_if_it_is_older() {
-        let mut council = Council::new(4, 0.2);
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
         let choice =
             |stamp_s| Arrivals { flags: ARRIVALS_CHOSEN, gate_s: one_of(1), routes: 3, ..row_of(2, stamp_s, 7) };
-        council.hear(at(1.1), &choice(1.0));
-        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
-        assert_eq!(council.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
-        assert_eq!(council.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
-        assert_eq!(council.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
-        assert!(council.heard.is_empty(), "a choice is no row of the table");
+        plan_exchange.hear(at(1.1), &choice(1.0));
+        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
+        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
+        assert_eq!(plan_exchange.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
+        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
+        assert!(plan_exchange.heard.is_empty(), "a choice is no row of the table");
     }
 
     #[test]
     fn a_choice_is_repeated_for_a_while() {
-        let mut council = Council::new(4, 0.2);
-        council.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
+        plan_exchange.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
         let mut said = Vec::new();
         for tick in 0..100 {
-            council.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
+            plan_exchange.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
         }
         assert!((5..=7).contains(&said.len()), "{}", said.len());
     }
@@ -257,11 +257,11 @@ mod tests {
 
     #[test]
     fn rows_of_strangers_from_the_future_and_to_nowhere_are_refused() {
-        let mut council = Council::new(4, 0.2);
-        asking(&mut council, 1.0);
-        council.hear(at(1.0), &row_of(9, 0.5, 7));
-        council.hear(at(1.0), &row_of(2, 1.5, 7));
-        council.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
-        assert!(council.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && council.heard.is_empty());
+        let mut plan_exchange = PlanExchange::new(4, 0.2);
+        asking(&mut plan_exchange, 1.0);
+        plan_exchange.hear(at(1.0), &row_of(9, 0.5, 7));
+        plan_exchange.hear(at(1.0), &row_of(2, 1.5, 7));
+        plan_exchange.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
+        assert!(plan_exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && plan_exchange.heard.is_empty());
     }
 }

@@ -12,7 +12,7 @@ const HEAD_BYTES: u64 = 8;
 
 /// A channel of finite bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Channel {
+pub struct SharedChannel {
     /// Key of the order in which drones get the channel in a tick.
     pub seed: u64,
     /// Bit rate that is left for frames, bit/s; positive.
@@ -21,7 +21,7 @@ pub struct Channel {
     pub limit_s: f64,
 }
 
-impl Channel {
+impl SharedChannel {
     /// How long a frame takes the channel, ns.
     #[must_use]
     pub fn airtime_ns(&self, frame: &AirFrame) -> u64 {
@@ -33,7 +33,7 @@ impl Channel {
 /// A channel and the frames that wait for it.
 #[derive(Clone, Debug)]
 pub struct Queue {
-    channel: Channel,
+    channel: SharedChannel,
     /// When the channel is free again.
     free: SimTime,
     order: Vec<usize>,
@@ -42,7 +42,7 @@ pub struct Queue {
 impl Queue {
     /// An empty queue.
     #[must_use]
-    pub fn new(channel: Channel) -> Self {
+    pub fn new(channel: SharedChannel) -> Self {
         Self { channel, free: SimTime::ZERO, order: Vec::new() }
     }
 

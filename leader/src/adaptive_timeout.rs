@@ -11,11 +11,11 @@ const DOUBT: f64 = 1.0;
 /// one silence in ten million is as long.
 const PATIENCE: f64 = 22.0;
 /// Nobody is waited for longer than so many time-outs: then it is as good as gone.
-const MOST_TIMEOUTS: f64 = 12.0;
+const MAX_TIMEOUTS: f64 = 12.0;
 
 /// The gaps between the signs of one source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Rhythm {
+pub(crate) struct AdaptiveTimeout {
     last: SimTime,
     /// Gaps counted, as far as it matters for the weight of the next.
     gaps: u32,
@@ -24,7 +24,7 @@ pub(crate) struct Rhythm {
     deviation_s: f64,
 }
 
-impl Rhythm {
+impl AdaptiveTimeout {
     /// A source that was heard for the first time.
     pub fn new(now: SimTime) -> Self {
         Self { last: now, ..Self::default() }
@@ -69,7 +69,7 @@ impl Rhythm {
 
     /// How long a silence is no news, s: `base_s`, or more if gaps are long or differ.
     pub fn patience_s(&self, base_s: f64) -> f64 {
-        (self.mean_s + PATIENCE * self.deviation_s).clamp(base_s, MOST_TIMEOUTS * base_s)
+        (self.mean_s + PATIENCE * self.deviation_s).clamp(base_s, MAX_TIMEOUTS * base_s)
     }
 }
 
@@ -77,13 +77,13 @@ impl Rhythm {
 mod tests {
     use super::*;
 
-    fn after(gaps_s: impl Iterator<Item = f64>) -> Rhythm {
-        let mut rhythm = Rhythm::new(SimTime::ZERO);
+    fn after(gaps_s: impl Iterator<Item = f64>) -> AdaptiveTimeout {
+        let mut adaptive_timeout = AdaptiveTimeout::new(SimTime::ZERO);
         gaps_s.fold(SimTime::ZERO, |now, gap_s| {
-            rhythm.hear(now.after(gap_s), 0.0, f64::INFINITY);
+            adaptive_timeout.hear(now.after(gap_s), 0.0, f64::INFINITY);
             now.after(gap_s)
         });
-        rhythm
+        adaptive_timeout
     }
 
     #[test]
@@ -97,17 +97,17 @@ mod tests {
 
     #[test]
     fn signs_between_the_beats_are_no_irregularity() {
-        let (mut rhythm, mut now) = (Rhythm::new(SimTime::ZERO), SimTime::ZERO);
+        let (mut adaptive_timeout, mut now) = (AdaptiveTimeout::new(SimTime::ZERO), SimTime::ZERO);
         for beat in 0..400 {
             now = now.after(0.01);
             // Every fifth beat something else is said in between.
             if beat % 5 == 0 {
-                rhythm.hear(now, 0.015, f64::INFINITY);
+                adaptive_timeout.hear(now, 0.015, f64::INFINITY);
             }
             now = now.after(0.01);
-            rhythm.hear(now, 0.015, f64::INFINITY);
+            adaptive_timeout.hear(now, 0.015, f64::INFINITY);
         }
-        assert!(rhythm.patience_s(0.06) < 0.0601, "{rhythm:?}");
+        assert!(adaptive_timeout.patience_s(0.06) < 0.0601, "{adaptive_timeout:?}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// What is to be done to a drone's process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum OrderKind {
+pub enum RequestKind {
     /// SIGKILL, and reap it.
     Kill = 1,
     /// SIGSTOP.
@@ -23,12 +23,12 @@ pub enum OrderKind {
 
 /// One order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Order {
+pub struct ProcessRequest {
     /// What.
-    pub kind: OrderKind,
+    pub kind: RequestKind,
     /// To whom.
     pub drone: DroneId,
-    /// In which tick; for [`OrderKind::Resume`] and [`OrderKind::Restart`], the first tick it is to answer.
+    /// In which tick; for [`RequestKind::Resume`] and [`RequestKind::Restart`], the first tick it is to answer.
     pub tick: Tick,
 }
 
@@ -38,7 +38,7 @@ impl Control {
     ///
     /// # Errors
     /// [`BusError::NoAnswer`].
-    pub fn give_order(&self, order: Order, limit: Duration) -> Result<u32, BusError> {
+    pub fn give_order(&self, order: ProcessRequest, limit: Duration) -> Result<u32, BusError> {
         let words = self.orders();
         words.kind.store(order.kind as u32, Ordering::Relaxed);
         words.drone.store(order.drone.0, Ordering::Relaxed);
@@ -62,7 +62,7 @@ impl Control {
 
     /// The supervisor's part: waits at most `limit` for an order that is not yet answered.
     #[must_use]
-    pub fn next_order(&self, limit: Duration) -> Option<Order> {
+    pub fn next_order(&self, limit: Duration) -> Option<ProcessRequest> {
         let words = self.orders();
         let answered = words.answered.load(Ordering::Relaxed);
         let mut asked = words.asked.load(Ordering::Acquire);
@@ -74,13 +74,13 @@ impl Control {
             return None;
         }
         let kind = match words.kind.load(Ordering::Relaxed) {
-            1 => OrderKind::Kill,
-            2 => OrderKind::Freeze,
-            3 => OrderKind::Resume,
-            _ => OrderKind::Restart,
+            1 => RequestKind::Kill,
+            2 => RequestKind::Freeze,
+            3 => RequestKind::Resume,
+            _ => RequestKind::Restart,
         };
         let tick = Tick::from(words.tick.load(Ordering::Relaxed));
-        Some(Order { kind, drone: DroneId(words.drone.load(Ordering::Relaxed)), tick })
+        Some(ProcessRequest { kind, drone: DroneId(words.drone.load(Ordering::Relaxed)), tick })
     }
 
     /// The supervisor's part: the order is carried out. `reply` is handed to the world.
@@ -105,7 +105,7 @@ mod tests {
     fn an_order_is_carried_out_once_and_answered() {
         let launcher = control();
         let world = Control::attach(launcher.fd().unwrap()).unwrap();
-        let order = Order { kind: OrderKind::Restart, drone: DroneId(1), tick: 70 };
+        let order = ProcessRequest { kind: RequestKind::Restart, drone: DroneId(1), tick: 70 };
         let supervisor = std::thread::spawn(move || {
             let mut seen = Vec::new();
             while seen.len() < 2 {
@@ -118,14 +118,14 @@ mod tests {
             seen
         });
         assert_eq!(world.give_order(order, Duration::from_secs(5)).unwrap(), 7);
-        let kill = Order { kind: OrderKind::Kill, ..order };
+        let kill = ProcessRequest { kind: RequestKind::Kill, ..order };
         assert_eq!(world.give_order(kill, Duration::from_secs(5)).unwrap(), 8);
         assert_eq!(supervisor.join().unwrap(), [order, kill]);
     }
 
     #[test]
     fn without_a_supervisor_the_world_does_not_wait_for_ever() {
-        let order = Order { kind: OrderKind::Kill, drone: DroneId(0), tick: 3 };
+        let order = ProcessRequest { kind: RequestKind::Kill, drone: DroneId(0), tick: 3 };
         let error = control().give_order(order, Duration::from_millis(20)).unwrap_err();
         assert!(matches!(error, BusError::NoAnswer { .. }), "{error}");
     }

@@ -14,9 +14,9 @@ const WIDTH: usize = 4;
 /// A drone's side in each partition that is in force: four bits a partition, its side plus 1, or 0 if it is on none.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Sides(pub u32);
+pub struct PartitionMask(pub u32);
 
-impl Sides {
+impl PartitionMask {
     /// Puts the drone on a side of a partition, where it was on none. Numbers from 0, below [`MAX_PARTITIONS`] and
     /// [`MAX_SIDES`]; others are no side.
     pub fn join(&mut self, partition: usize, side: usize) {
@@ -39,16 +39,16 @@ impl Sides {
 /// A drone's radio as faults leave it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Cuts {
+pub struct LinkFaults {
     /// Its side in each partition.
-    pub sides: Sides,
+    pub sides: PartitionMask,
     /// 1 if nobody hears it.
     pub mute: u16,
     /// 1 if it hears nobody.
     pub deaf: u16,
 }
 
-impl Cuts {
+impl LinkFaults {
     /// Why a drone with this radio cannot hear a frame that was sent with `sender`'s, if it cannot.
     #[must_use]
     pub fn cut_off(self, sender: Self) -> Option<DropReason> {
@@ -63,8 +63,8 @@ impl Cuts {
 mod tests {
     use super::*;
 
-    fn on(places: &[(usize, usize)]) -> Sides {
-        let mut sides = Sides::default();
+    fn on(places: &[(usize, usize)]) -> PartitionMask {
+        let mut sides = PartitionMask::default();
         places.iter().for_each(|&(partition, side)| sides.join(partition, side));
         sides
     }
@@ -80,6 +80,6 @@ mod tests {
 
     #[test]
     fn numbers_out_of_range_are_no_side() {
-        assert_eq!(on(&[(8, 0), (0, 15)]), Sides::default());
+        assert_eq!(on(&[(8, 0), (0, 15)]), PartitionMask::default());
     }
 }

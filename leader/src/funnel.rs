@@ -12,14 +12,14 @@ const PASSED_M: f64 = 1e-6;
 
 /// The way past one or several sets and back to the course line, made once and pulled taut every tick.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lane {
+pub struct Corridor {
     constraints: Vec<Constraint>,
     target: Vec2,
 }
 
 /// A taut string.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pull {
+pub struct Steering {
     /// Unit vector of its first leg.
     pub direction: Vec2,
     /// Length to the gate, m; past the gate the negative difference in x, beyond the target straight on.
@@ -28,7 +28,7 @@ pub struct Pull {
     pub total_m: f64,
 }
 
-impl Lane {
+impl Corridor {
     /// A lane past these sets, each with the route taken past it (0 = rightmost), to a target on the course line,
     /// [`RUN_OUT_M`] past the last exit.
     ///
@@ -49,7 +49,7 @@ impl Lane {
     /// Pulls the string taut from a position (finite, m) and measures it up to the abscissa `gate_x_m`. Does not
     /// allocate. Finite wherever the drone is: one that is inside a wall is led out of it.
     #[must_use]
-    pub fn pull(&self, position: Vec2, gate_x_m: f64) -> Pull {
+    pub fn pull(&self, position: Vec2, gate_x_m: f64) -> Steering {
         let past_m = position.x - gate_x_m;
         let mut to_gate_m = (past_m >= 0.0).then_some(-past_m);
         let (mut direction, mut total_m, mut end) = (None, 0.0, position);
@@ -63,7 +63,7 @@ impl Lane {
             end = b;
         });
         let to_gate_m = to_gate_m.unwrap_or(total_m + gate_x_m - end.x);
-        Pull { direction: direction.unwrap_or(Vec2::x()), to_gate_m, total_m }
+        Steering { direction: direction.unwrap_or(Vec2::x()), to_gate_m, total_m }
     }
 
     /// Visits the legs of the taut string, each at least [`PASSED_M`] long in x.

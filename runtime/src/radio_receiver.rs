@@ -4,10 +4,10 @@ use skein_agent::Heard;
 use skein_protocol::digest::Digest;
 use skein_protocol::downlink::{DownlinkView, SenseHead};
 use skein_protocol::frame::AirFrame;
+use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::message::Topic;
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::{AirsAt, DROP_REASONS, DropReason, Radio, Verdict};
-use skein_protocol::sides::Cuts;
+use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio, TransmitTimes};
 use skein_protocol::slot::LinkStats;
 use skein_protocol::{DroneId, MessageRef, SimTime};
 use std::cmp::Reverse;
@@ -30,16 +30,16 @@ pub(crate) struct Pending {
 enum Place {
     /// In the downlink at hand.
     Here(u32),
-    /// In [`Ear::kept`].
+    /// In [`RadioReceiver::kept`].
     Kept(u32),
 }
 
 /// A drone's radio, and the frames on their way to it.
-pub(crate) struct Ear {
+pub(crate) struct RadioReceiver {
     me: DroneId,
     dt_ns: i64,
     radio: Arc<Radio>,
-    airs: AirsAt,
+    airs: TransmitTimes,
     /// How far it hears each topic, m.
     reach_m: [f64; Topic::ALL.len()],
     /// Due in a later tick than they come in: the one due first is the first.
@@ -47,7 +47,7 @@ pub(crate) struct Ear {
     /// Their frames, and the places among them that are free.
     kept: Vec<AirFrame>,
     free: Vec<u32>,
-    /// Heard, heard for the second time, and refused since the last [`Ear::tally`].
+    /// Heard, heard for the second time, and refused since the last [`RadioReceiver::tally`].
     tally: Tally,
 }
 
@@ -61,7 +61,7 @@ pub(crate) struct Tally {
     pub hash: u64,
 }
 
-impl Ear {
+impl RadioReceiver {
     pub fn new(me: DroneId, dt_ns: i64, radio: Arc<Radio>) -> Self {
         Self {
             me,
@@ -90,7 +90,7 @@ impl Ear {
         stats: &mut LinkStats,
     ) {
         let Some(own) = down.drones.get(self.me.index()) else { return };
-        if own.cuts != Cuts::default() || !self.hears_nearby(&down.nearby.locality) {
+        if own.cuts != LinkFaults::default() || !self.hears_nearby(&down.nearby.locality) {
             let frames = 0..down.frames.len();
             frames.for_each(|place| _ = self.take_up((own, now), down.frames, place, arrived, stats));
             return;
@@ -123,9 +123,9 @@ impl Ear {
             self.drop_frames(reason, 1, stats);
             return 1;
         }
-        match self.radio.fate_at(&self.airs, frame, own.position_m.into(), self.dt_ns) {
-            Verdict::Drop(reason) => self.drop_frames(reason, 1, stats),
-            Verdict::Deliver { due, again } => {
+        match self.radio.delivery_at(&self.airs, frame, own.position_m.into(), self.dt_ns) {
+            Delivery::Drop(reason) => self.drop_frames(reason, 1, stats),
+            Delivery::Deliver { due, again } => {
                 self.expect(frame, place as u32, (due, false), now, arrived);
                 again.into_iter().for_each(|due| self.expect(frame, place as u32, (due, true), now, arrived));
             }

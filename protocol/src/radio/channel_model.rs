@@ -1,13 +1,13 @@
 //! What the air does to one frame at one receiver: its delay, its loss, its range, its copies.
 
 use super::burst::Burst;
-use super::key::Draws;
+use super::key::KeyedRng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::SQRT_2;
 
 /// What the air does to a frame. The default is ideal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Air {
+pub struct ChannelModel {
     /// Time on the air; a frame takes at least one tick.
     pub delay: Delay,
     /// Probability that a receiver does not hear a frame, 0 to 1, independent for each (Bernoulli).
@@ -20,7 +20,7 @@ pub struct Air {
     pub duplicate: f64,
 }
 
-impl Air {
+impl ChannelModel {
     /// No frame is heard from farther away, m; infinite unless the range is a hard limit.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
@@ -55,7 +55,7 @@ pub struct Delay {
 
 impl Delay {
     /// A delay, s; never negative. Nothing is drawn where nothing varies.
-    pub(super) fn draw(&self, draws: impl FnOnce() -> Draws) -> f64 {
+    pub(super) fn draw(&self, draws: impl FnOnce() -> KeyedRng) -> f64 {
         let Self { model, mean_s, jitter_s } = *self;
         match model {
             DelayModel::Fixed => mean_s,

@@ -36,7 +36,7 @@ struct Exchange<'a> {
 /// at most the number of drones. `costs` are looked at where the cap is not 0; the total is least if `weighted`.
 pub(crate) fn place(caps: &[Vec<u32>], costs: &[Vec<Cost>], weighted: bool) -> Option<Vec<usize>> {
     let (drones, routes) = (caps.len(), caps.first().map_or(0, Vec::len));
-    let mut exchange = Exchange {
+    let mut matroid_intersection = Exchange {
         caps,
         costs,
         weighted,
@@ -45,8 +45,8 @@ pub(crate) fn place(caps: &[Vec<u32>], costs: &[Vec<Cost>], weighted: bool) -> O
         reach: vec![vec![FREE; drones + 1]; routes],
         entries: vec![vec![NO_ENTRY; drones + 2]; routes],
     };
-    (0..drones).try_for_each(|drone| exchange.insert(drone))?;
-    exchange.route.into_iter().collect()
+    (0..drones).try_for_each(|drone| matroid_intersection.insert(drone))?;
+    matroid_intersection.route.into_iter().collect()
 }
 
 /// Chains of displacements from one new drone.

@@ -1,6 +1,6 @@
 //! What both runtimes put around a pilot: its radio, and the tick's tally.
 
-use crate::ear::{Ear, Pending};
+use crate::radio_receiver::{Pending, RadioReceiver};
 use skein_agent::{Heard, Pilot};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Memory for the work of one tick. Drones that are stepped in turn share it: it stays in the caches, and holds what the
 /// busiest of them needs, not what each of them once needed.
 #[derive(Default)]
-pub struct Desk {
+pub struct StepScratch {
     /// Due now.
     arrived: Vec<Pending>,
     /// Empty between ticks.
@@ -21,25 +21,25 @@ pub struct Desk {
 }
 
 /// One drone: its pilot and its radio.
-pub struct Cockpit {
+pub struct PilotHost {
     me: DroneId,
     dt_s: f64,
-    ear: Ear,
+    radio_receiver: RadioReceiver,
     pilot: Box<dyn Pilot>,
     frames_total: u64,
 }
 
-impl Cockpit {
+impl PilotHost {
     /// A drone before its first tick.
     #[must_use]
     pub fn new(me: DroneId, dt_s: f64, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
-        let ear = Ear::new(me, (dt_s * 1e9).round() as i64, radio.into());
-        Self { me, dt_s, ear, pilot, frames_total: 0 }
+        let radio_receiver = RadioReceiver::new(me, (dt_s * 1e9).round() as i64, radio.into());
+        Self { me, dt_s, radio_receiver, pilot, frames_total: 0 }
     }
 
     /// Puts the frames of a downlink that comes too late to be answered through the radio, which counts in `stats`.
-    pub fn overhear(&mut self, down: &DownlinkView<'_>, desk: &mut Desk, stats: &mut LinkStats) {
-        self.ear.receive(down, SimTime(i64::MIN), &mut desk.arrived, stats);
+    pub fn overhear(&mut self, down: &DownlinkView<'_>, desk: &mut StepScratch, stats: &mut LinkStats) {
+        self.radio_receiver.receive(down, SimTime(i64::MIN), &mut desk.arrived, stats);
     }
 
     /// Puts the frames of the newest downlink through the radio, and steps the pilot on it: fills its actuator slot and
@@ -47,21 +47,21 @@ impl Cockpit {
     pub fn step<'d>(
         &mut self,
         down: &DownlinkView<'_>,
-        desk: &'d mut Desk,
+        desk: &'d mut StepScratch,
         slot: &mut Slot,
         stats: &mut LinkStats,
     ) -> &'d [Message] {
         desk.arrived.clear();
         desk.said.clear();
         let Some(senses) = down.senses(self.me) else { return &desk.said };
-        self.ear.receive(down, senses.now, &mut desk.arrived, stats);
+        self.radio_receiver.receive(down, senses.now, &mut desk.arrived, stats);
         let mut heard = emptied(std::mem::take(&mut desk.heard));
-        self.ear.deliver((senses.tick, senses.now), down.frames, &mut desk.arrived, &mut heard, stats);
+        self.radio_receiver.deliver((senses.tick, senses.now), down.frames, &mut desk.arrived, &mut heard, stats);
         let command = self.pilot.step(&senses, &heard, &mut desk.said);
         desk.heard = emptied(heard);
         self.frames_total += desk.said.len() as u64;
         self.count_ages(&senses, desk, stats);
-        let tally = self.ear.tally();
+        let tally = self.radio_receiver.tally();
         *slot = Slot {
             heard: tally.heard,
             duplicates: tally.duplicates,
@@ -75,7 +75,7 @@ impl Cockpit {
     }
 
     /// How old its knowledge of its peers is whenever it beacons.
-    fn count_ages(&self, senses: &Senses<'_>, desk: &mut Desk, stats: &mut LinkStats) {
+    fn count_ages(&self, senses: &Senses<'_>, desk: &mut StepScratch, stats: &mut LinkStats) {
         if desk.said.iter().any(|message| matches!(message, Message::Pose(_))) {
             self.pilot.pose_ages_s(senses.now, &mut desk.ages);
             let ticks = |age_s: &f64| (age_s / self.dt_s).round().max(0.0) as u64;

@@ -8,7 +8,7 @@
 
 use crate::stage::{Forecast, Stage, end_slots};
 use crate::swarm_pilot::SwarmPilot;
-use skein_leader::ledger::Orders;
+use skein_leader::ledger::PlanBundle;
 use skein_leader::planner::{Member, Objective};
 use skein_protocol::downlink::SensedShape;
 use skein_protocol::{DroneId, SimTime};
@@ -20,7 +20,7 @@ const STEP_S: f64 = 0.1;
 /// Drone-steps rehearsed in a second, the same share of them in each tick.
 const STEPS_A_SECOND: f64 = 120_000.0;
 /// Larger swarms are not rehearsed: the neighbours of all drones are looked for pair by pair.
-pub const MOST_MEMBERS: usize = 32;
+pub const MAX_MEMBERS: usize = 32;
 /// A grouping has to cost less than the shortest ways by this share of their cost. …
 const WORTH: f64 = 0.03;
 /// … While there is room for obstacles that nobody has seen yet, it has to cost less by this share, …
@@ -49,7 +49,7 @@ pub struct Start {
 
 /// A rehearsal under way.
 #[derive(Clone, Debug)]
-pub struct Rehearsal {
+pub struct Rollout {
     members: Vec<DroneId>,
     /// Steps of all drones in a tick.
     steps_a_tick: usize,
@@ -61,17 +61,17 @@ pub struct Rehearsal {
     /// Which of the alternatives is flown while the leader thinks.
     meanwhile: usize,
     /// The shortest ways first, the rule's second.
-    alternatives: Vec<Orders>,
+    alternatives: Vec<PlanBundle>,
     forecasts: Vec<Forecast>,
     /// The swarm while the leader thinks, then as it will be at the decision.
     thinking: Stage,
     stage: Option<Stage>,
 }
 
-impl Rehearsal {
+impl Rollout {
     /// A rehearsal of these alternatives by their leader, before it obeys one of them.
     #[must_use]
-    pub fn new(leader: &SwarmPilot, start: Start, all: Vec<Orders>) -> Self {
+    pub fn new(leader: &SwarmPilot, start: Start, all: Vec<PlanBundle>) -> Self {
         let dt_s = leader.params.dt_s;
         let ticks = ((STEP_S / dt_s).round() as u64).max(1);
         let step_s = dt_s * ticks as f64;
@@ -91,7 +91,7 @@ impl Rehearsal {
             sees_the_end: leader.sees_the_end(crew.len()),
             decision_tick: start.tick + ticks * steps,
             meanwhile,
-            alternatives: all.into_iter().map(|orders| restamped(orders, decision)).collect(),
+            alternatives: all.into_iter().map(|bundle| restamped(bundle, decision)).collect(),
             forecasts: Vec::new(),
             thinking,
             stage: None,
@@ -105,7 +105,7 @@ impl Rehearsal {
     }
 
     /// Goes on for one tick; the chosen orders once it is time.
-    pub fn work(&mut self, tick: u64) -> Option<Orders> {
+    pub fn work(&mut self, tick: u64) -> Option<PlanBundle> {
         if tick >= self.decision_tick {
             return Some(self.choose());
         }
@@ -135,14 +135,14 @@ impl Rehearsal {
 
     /// What was found to be best by now; what is flown already if nothing was found yet.
     #[must_use]
-    pub fn choose(&self) -> Orders {
+    pub fn choose(&self) -> PlanBundle {
         let best = if self.forecasts.is_empty() { self.meanwhile } else { best(&self.forecasts, self.sees_the_end) };
-        let mut orders = self.alternatives[best].clone();
-        orders.plan.candidates = self.forecasts.len() as u32;
+        let mut bundle = self.alternatives[best].clone();
+        bundle.plan.candidates = self.forecasts.len() as u32;
         if let Some(forecast) = self.forecasts.get(best).filter(|forecast| forecast.good) {
-            orders.plan.predicted_s = forecast.pass_s;
+            bundle.plan.predicted_s = forecast.pass_s;
         }
-        orders
+        bundle
     }
 }
 
@@ -189,13 +189,13 @@ impl SwarmPilot {
 }
 
 /// Orders that replace those which the swarm obeys while the leader thinks.
-fn restamped(mut orders: Orders, decision: SimTime) -> Orders {
-    let id = &mut orders.plan.id;
+fn restamped(mut bundle: PlanBundle, decision: SimTime) -> PlanBundle {
+    let id = &mut bundle.plan.id;
     id.epoch = id.epoch.saturating_add(1);
     let id = *id;
-    orders.plan.stamp = decision;
-    orders.parts.iter_mut().for_each(|part| part.id = id);
-    orders
+    bundle.plan.stamp = decision;
+    bundle.parts.iter_mut().for_each(|part| part.id = id);
+    bundle
 }
 
 #[cfg(test)]
