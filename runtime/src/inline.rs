@@ -59,7 +59,7 @@ pub fn run_with(
     let (opened, mut signal, mut sink_error) = (Instant::now(), None, None);
     while world.ended().is_none() {
         let start = world.now();
-        world.orders().iter().for_each(|&order| {
+        world.process_commands().iter().for_each(|&order| {
             carry_out(order, &mut handles, |id, incarnation| yard.pilot_host(id, incarnation, start))
         });
         let down = world.downlink().view();

@@ -121,11 +121,11 @@ fn planner(scenario: &Scenario) -> PlannerParams {
     let (drone, avoidance) = (&scenario.drone, &scenario.avoidance);
     PlannerParams {
         strategy: match scenario.strategy {
-            StrategyKey::CongestionAware => Strategy::LookAhead(Objective {
+            StrategyKey::LookAhead => Strategy::LookAhead(Objective {
                 energy_per_kj: scenario.objective.energy_per_kj,
                 time_per_s: scenario.objective.time_per_s,
             }),
-            StrategyKey::CongestionAwarePaper => Strategy::PaperRule,
+            StrategyKey::PaperRule => Strategy::PaperRule,
             StrategyKey::ShortestPath => Strategy::ShortestPath,
             StrategyKey::Fixed { left, right } => Strategy::Fixed { left: left as usize, right: right as usize },
         },

@@ -2,7 +2,7 @@
 
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Fault as Keys, FaultEvent, FaultKind, FaultTarget, Scenario, Sensor};
-use skein_world::faults::{Effect, Fault, FaultPlan, FaultTrigger, Noise, When, Whom, Wind};
+use skein_world::faults::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, Wind};
 
 /// How long a gust lasts unless the scenario says, s.
 const GUST_S: f64 = 1.0;
@@ -12,37 +12,37 @@ pub(crate) fn faults(scenario: &Scenario) -> FaultPlan {
     let drones = scenario.formation.drones;
     let fault = |keys: &Keys| Fault {
         effect: effect(keys, drones),
-        when: when(keys),
-        whom: whom(keys),
+        time: time(keys),
+        targets: targets(keys),
         for_s: keys.for_s.unwrap_or(f64::INFINITY),
     };
     FaultPlan { seed: scenario.seed, faults: scenario.fault_plan.iter().map(fault).collect() }
 }
 
-fn effect(keys: &Keys, drones: u32) -> Effect {
+fn effect(keys: &Keys, drones: u32) -> FaultEffect {
     let vector = |key: Option<[f64; 2]>| key.map_or_else(Vec2::zeros, Vec2::from);
     match keys.kind {
-        FaultKind::Kill => Effect::Kill,
-        FaultKind::Freeze => Effect::Freeze,
-        FaultKind::Restart => Effect::Restart,
-        FaultKind::Slow => Effect::Slow(keys.reaction_time_s.unwrap_or(0.0)),
-        FaultKind::Deaf => Effect::Deaf,
-        FaultKind::Mute => Effect::Mute,
+        FaultKind::Kill => FaultEffect::Kill,
+        FaultKind::Freeze => FaultEffect::Freeze,
+        FaultKind::Restart => FaultEffect::Restart,
+        FaultKind::Slow => FaultEffect::Slow(keys.reaction_time_s.unwrap_or(0.0)),
+        FaultKind::Deaf => FaultEffect::Deaf,
+        FaultKind::Mute => FaultEffect::Mute,
         FaultKind::Partition => {
             let sides = keys.sides.as_ref().map(|sides| sides.of(drones)).unwrap_or_default();
-            Effect::Partition(sides.into_iter().map(ids).collect())
+            FaultEffect::Partition(sides.into_iter().map(ids).collect())
         }
-        FaultKind::Blind => Effect::Blind {
+        FaultKind::Blind => FaultEffect::Blind {
             obstacles: keys.sensor != Some(Sensor::Ranging),
             ranging: keys.sensor != Some(Sensor::Obstacles),
         },
-        FaultKind::Noise => Effect::Noise(Noise {
+        FaultKind::Noise => FaultEffect::Noise(Noise {
             position_bias_m: vector(keys.position_bias_m),
             position_std_m: keys.position_std_m.unwrap_or(0.0),
             velocity_bias_mps: vector(keys.velocity_bias_mps),
             velocity_std_mps: keys.velocity_std_mps.unwrap_or(0.0),
         }),
-        FaultKind::Wind => Effect::Wind(Wind {
+        FaultKind::Wind => FaultEffect::Wind(Wind {
             acceleration_mps2: vector(keys.wind_mps2),
             gust_mps2: keys.gust_mps2.unwrap_or(0.0),
             gust_s: keys.gust_s.unwrap_or(GUST_S),
@@ -50,8 +50,8 @@ fn effect(keys: &Keys, drones: u32) -> Effect {
     }
 }
 
-fn when(keys: &Keys) -> When {
-    let Some(event) = keys.on else { return When::At(keys.at_s.unwrap_or(0.0)) };
+fn time(keys: &Keys) -> FaultTime {
+    let Some(event) = keys.on else { return FaultTime::At(keys.at_s.unwrap_or(0.0)) };
     let event = match event {
         FaultEvent::Detected => FaultTrigger::Detected,
         FaultEvent::Grouped => FaultTrigger::Grouped,
@@ -62,20 +62,20 @@ fn when(keys: &Keys) -> When {
         FaultEvent::LeaderElected => FaultTrigger::LeaderElected,
         FaultEvent::GroupLeaderElected => FaultTrigger::GroupLeaderElected,
     };
-    When::On { event, stage: keys.stage as usize, after_s: keys.after_s }
+    FaultTime::On { event, stage: keys.stage as usize, after_s: keys.after_s }
 }
 
-fn whom(keys: &Keys) -> Whom {
+fn targets(keys: &Keys) -> FaultTargets {
     match (keys.drone, &keys.drones, keys.target) {
-        (Some(drone), _, _) => Whom::Drones(ids(vec![drone])),
-        (_, Some(drones), _) => Whom::Drones(ids(drones.clone())),
-        (_, _, Some(FaultTarget::Leader)) => Whom::Leader,
-        (_, _, Some(FaultTarget::GroupLeader(group))) => Whom::GroupLeader(group),
-        (_, _, Some(FaultTarget::FirstInQueue)) => Whom::FirstInQueue,
-        (_, _, Some(FaultTarget::LastInQueue)) => Whom::LastInQueue,
-        (_, _, Some(FaultTarget::Member)) => Whom::Member,
-        (_, _, Some(FaultTarget::Random)) => Whom::Random,
-        (_, _, Some(FaultTarget::All) | None) => Whom::All,
+        (Some(drone), _, _) => FaultTargets::Drones(ids(vec![drone])),
+        (_, Some(drones), _) => FaultTargets::Drones(ids(drones.clone())),
+        (_, _, Some(FaultTarget::Leader)) => FaultTargets::Leader,
+        (_, _, Some(FaultTarget::GroupLeader(group))) => FaultTargets::GroupLeader(group),
+        (_, _, Some(FaultTarget::FirstInQueue)) => FaultTargets::FirstInQueue,
+        (_, _, Some(FaultTarget::LastInQueue)) => FaultTargets::LastInQueue,
+        (_, _, Some(FaultTarget::Member)) => FaultTargets::Member,
+        (_, _, Some(FaultTarget::Random)) => FaultTargets::Random,
+        (_, _, Some(FaultTarget::All) | None) => FaultTargets::All,
     }
 }
 

@@ -127,7 +127,7 @@ impl WorldServer {
 
     fn tick(&mut self, mut pacer: Option<&mut Pacer>) -> Result<(), RuntimeError> {
         let tick = self.world.tick();
-        for order in self.world.orders().to_vec() {
+        for order in self.world.process_commands().to_vec() {
             let begun = Instant::now();
             self.carry_out(order)?;
             if let Some(pacer) = &mut pacer {

@@ -7,13 +7,13 @@ use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::mission;
 use skein_runtime::pilot_host::StepScratch;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
 
 fn scenario(name: &str) -> Scenario {
     let path = format!("{}/../scenarios/paper/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
-    Scenario::parse(&text, Source { name: &path, stem: name }, &[]).unwrap()
+    Scenario::parse(&text, ScenarioSource { name: &path, stem: name }, &[]).unwrap()
 }
 
 /// Flies to the end with one drone's process gone from tick `at` on.

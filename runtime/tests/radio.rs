@@ -5,13 +5,14 @@ use skein_protocol::SimTime;
 use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio};
 use skein_protocol::record::{EventKind, RecordSink, RecordView, RunEvent, Totals};
 use skein_runtime::{inline, mission};
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 fn scenario(sets: &[(&str, &str)]) -> Scenario {
     let path = format!("{}/../scenarios/paper/s2-right.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
     let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-    Scenario::parse(&text, Source { name: &path, stem: "s2-right" }, &sets).unwrap_or_else(|errors| panic!("{errors}"))
+    Scenario::parse(&text, ScenarioSource { name: &path, stem: "s2-right" }, &sets)
+        .unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 /// Looks every frame's fate up in the records, but for the last tick's: those are on the air when the mission ends.

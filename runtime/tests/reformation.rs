@@ -7,7 +7,7 @@ use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::mission;
 use skein_runtime::pilot_host::StepScratch;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
 
 /// The digest of S2 flown with one method; the mission has to end in formation, the distances kept.
@@ -16,7 +16,7 @@ fn fly(name: &str, lambda: &str) -> u64 {
     let text = std::fs::read_to_string(&path).unwrap();
     let sets = [("mission.reformation", name), ("mission.tps_lambda", lambda)];
     let sets = sets.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    let scenario = Scenario::parse(&text, Source { name: &path, stem: "s2-right" }, &sets).unwrap();
+    let scenario = Scenario::parse(&text, ScenarioSource { name: &path, stem: "s2-right" }, &sets).unwrap();
     let world = to_the_end(&scenario);
     let separation_m = world.min_separation_m();
     assert_eq!(world.ended(), Some(Outcome::Reached), "{name}");

@@ -3,7 +3,7 @@
 
 use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, RunEvent};
 use skein_runtime::inline;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use std::collections::BTreeMap;
 
 /// The leader thinks for so long, s.
@@ -52,7 +52,7 @@ fn fly_with(name: &str, overrides: &[(&str, &str)]) -> Watch {
     let text = std::fs::read_to_string(&path).unwrap();
     let overrides: Vec<(String, String)> =
         overrides.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
-    let scenario = Scenario::parse(&text, Source { name: &path, stem: name }, &overrides).unwrap();
+    let scenario = Scenario::parse(&text, ScenarioSource { name: &path, stem: name }, &overrides).unwrap();
     let mut watch = Watch::default();
     inline::run(&scenario, &mut watch, || None).unwrap();
     assert_eq!(watch.outcome, Some(Outcome::Reached), "{name}");

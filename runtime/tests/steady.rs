@@ -6,7 +6,7 @@ use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::mission;
 use skein_runtime::pilot_host::{PilotHost, StepScratch};
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -47,7 +47,7 @@ fn scenario(drones: u32, more: &str) -> Scenario {
         "[formation]\nshape = \"grid\"\ndrones = {drones}\nspacing_m = 65\n[drone]\nsafe_distance_m = 37\n\
          [mission]\nstop_x_m = 100000\n[time]\ntimeout_s = 10000\n{more}"
     );
-    Scenario::parse(&text, Source { name: "steady", stem: "steady" }, &[]).unwrap()
+    Scenario::parse(&text, ScenarioSource { name: "steady", stem: "steady" }, &[]).unwrap()
 }
 
 struct Swarm {
@@ -75,7 +75,7 @@ impl Swarm {
         let mut spent = [0, 0];
         let mut count = |who: usize, before: u64| spent[who] += COUNT.get() - before;
         let before = COUNT.get();
-        self.world.orders();
+        self.world.process_commands();
         let down = self.world.downlink();
         count(1, before);
         // The test's own copy.

@@ -3,7 +3,7 @@
 
 use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView};
 use skein_runtime::inline;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// How a mission ended, why, and after how many ticks.
 #[derive(Default)]
@@ -32,7 +32,7 @@ fn watch(name: &str, keys: &[(&str, &str)]) -> Ending {
     let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
     let keys: Vec<(String, String)> = keys.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
-    let scenario = Scenario::parse(&text, Source { name: &path, stem: "flight" }, &keys).unwrap();
+    let scenario = Scenario::parse(&text, ScenarioSource { name: &path, stem: "flight" }, &keys).unwrap();
     let mut ending = Ending::default();
     inline::run(&scenario, &mut ending, || None).unwrap();
     ending

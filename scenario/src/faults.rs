@@ -77,7 +77,7 @@ pub struct Fault {
     pub reaction_time_s: Option<f64>,
     /// With kind = "partition", which needs it: sets of drones between which no frame passes; `"halves"`: the first
     /// half of the numbers and the second. Who is in no set hears and is heard by all.
-    pub sides: Option<Sides>,
+    pub sides: Option<PartitionSides>,
     /// With kind = "blind": which sensor tells nothing; absent: both.
     pub sensor: Option<Sensor>,
     /// With kind = "noise": added to what the drone is told of its own position, [x, y].
@@ -280,9 +280,9 @@ impl JsonSchema for FaultTarget {
 /// The sides of a partition.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Sides {
+pub enum PartitionSides {
     /// The first half of the numbers, the larger if they are odd, and the second: written `"halves"`.
-    Word(Halves),
+    Word(SidesWord),
     /// The drones of each side.
     Lists(Vec<Vec<u32>>),
 }
@@ -290,17 +290,17 @@ pub enum Sides {
 /// The only word for sides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Halves {
+pub enum SidesWord {
     /// Two halves, by number.
     Halves,
 }
 
-impl Sides {
+impl PartitionSides {
     /// The drones of each side in a swarm of so many.
     #[must_use]
     pub fn of(&self, drones: u32) -> Vec<Vec<u32>> {
         match self {
-            Self::Word(Halves::Halves) => {
+            Self::Word(SidesWord::Halves) => {
                 let middle = drones.div_ceil(2);
                 vec![(0..middle).collect(), (middle..drones).collect()]
             }
@@ -309,9 +309,9 @@ impl Sides {
     }
 }
 
-impl JsonSchema for Sides {
+impl JsonSchema for PartitionSides {
     fn schema_name() -> Cow<'static, str> {
-        "Sides".into()
+        "PartitionSides".into()
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
@@ -349,6 +349,6 @@ mod tests {
 
     #[test]
     fn halves_are_by_number() {
-        assert_eq!(Sides::Word(Halves::Halves).of(5), [vec![0, 1, 2], vec![3, 4]]);
+        assert_eq!(PartitionSides::Word(SidesWord::Halves).of(5), [vec![0, 1, 2], vec![3, 4]]);
     }
 }

@@ -22,7 +22,9 @@ mod rules;
 mod strategy;
 
 pub use error::{Issue, ScenarioErrors};
-pub use faults::{Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, MAX_FAULTS, Sensor, Sides};
+pub use faults::{
+    Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, MAX_FAULTS, PartitionSides, Sensor, SidesWord,
+};
 pub use guidance::Guidance;
 pub use keys::{
     Avoidance, Drone, End, Formation, FormationShape, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol, Reformation,
@@ -30,7 +32,7 @@ pub use keys::{
 };
 pub use objective::Objective;
 pub use obstacle::Obstacle;
-pub use parse::Source;
+pub use parse::ScenarioSource;
 pub use radio::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
-pub use reference::{Key, keys, markdown, schema};
+pub use reference::{KeyDoc, keys, markdown, schema};
 pub use strategy::{Strategy, StrategyError};

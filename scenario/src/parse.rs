@@ -12,7 +12,7 @@ use toml::de::DeTable;
 
 /// What a scenario's text is called.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct ScenarioSource<'a> {
     /// Its path, for messages.
     pub name: &'a str,
     /// The file's name without its ending: the scenario's name where the text gives none. Characters that a name must
@@ -27,7 +27,11 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioErrors`], each with its place. Errors of TOML's syntax come alone; so do unknown keys, wrong types and
     /// ranges; rules between keys are checked last.
-    pub fn parse(text: &str, source: Source<'_>, overrides: &[(String, String)]) -> Result<Self, ScenarioErrors> {
+    pub fn parse(
+        text: &str,
+        source: ScenarioSource<'_>,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioErrors> {
         let text_of = Text::new(text, source, overrides);
         let (table, errors) = DeTable::parse_recoverable(text);
         if !errors.is_empty() {
@@ -54,7 +58,7 @@ impl Scenario {
     /// As [`Scenario::parse`]; the first byte that is not UTF-8 is an error of its own.
     pub fn parse_bytes(
         bytes: &[u8],
-        source: Source<'_>,
+        source: ScenarioSource<'_>,
         overrides: &[(String, String)],
     ) -> Result<Self, ScenarioErrors> {
         let error = match std::str::from_utf8(bytes) {
@@ -73,7 +77,7 @@ impl Scenario {
     ///
     /// # Errors
     /// As [`Scenario::parse`]; JSON has no places, so every error is at 1:1.
-    pub fn from_json(json: &serde_json::Value, source: Source<'_>) -> Result<Self, ScenarioErrors> {
+    pub fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) -> Result<Self, ScenarioErrors> {
         Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
     }
 }
@@ -82,12 +86,12 @@ impl Scenario {
 struct Text<'a> {
     text: &'a str,
     lines: Lines<'a>,
-    source: Source<'a>,
+    source: ScenarioSource<'a>,
     overrides: &'a [(String, String)],
 }
 
 impl<'a> Text<'a> {
-    fn new(text: &'a str, source: Source<'a>, overrides: &'a [(String, String)]) -> Self {
+    fn new(text: &'a str, source: ScenarioSource<'a>, overrides: &'a [(String, String)]) -> Self {
         Self { text, lines: Lines::new(text), source, overrides }
     }
 

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 
 /// One key of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Key {
+pub struct KeyDoc {
     /// Where it stands, such as `time.dt_s`; keys of the list `obstacle` as `obstacle.rectangle.centre_m`.
     pub path: String,
     /// Its unit, from the ending of its name; empty if it has none.
@@ -22,7 +22,7 @@ pub struct Key {
     pub meaning: String,
 }
 
-impl Key {
+impl KeyDoc {
     /// The key's own name.
     pub(crate) fn leaf(&self) -> &str {
         self.path.rsplit('.').next().unwrap_or_default()
@@ -38,17 +38,17 @@ pub fn schema() -> Json {
 
 /// Every key of a scenario, in the order of its tables.
 #[must_use]
-pub fn keys() -> Vec<Key> {
+pub fn keys() -> Vec<KeyDoc> {
     keys_of(&schema())
 }
 
-pub(crate) fn keys_of(schema: &Json) -> Vec<Key> {
+pub(crate) fn keys_of(schema: &Json) -> Vec<KeyDoc> {
     let mut keys = Vec::new();
     collect(schema, "", &mut keys);
     keys
 }
 
-fn collect(table: &Json, path: &str, keys: &mut Vec<Key>) {
+fn collect(table: &Json, path: &str, keys: &mut Vec<KeyDoc>) {
     let properties = table["properties"].as_object().into_iter().flatten();
     for (name, schema) in properties {
         let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
@@ -69,7 +69,7 @@ fn is_required(table: &Json, name: &str) -> bool {
     table["required"].as_array().is_some_and(|required| required.iter().any(|r| r == name))
 }
 
-fn key(path: String, schema: &Json, required: bool) -> Key {
+fn key(path: String, schema: &Json, required: bool) -> KeyDoc {
     let default = match &schema["default"] {
         _ if required => "required".to_owned(),
         Json::Null => "absent".to_owned(),
@@ -81,7 +81,7 @@ fn key(path: String, schema: &Json, required: bool) -> Key {
     for word in present(schema)["oneOf"].as_array().into_iter().flatten() {
         let _ = write!(meaning, " {}: {}", word["const"], text(word));
     }
-    Key { unit: unit(&path).unwrap_or_default(), range: values(schema), default, meaning, path }
+    KeyDoc { unit: unit(&path).unwrap_or_default(), range: values(schema), default, meaning, path }
 }
 
 /// The unit that a key's name ends with; indices behind it are skipped.
@@ -155,7 +155,7 @@ pub fn markdown() -> String {
             heading(&mut page, &schema, &here);
             table = Some(here);
         }
-        let Key { unit, range, default, meaning, .. } = &key;
+        let KeyDoc { unit, range, default, meaning, .. } = &key;
         let _ = writeln!(page, "| `{}` | {unit} | {range} | {default} | {meaning} |", key.leaf());
     }
     page

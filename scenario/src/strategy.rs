@@ -14,9 +14,9 @@ pub enum Strategy {
     /// `congestion-aware`: the best few groupings by the paper's rule, and the shortest paths, are flown ahead in the
     /// leader's mind; the best by the scenario's objective is taken.
     #[default]
-    CongestionAware,
+    LookAhead,
     /// `congestion-aware-paper`: the paper's rule to the letter (A3, C1), no rehearsal.
-    CongestionAwarePaper,
+    PaperRule,
     /// `shortest-path`: every drone takes its own shortest path.
     ShortestPath,
     /// `fixed:L/R`: so many drones to each side of the only obstacle.
@@ -38,8 +38,8 @@ pub struct StrategyError {
 impl Strategy {
     /// The words without numbers in them.
     pub const WORDS: [(&str, Self); 3] = [
-        ("congestion-aware", Self::CongestionAware),
-        ("congestion-aware-paper", Self::CongestionAwarePaper),
+        ("congestion-aware", Self::LookAhead),
+        ("congestion-aware-paper", Self::PaperRule),
         ("shortest-path", Self::ShortestPath),
     ];
 }
@@ -66,8 +66,8 @@ impl FromStr for Strategy {
 impl fmt::Display for Strategy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::CongestionAware => f.write_str("congestion-aware"),
-            Self::CongestionAwarePaper => f.write_str("congestion-aware-paper"),
+            Self::LookAhead => f.write_str("congestion-aware"),
+            Self::PaperRule => f.write_str("congestion-aware-paper"),
             Self::ShortestPath => f.write_str("shortest-path"),
             Self::Fixed { left, right } => write!(f, "fixed:{left}/{right}"),
         }

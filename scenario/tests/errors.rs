@@ -1,9 +1,9 @@
 //! What is wrong with a scenario is said with its place, what was found and what was expected.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
-use skein_scenario::{Scenario, ScenarioErrors, Source};
+use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
 
-const SOURCE: Source<'_> = Source { name: "bad.toml", stem: "bad" };
+const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "bad.toml", stem: "bad" };
 
 fn parse(text: &str, sets: &[(&str, &str)]) -> Result<Scenario, ScenarioErrors> {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();

@@ -1,10 +1,10 @@
 //! The keys of faults: what is read, and what is refused with its place.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
-use skein_scenario::{Fault, FaultEvent, FaultKind, FaultTarget, Scenario, ScenarioErrors, Source};
+use skein_scenario::{Fault, FaultEvent, FaultKind, FaultTarget, Scenario, ScenarioErrors, ScenarioSource};
 
 const HEAD: &str = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [300, 0]\nradius_m = 20\n";
-const SOURCE: Source<'_> = Source { name: "f.toml", stem: "f" };
+const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "f.toml", stem: "f" };
 
 fn parse(text: &str, sets: &[(&str, &str)]) -> Result<Scenario, ScenarioErrors> {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();

@@ -1,7 +1,7 @@
 //! The scenario files of this repository, and the key reference.
 #![allow(clippy::disallowed_methods, clippy::unwrap_used, reason = "tests read files, and fail where they cannot")]
 
-use skein_scenario::{End, Scenario, Source};
+use skein_scenario::{End, Scenario, ScenarioSource};
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
@@ -24,7 +24,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 
 fn load(path: &Path) -> Scenario {
     let (name, stem) = (path.to_string_lossy(), path.file_stem().unwrap().to_string_lossy());
-    let source = Source { name: &name, stem: &stem };
+    let source = ScenarioSource { name: &name, stem: &stem };
     Scenario::parse_bytes(&std::fs::read(path).unwrap(), source, &[]).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
@@ -34,7 +34,7 @@ fn every_file_below_scenarios_is_valid_and_survives_json_and_toml() {
     assert!(files.len() >= 9, "only {} files", files.len());
     for path in files {
         let scenario = load(&path);
-        let source = Source { name: "again", stem: "again" };
+        let source = ScenarioSource { name: "again", stem: "again" };
         let json = serde_json::to_string(&scenario).unwrap();
         assert_eq!(serde_json::from_str::<Scenario>(&json).unwrap(), scenario, "{}", path.display());
         let checked = Scenario::from_json(&serde_json::from_str(&json).unwrap(), source);

@@ -4,9 +4,9 @@
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Burst, ChannelModel, Delay, DelayModel, Link, Radio, Range, Scope, SharedChannel};
 use skein_protocol::{DroneId, Vec2};
-use skein_scenario::{Preset, Scenario, Source};
+use skein_scenario::{Preset, Scenario, ScenarioSource};
 
-const SOURCE: Source<'_> = Source { name: "r.toml", stem: "r" };
+const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "r.toml", stem: "r" };
 
 fn try_parse(radio: &str, sets: &[(&str, &str)]) -> Result<Scenario, String> {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();

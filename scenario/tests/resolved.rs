@@ -5,9 +5,9 @@ use proptest::prelude::*;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::Radio;
-use skein_scenario::{Failsafe, Scenario, Source, Strategy, schema};
+use skein_scenario::{Failsafe, Scenario, ScenarioSource, Strategy, schema};
 
-const SOURCE: Source<'_> = Source { name: "s.toml", stem: "my mission" };
+const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "s.toml", stem: "my mission" };
 
 fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
@@ -17,7 +17,7 @@ fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
 #[test]
 fn the_least_scenario_has_the_papers_defaults() {
     let s = parse("[formation]", &[]);
-    assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::CongestionAware));
+    assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::LookAhead));
     assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
     assert!((s.stopping_distance_m() - 10.0).abs() < 1e-9);
     assert_eq!(s.starts(), Shape::NestedV.slots(8, 35.0));

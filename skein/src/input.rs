@@ -2,7 +2,7 @@
 
 use crate::cli::ScenarioArgs;
 use crate::exit::Failure;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// A scenario file is refused beyond this, bytes.
 const FILE_LIMIT: u64 = 16 << 20;
@@ -25,5 +25,5 @@ pub fn scenario(args: &ScenarioArgs) -> Result<Scenario, Failure> {
     let mut overrides = args.overrides.clone();
     overrides.extend(args.strategy.iter().map(|value| ("strategy".to_owned(), format!("{value:?}"))));
     overrides.extend(args.seed.iter().map(|value| ("seed".to_owned(), value.clone())));
-    Scenario::parse_bytes(&bytes, Source { name: &name, stem: &stem }, &overrides).map_err(Failure::diagnostic)
+    Scenario::parse_bytes(&bytes, ScenarioSource { name: &name, stem: &stem }, &overrides).map_err(Failure::diagnostic)
 }

@@ -22,18 +22,18 @@ pub struct FaultPlan {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// What happens.
-    pub effect: Effect,
+    pub effect: FaultEffect,
     /// When.
-    pub when: When,
+    pub time: FaultTime,
     /// To whom.
-    pub whom: Whom,
-    /// For how long, s; infinite: to the end of the mission. No part of [`Effect::Kill`].
+    pub targets: FaultTargets,
+    /// For how long, s; infinite: to the end of the mission. No part of [`FaultEffect::Kill`].
     pub for_s: f64,
 }
 
 /// What a fault does.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub enum FaultEffect {
     /// The process is killed.
     Kill,
     /// The process is stopped, and continued in the end.
@@ -46,7 +46,7 @@ pub enum Effect {
     Deaf,
     /// Nobody hears the drone.
     Mute,
-    /// No frame passes between drones on different sides. `Fault::whom` means nothing.
+    /// No frame passes between drones on different sides. `Fault::targets` means nothing.
     Partition(Vec<Vec<DroneId>>),
     /// Sensors tell nothing.
     Blind {
@@ -87,7 +87,7 @@ pub struct Wind {
 
 /// When a fault happens: in the first tick at or after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum When {
+pub enum FaultTime {
     /// At this time, s.
     At(f64),
     /// After an event.
@@ -124,7 +124,7 @@ pub enum FaultTrigger {
 
 /// Whom a fault meets: settled when it happens. A role that nobody has then is waited for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Whom {
+pub enum FaultTargets {
     /// These, as far as they live.
     Drones(Vec<DroneId>),
     /// Who leads most: the shallowest group, then the highest ballot, then the lowest number.
@@ -156,7 +156,7 @@ pub enum ProcessCommand {
     Restart(DroneId, u32),
 }
 
-impl Effect {
+impl FaultEffect {
     /// What it is called.
     #[must_use]
     pub fn kind(&self) -> FaultKind {

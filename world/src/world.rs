@@ -1,6 +1,6 @@
 //! One mission, a tick at a time.
 //!
-//! In each tick: [`World::orders`], and what they say done to processes; [`World::downlink`]; then for each living drone [`World::take_slot`] and [`World::take_frames`], or
+//! In each tick: [`World::process_commands`], and what they say done to processes; [`World::downlink`]; then for each living drone [`World::take_slot`] and [`World::take_frames`], or
 //! [`World::hold`], or [`World::mark_dead`]; then [`World::advance`] and [`World::record`]. When [`World::ended`] says
 //! so: [`World::finish`] and, once more, [`World::record`].
 
@@ -46,7 +46,7 @@ pub struct World {
     decisions: Decisions,
     faults: Engine,
     /// What the tick's faults do to processes.
-    orders: Vec<ProcessCommand>,
+    commands: Vec<ProcessCommand>,
     /// Whether the current tick is open.
     open: bool,
     finish: Finish,
@@ -85,7 +85,7 @@ impl World {
             stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
             decisions: Decisions::new(bodies.len()),
             faults: Engine::new(params.faults.clone(), bodies.len()),
-            orders: Vec::new(),
+            commands: Vec::new(),
             open: false,
             finish: Finish::default(),
             log: Log::default(),

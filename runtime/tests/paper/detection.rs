@@ -3,7 +3,7 @@
 use super::flown::{Flown, fly_file, scenario, velocity};
 use skein_agent::danger::Braking;
 use skein_protocol::record::EventKind;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 #[test]
 fn a1_the_routine_is_flown_in_its_order() {
@@ -50,7 +50,7 @@ fn e1_to_e4_a_scenario_stops_as_the_equations_say_and_must_see_that_far() {
     let with = |t_c: &str| {
         let sets = [("drone.reaction_time_s", t_c), ("sensors.detection_range_m", "26")];
         let sets = sets.map(|(key, value)| (key.to_owned(), value.to_owned()));
-        Scenario::parse(&text, Source { name: "s2", stem: "s2" }, &sets)
+        Scenario::parse(&text, ScenarioSource { name: "s2", stem: "s2" }, &sets)
     };
     assert!(with("0").is_ok());
     let refused = with("0.5").unwrap_err().to_string();

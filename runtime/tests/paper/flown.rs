@@ -3,7 +3,7 @@
 use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent};
 use skein_protocol::{DroneId, Vec2};
 use skein_runtime::inline;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// Everything that the record tells.
 #[derive(Default)]
@@ -35,7 +35,7 @@ pub fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
 /// A scenario from text.
 pub fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
     let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-    Scenario::parse(text, Source { name: "test", stem: "test" }, &sets).unwrap()
+    Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &sets).unwrap()
 }
 
 pub fn fly(scenario: &Scenario) -> Flown {

@@ -11,7 +11,7 @@ use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime, Vec2};
 use skein_runtime::pilot_host::StepScratch;
 use skein_runtime::{PilotKind, mission};
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use std::hint::black_box;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -83,7 +83,7 @@ fn scenario(drones: u32, more: &str) -> Result<Scenario, Failure> {
     let head = format!("[formation]\nshape = \"grid\"\ndrones = {drones}\nspacing_m = 65\n");
     let rest = "[drone]\nsafe_distance_m = 37\n[mission]\nstop_x_m = 1000000\n[time]\ntimeout_s = 36000\n";
     let text = head + rest + more;
-    Scenario::parse(&text, Source { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
+    Scenario::parse(&text, ScenarioSource { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
 }
 
 /// What a frame's verdict costs by preset, and what a tick's frames cost a drone, with and without a range.

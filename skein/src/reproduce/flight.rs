@@ -1,6 +1,6 @@
 //! One mission to fly. The scenario files are part of the program, so that the command works anywhere.
 
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// Greatest displacement of a drone's start where starts are jittered, m.
 pub const JITTER_M: f64 = 2.0;
@@ -78,7 +78,7 @@ impl Flight {
         overrides.extend(self.seed.map(|seed| ("seed".to_owned(), seed.to_string())));
         overrides.extend(self.seed.map(|_| ("formation.start_jitter_m".to_owned(), JITTER_M.to_string())));
         overrides.extend(self.set.iter().cloned());
-        Scenario::parse(text, Source { name, stem: name }, &overrides).map_err(|error| error.to_string())
+        Scenario::parse(text, ScenarioSource { name, stem: name }, &overrides).map_err(|error| error.to_string())
     }
 
     fn file(&self) -> Option<&(&str, &str, &str)> {

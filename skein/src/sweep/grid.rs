@@ -2,7 +2,7 @@
 
 use super::experiment::{Experiment, Mission};
 use super::random::{Bounds, random_scene};
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use std::path::Path;
 
 /// All runs of an experiment, numbered in the order of runs.csv.
@@ -130,7 +130,7 @@ fn flags(bounds: Bounds) -> String {
 
 fn parse(path: &Path, text: &str, overrides: &[(String, String)]) -> Result<Scenario, String> {
     let (name, stem) = (path.display().to_string(), stem(path));
-    Scenario::parse(text, Source { name: &name, stem: &stem }, overrides).map_err(|errors| errors.to_string())
+    Scenario::parse(text, ScenarioSource { name: &name, stem: &stem }, overrides).map_err(|errors| errors.to_string())
 }
 
 fn stem(path: &Path) -> String {

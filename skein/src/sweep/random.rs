@@ -5,7 +5,7 @@ use super::draw::Draw;
 use skein_leader::geometry::separation;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
@@ -79,7 +79,7 @@ pub fn random_scene(seed: u64, bounds: Bounds, overrides: &[(String, String)]) -
 
 fn parse(seed: u64, text: &str, overrides: &[(String, String)]) -> Result<Scenario, String> {
     let name = format!("random-{seed}");
-    Scenario::parse(text, Source { name: &name, stem: &name }, overrides).map_err(|error| error.to_string())
+    Scenario::parse(text, ScenarioSource { name: &name, stem: &name }, overrides).map_err(|error| error.to_string())
 }
 
 /// One draw of a scene; `None` if an obstacle found no place.

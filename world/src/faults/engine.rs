@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::moments::Moments;
 use super::targets::Scene;
-use super::{Effect, Fault, FaultPlan, When, Whom};
+use super::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime};
 use crate::senses::SensorFault;
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
 
@@ -70,7 +70,7 @@ impl Engine {
 
     /// Looks for events, if a fault waits for one.
     pub fn observe(&mut self, now: SimTime, scene: &Scene<'_>) {
-        if self.waiting.iter().any(|&place| matches!(self.plan.faults[place].when, When::On { .. })) {
+        if self.waiting.iter().any(|&place| matches!(self.plan.faults[place].time, FaultTime::On { .. })) {
             self.moments.observe(now, scene);
         }
     }
@@ -85,14 +85,14 @@ impl Engine {
                 return None;
             }
             let drones = self.meets(place, scene);
-            let role =
-                !matches!(fault.whom, Whom::Drones(_) | Whom::All) && !matches!(fault.effect, Effect::Partition(_));
+            let role = !matches!(fault.targets, FaultTargets::Drones(_) | FaultTargets::All)
+                && !matches!(fault.effect, FaultEffect::Partition(_));
             (!drones.is_empty() || !role).then_some((index, Turn { fault: place, drones }))
         });
         let (index, turn) = found?;
         self.waiting.remove(index);
         let fault = &self.plan.faults[turn.fault];
-        if !turn.drones.is_empty() && fault.effect != Effect::Kill {
+        if !turn.drones.is_empty() && fault.effect != FaultEffect::Kill {
             let until = now.after(fault.for_s);
             self.active.push(Active { fault: turn.fault, drones: turn.drones.clone(), until });
             self.settle();
@@ -102,20 +102,20 @@ impl Engine {
 
     /// Whether a dead drone is to get a new process.
     pub fn awaits_restart(&self, drone: DroneId) -> bool {
-        let restarts = |active: &&Active| self.plan.faults[active.fault].effect == Effect::Restart;
+        let restarts = |active: &&Active| self.plan.faults[active.fault].effect == FaultEffect::Restart;
         self.active.iter().filter(restarts).any(|active| active.has(drone))
     }
 
     /// Whether any is.
     pub fn awaits_restarts(&self) -> bool {
-        self.active.iter().any(|active| self.plan.faults[active.fault].effect == Effect::Restart)
+        self.active.iter().any(|active| self.plan.faults[active.fault].effect == FaultEffect::Restart)
     }
 
     /// What a drone is told differently from the truth in a tick.
     pub fn sensor_fault(&self, drone: DroneId, tick: Tick) -> SensorFault {
         let mut sensor_fault = self.standing[drone.index()];
         for active in self.active.iter().filter(|active| active.has(drone)) {
-            if let Effect::Noise(noise) = &self.plan.faults[active.fault].effect {
+            if let FaultEffect::Noise(noise) = &self.plan.faults[active.fault].effect {
                 let mut chance = self.chance(active.fault, u64::from(drone.0), tick);
                 sensor_fault.position_error_m += noise.position_bias_m + chance.vector(noise.position_std_m);
                 sensor_fault.velocity_error_mps += noise.velocity_bias_mps + chance.vector(noise.velocity_std_mps);
@@ -133,7 +133,7 @@ impl Engine {
     pub fn wind_mps2(&self, drone: DroneId, now: SimTime) -> Vec2 {
         let mut sum = Vec2::zeros();
         for active in self.active.iter().filter(|active| active.has(drone)) {
-            if let Effect::Wind(wind) = &self.plan.faults[active.fault].effect {
+            if let FaultEffect::Wind(wind) = &self.plan.faults[active.fault].effect {
                 let gust = (now.secs() / wind.gust_s).floor() as u64;
                 let mut chance = self.chance(active.fault, u64::from(drone.0), gust);
                 sum += wind.acceleration_mps2 + chance.vector(wind.gust_mps2);
@@ -147,9 +147,9 @@ impl Engine {
     }
 
     fn is_due(&self, fault: &Fault, now: SimTime) -> bool {
-        match fault.when {
-            When::At(at_s) => now >= SimTime::from_secs(at_s),
-            When::On { event, stage, after_s } => {
+        match fault.time {
+            FaultTime::At(at_s) => now >= SimTime::from_secs(at_s),
+            FaultTime::On { event, stage, after_s } => {
                 self.moments.of(event, stage).is_some_and(|moment| now >= moment.after(after_s))
             }
         }
@@ -160,16 +160,16 @@ impl Engine {
         let fault = &self.plan.faults[place];
         let mut drones = match &fault.effect {
             // Sides are sides, whoever lives.
-            Effect::Partition(sides) => {
+            FaultEffect::Partition(sides) => {
                 return sorted(sides.concat().into_iter().filter(|drone| drone.index() < scene.bodies.len()).collect());
             }
-            _ => scene.meets(&fault.whom, self.chance(place, u64::MAX, 0)),
+            _ => scene.meets(&fault.targets, self.chance(place, u64::MAX, 0)),
         };
         drones.retain(|&drone| {
             let (body, process) = (&scene.bodies[drone.index()], &scene.processes[drone.index()]);
             match fault.effect {
-                Effect::Freeze => body.alive && !process.frozen,
-                Effect::Restart => body.flies() && !self.awaits_restart(drone),
+                FaultEffect::Freeze => body.alive && !process.frozen,
+                FaultEffect::Restart => body.flies() && !self.awaits_restart(drone),
                 _ => body.alive,
             }
         });
@@ -181,7 +181,7 @@ impl Engine {
         self.standing.fill(SensorFault::default());
         for active in &self.active {
             let effect = &self.plan.faults[active.fault].effect;
-            if let Effect::Partition(sides) = effect {
+            if let FaultEffect::Partition(sides) = effect {
                 let number = self.plan.partition_number(active.fault);
                 for (side, drones) in sides.iter().enumerate() {
                     let known = drones.iter().filter(|drone| active.has(**drone));
@@ -201,21 +201,21 @@ impl Active {
 }
 
 impl SensorFault {
-    fn add(&mut self, effect: &Effect) {
+    fn add(&mut self, effect: &FaultEffect) {
         match effect {
-            Effect::Slow(extra_s) => self.extra_reaction_s += extra_s,
-            Effect::Deaf => self.cuts.deaf = 1,
-            Effect::Mute => self.cuts.mute = 1,
-            Effect::Blind { obstacles, ranging } => {
+            FaultEffect::Slow(extra_s) => self.extra_reaction_s += extra_s,
+            FaultEffect::Deaf => self.cuts.deaf = 1,
+            FaultEffect::Mute => self.cuts.mute = 1,
+            FaultEffect::Blind { obstacles, ranging } => {
                 self.no_obstacles |= obstacles;
                 self.no_ranging |= ranging;
             }
-            Effect::Kill
-            | Effect::Freeze
-            | Effect::Restart
-            | Effect::Partition(_)
-            | Effect::Noise(_)
-            | Effect::Wind(_) => {}
+            FaultEffect::Kill
+            | FaultEffect::Freeze
+            | FaultEffect::Restart
+            | FaultEffect::Partition(_)
+            | FaultEffect::Noise(_)
+            | FaultEffect::Wind(_) => {}
         }
     }
 }
@@ -223,7 +223,7 @@ impl SensorFault {
 impl FaultPlan {
     /// The number of a partition among the plan's partitions.
     fn partition_number(&self, place: usize) -> usize {
-        self.faults[..place].iter().filter(|fault| matches!(fault.effect, Effect::Partition(_))).count()
+        self.faults[..place].iter().filter(|fault| matches!(fault.effect, FaultEffect::Partition(_))).count()
     }
 }
 

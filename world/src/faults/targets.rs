@@ -1,6 +1,6 @@
 //! Whom a fault meets, by what drones say of themselves in the tick before.
 
-use super::Whom;
+use super::FaultTargets;
 use super::chance::Chance;
 use crate::body::Body;
 use crate::process::Process;
@@ -38,24 +38,28 @@ impl Scene<'_> {
 
     /// The drones that a fault meets now, by number; none if nobody has the role. Those named are not asked whether they
     /// live.
-    pub fn meets(&self, whom: &Whom, mut chance: Chance) -> Vec<DroneId> {
+    pub fn meets(&self, targets: &FaultTargets, mut chance: Chance) -> Vec<DroneId> {
         let along = |drone: usize| OrderedX(self.bodies[drone].position.x);
         let one = |found: Option<usize>| found.into_iter().collect();
-        let drones: Vec<usize> = match whom {
-            Whom::Drones(drones) => drones.iter().map(|id| id.index()).filter(|&d| d < self.bodies.len()).collect(),
-            Whom::All => self.all().map(|(drone, _)| drone).collect(),
-            Whom::Leader => one(self.leader(|_| true)),
-            Whom::GroupLeader(group) => one(self.leader(|led| led == *group)),
-            Whom::FirstInQueue => {
+        let drones: Vec<usize> = match targets {
+            FaultTargets::Drones(drones) => {
+                drones.iter().map(|id| id.index()).filter(|&d| d < self.bodies.len()).collect()
+            }
+            FaultTargets::All => self.all().map(|(drone, _)| drone).collect(),
+            FaultTargets::Leader => one(self.leader(|_| true)),
+            FaultTargets::GroupLeader(group) => one(self.leader(|led| led == *group)),
+            FaultTargets::FirstInQueue => {
                 let key = |&(drone, slot): &(usize, &Slot)| (slot.rank, Reverse(along(drone)), drone);
                 one(self.queued().min_by_key(key).map(|(drone, _)| drone))
             }
-            Whom::LastInQueue => {
+            FaultTargets::LastInQueue => {
                 let key = |&(drone, slot): &(usize, &Slot)| (Reverse(slot.rank), along(drone), drone);
                 one(self.queued().min_by_key(key).map(|(drone, _)| drone))
             }
-            Whom::Member => one(self.all().find(|(_, slot)| slot.flags & SLOT_LEADS == 0).map(|(drone, _)| drone)),
-            Whom::Random => {
+            FaultTargets::Member => {
+                one(self.all().find(|(_, slot)| slot.flags & SLOT_LEADS == 0).map(|(drone, _)| drone))
+            }
+            FaultTargets::Random => {
                 let living: Vec<usize> = self.all().map(|(drone, _)| drone).collect();
                 one(living.get(chance.one_of(living.len())).copied())
             }
@@ -105,7 +109,7 @@ mod tests {
     }
 
     /// 0 leads the swarm under an old ballot, 2 under a new one; 1 leads N1; 3, 4 and 5 queue.
-    fn met(whom: &Whom, change: impl FnOnce(&mut Vec<Body>, &mut Vec<Process>)) -> Vec<u32> {
+    fn met(targets: &FaultTargets, change: impl FnOnce(&mut Vec<Body>, &mut Vec<Process>)) -> Vec<u32> {
         let mut bodies =
             bodies(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [30.0, 0.0], [40.0, 0.0], [50.0, 0.0], [6.0, 0.0]]);
         let mut processes = vec![
@@ -120,21 +124,21 @@ mod tests {
         change(&mut bodies, &mut processes);
         let stages = Stages::new(&[], 40.0);
         let scene = Scene { bodies: &bodies, processes: &processes, stages: &stages };
-        scene.meets(whom, Chance::new(1, [0; 3])).into_iter().map(|id| id.0).collect()
+        scene.meets(targets, Chance::new(1, [0; 3])).into_iter().map(|id| id.0).collect()
     }
 
     #[test]
     fn roles_are_found() {
-        let found = |whom| met(&whom, |_, _| {});
-        assert_eq!(found(Whom::Leader), [2], "the newer of two terms");
-        assert_eq!(found(Whom::GroupLeader(GroupId::ALL.child(1))), [1]);
-        assert_eq!(found(Whom::GroupLeader(GroupId::ALL.child(2))), [0; 0]);
-        assert_eq!(found(Whom::FirstInQueue), [3]);
-        assert_eq!(found(Whom::LastInQueue), [4], "of two with a rank, the one behind");
-        assert_eq!(found(Whom::Member), [3]);
-        assert_eq!(found(Whom::All), [0, 1, 2, 3, 4, 5, 6]);
-        assert_eq!(found(Whom::Drones(vec![DroneId(6), DroneId(99)])), [6]);
-        assert_eq!(found(Whom::Random).len(), 1);
+        let found = |targets| met(&targets, |_, _| {});
+        assert_eq!(found(FaultTargets::Leader), [2], "the newer of two terms");
+        assert_eq!(found(FaultTargets::GroupLeader(GroupId::ALL.child(1))), [1]);
+        assert_eq!(found(FaultTargets::GroupLeader(GroupId::ALL.child(2))), [0; 0]);
+        assert_eq!(found(FaultTargets::FirstInQueue), [3]);
+        assert_eq!(found(FaultTargets::LastInQueue), [4], "of two with a rank, the one behind");
+        assert_eq!(found(FaultTargets::Member), [3]);
+        assert_eq!(found(FaultTargets::All), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(found(FaultTargets::Drones(vec![DroneId(6), DroneId(99)])), [6]);
+        assert_eq!(found(FaultTargets::Random).len(), 1);
     }
 
     #[test]
@@ -144,11 +148,11 @@ mod tests {
             bodies[4].alive = false;
             processes[3].frozen = true;
         };
-        assert_eq!(met(&Whom::Leader, change), [0]);
-        assert_eq!(met(&Whom::FirstInQueue, change), [5]);
-        assert_eq!(met(&Whom::LastInQueue, change), [5]);
-        assert_eq!(met(&Whom::Member, change), [5]);
-        assert_eq!(met(&Whom::All, change), [0, 1, 5, 6]);
-        assert_eq!(met(&Whom::Drones(vec![DroneId(2)]), change), [2], "who is named is met");
+        assert_eq!(met(&FaultTargets::Leader, change), [0]);
+        assert_eq!(met(&FaultTargets::FirstInQueue, change), [5]);
+        assert_eq!(met(&FaultTargets::LastInQueue, change), [5]);
+        assert_eq!(met(&FaultTargets::Member, change), [5]);
+        assert_eq!(met(&FaultTargets::All, change), [0, 1, 5, 6]);
+        assert_eq!(met(&FaultTargets::Drones(vec![DroneId(2)]), change), [2], "who is named is met");
     }
 }

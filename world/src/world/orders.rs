@@ -3,7 +3,7 @@
 use super::World;
 use crate::faults::engine::Turn;
 use crate::faults::targets::Scene;
-use crate::faults::{Effect, ProcessCommand, Whom};
+use crate::faults::{FaultEffect, FaultTargets, ProcessCommand};
 use skein_protocol::DroneId;
 use skein_protocol::record::{EventKind, FaultKind};
 use skein_protocol::slot::Slot;
@@ -11,9 +11,9 @@ use skein_protocol::slot::Slot;
 impl World {
     /// What the faults of the current tick do to drones' processes: to be done, in this order, before the tick's
     /// downlink goes out. The world counts it as done.
-    pub fn orders(&mut self) -> &[ProcessCommand] {
+    pub fn process_commands(&mut self) -> &[ProcessCommand] {
         self.open();
-        &self.orders
+        &self.commands
     }
 
     /// Whether a drone's process is stopped.
@@ -28,7 +28,7 @@ impl World {
             return;
         }
         let now = self.now();
-        self.orders.clear();
+        self.commands.clear();
         for turn in self.faults.end(now) {
             self.end_fault(&turn);
         }
@@ -65,19 +65,19 @@ impl World {
         if fault.for_s.is_finite() && kind != FaultKind::Kill {
             words += &format!("{} {} s", if kind == FaultKind::Restart { " after" } else { ", for" }, fault.for_s);
         }
-        if is_whole(&fault.whom, &fault.effect) {
+        if is_whole(&fault.targets, &fault.effect) {
             self.log_fault(kind, DroneId::NONE, &words);
             return;
         }
         for &drone in &turn.drones {
             match kind {
                 FaultKind::Kill | FaultKind::Restart if self.is_alive(drone) => {
-                    self.orders.push(ProcessCommand::Kill(drone));
+                    self.commands.push(ProcessCommand::Kill(drone));
                     self.mark_dead(drone, kind, true, &words);
                     continue;
                 }
                 FaultKind::Freeze => {
-                    self.orders.push(ProcessCommand::Freeze(drone));
+                    self.commands.push(ProcessCommand::Freeze(drone));
                     self.processes[drone.index()].frozen = true;
                 }
                 _ => {}
@@ -89,7 +89,7 @@ impl World {
     fn end_fault(&mut self, turn: &Turn) {
         let fault = self.faults.fault(turn.fault);
         let kind = fault.effect.kind();
-        if is_whole(&fault.whom, &fault.effect) {
+        if is_whole(&fault.targets, &fault.effect) {
             self.log_over(kind, DroneId::NONE, String::new());
             return;
         }
@@ -111,7 +111,7 @@ impl World {
         if !std::mem::replace(&mut process.frozen, false) || !self.bodies[drone.index()].alive {
             return None;
         }
-        self.orders.push(ProcessCommand::Resume(drone));
+        self.commands.push(ProcessCommand::Resume(drone));
         Some("continued".to_owned())
     }
 
@@ -125,7 +125,7 @@ impl World {
         let incarnation = self.processes[drone.index()].incarnation + 1;
         self.set_incarnation(drone, incarnation);
         self.processes[drone.index()].slot = Slot::default();
-        self.orders.push(ProcessCommand::Restart(drone, incarnation));
+        self.commands.push(ProcessCommand::Restart(drone, incarnation));
         Some(format!("a new process, incarnation {incarnation}"))
     }
 
@@ -140,11 +140,11 @@ impl World {
 }
 
 /// Whether a fault is told of the swarm, not drone by drone. What is done to processes is told of each.
-fn is_whole(whom: &Whom, effect: &Effect) -> bool {
+fn is_whole(targets: &FaultTargets, effect: &FaultEffect) -> bool {
     match effect {
-        Effect::Partition(_) => true,
-        Effect::Kill | Effect::Freeze | Effect::Restart => false,
-        _ => *whom == Whom::All,
+        FaultEffect::Partition(_) => true,
+        FaultEffect::Kill | FaultEffect::Freeze | FaultEffect::Restart => false,
+        _ => *targets == FaultTargets::All,
     }
 }
 

@@ -11,7 +11,7 @@ use skein_protocol::record::Outcome;
 use skein_report::{Ending, Recorder};
 use skein_runtime::supervisor::{self, Launch};
 use skein_runtime::{Clock, PilotKind, RunEnd, RuntimeError, inline};
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// Size of the swarm.
 pub const DRONES: u32 = 8;
@@ -75,7 +75,7 @@ impl ChannelSetting {
     }
 
     fn scenario(&self) -> Result<Scenario, Failure> {
-        let source = Source { name: "bench failover", stem: "failover" };
+        let source = ScenarioSource { name: "bench failover", stem: "failover" };
         Scenario::parse(&self.toml(), source, &[]).map_err(Failure::diagnostic)
     }
 }

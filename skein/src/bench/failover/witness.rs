@@ -181,7 +181,7 @@ mod tests {
     fn a_death_ends_when_all_follow_and_what_begins_beside_it_is_false() {
         let scenario = skein_scenario::Scenario::parse(
             "[formation]\ndrones = 3\n",
-            skein_scenario::Source { name: "t", stem: "t" },
+            skein_scenario::ScenarioSource { name: "t", stem: "t" },
             &[],
         );
         let facts = crate::facts::facts(&scenario.unwrap(), "inline", "lockstep").ok().unwrap();

@@ -11,7 +11,7 @@ use skein_bus::WaitMode;
 use skein_protocol::downlink::{DownHead, SenseHead, SensedNeighbour};
 use skein_protocol::frame::AirFrame;
 use skein_runtime::PilotKind;
-use skein_scenario::{Scenario, Source};
+use skein_scenario::{Scenario, ScenarioSource};
 
 /// Drones in a process, where several share one.
 pub(super) const PACK: u32 = 32;
@@ -153,7 +153,7 @@ safe_distance_m = 37
         text += "[radio]\nrange_m = 100\n[[radio.rule]]\nto = [0]\nrange_m = 100000\n";
         text += "[[radio.rule]]\ntopics = [\"leadership\", \"plan\", \"assignment\"]\nrange_m = 100000\n";
     }
-    Scenario::parse(&text, Source { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
+    Scenario::parse(&text, ScenarioSource { name: "bench", stem: "bench" }, &[]).map_err(Failure::diagnostic)
 }
 
 #[cfg(test)]

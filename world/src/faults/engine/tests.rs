@@ -46,8 +46,8 @@ impl Stage {
     }
 }
 
-fn fault(effect: Effect, when: When, whom: Whom, for_s: f64) -> Fault {
-    Fault { effect, when, whom, for_s }
+fn fault(effect: FaultEffect, time: FaultTime, targets: FaultTargets, for_s: f64) -> Fault {
+    Fault { effect, time, targets, for_s }
 }
 
 fn engine(faults: Vec<Fault>) -> Engine {
@@ -65,13 +65,13 @@ fn begun(engine: &mut Engine, now: SimTime, stage: &Stage) -> Vec<(usize, Vec<u3
     turns.map(|turn| (turn.fault, turn.drones.iter().map(|id| id.0).collect())).collect()
 }
 
-fn one(drone: u32) -> Whom {
-    Whom::Drones(vec![DroneId(drone)])
+fn one(drone: u32) -> FaultTargets {
+    FaultTargets::Drones(vec![DroneId(drone)])
 }
 
 #[test]
 fn a_fault_is_in_force_from_its_time_to_its_end() {
-    let (stage, mut engine) = (Stage::new(), engine(vec![fault(Effect::Deaf, When::At(1.0), one(1), 2.0)]));
+    let (stage, mut engine) = (Stage::new(), engine(vec![fault(FaultEffect::Deaf, FaultTime::At(1.0), one(1), 2.0)]));
     assert_eq!(begun(&mut engine, at(0.98), &stage), []);
     assert_eq!(begun(&mut engine, at(1.0), &stage), [(0, vec![1])]);
     assert_eq!((engine.standing(DroneId(1)).cuts.deaf, engine.standing(DroneId(0)).cuts.deaf), (1, 0));
@@ -83,14 +83,14 @@ fn a_fault_is_in_force_from_its_time_to_its_end() {
 
 #[test]
 fn faults_add_up() {
-    let wall = Effect::Partition(vec![vec![DroneId(0)], vec![DroneId(1), DroneId(2)]]);
+    let wall = FaultEffect::Partition(vec![vec![DroneId(0)], vec![DroneId(1), DroneId(2)]]);
     let stage = Stage::new();
     let mut engine = engine(vec![
-        fault(Effect::Slow(0.2), When::At(0.0), Whom::All, f64::INFINITY),
-        fault(Effect::Slow(0.3), When::At(0.0), one(0), 1.0),
-        fault(Effect::Blind { obstacles: true, ranging: false }, When::At(0.0), one(0), 1.0),
-        fault(wall, When::At(0.0), Whom::All, 1.0),
-        fault(Effect::Mute, When::At(0.0), one(2), 1.0),
+        fault(FaultEffect::Slow(0.2), FaultTime::At(0.0), FaultTargets::All, f64::INFINITY),
+        fault(FaultEffect::Slow(0.3), FaultTime::At(0.0), one(0), 1.0),
+        fault(FaultEffect::Blind { obstacles: true, ranging: false }, FaultTime::At(0.0), one(0), 1.0),
+        fault(wall, FaultTime::At(0.0), FaultTargets::All, 1.0),
+        fault(FaultEffect::Mute, FaultTime::At(0.0), one(2), 1.0),
     ]);
     assert_eq!(begun(&mut engine, at(0.0), &stage).len(), 5);
     let (first, second) = (*engine.standing(DroneId(0)), *engine.standing(DroneId(1)));
@@ -108,10 +108,10 @@ fn a_role_is_waited_for_and_the_named_dead_are_left_out() {
     let mut stage = Stage::new();
     stage.bodies[2].alive = false;
     let mut engine = engine(vec![
-        fault(Effect::Kill, When::At(0.0), Whom::Leader, f64::INFINITY),
-        fault(Effect::Kill, When::At(0.0), one(2), f64::INFINITY),
-        fault(Effect::Restart, When::At(0.0), one(2), 1.0),
-        fault(Effect::Restart, When::At(0.5), one(2), 1.0),
+        fault(FaultEffect::Kill, FaultTime::At(0.0), FaultTargets::Leader, f64::INFINITY),
+        fault(FaultEffect::Kill, FaultTime::At(0.0), one(2), f64::INFINITY),
+        fault(FaultEffect::Restart, FaultTime::At(0.0), one(2), 1.0),
+        fault(FaultEffect::Restart, FaultTime::At(0.5), one(2), 1.0),
     ]);
     assert_eq!(begun(&mut engine, at(0.0), &stage), [(1, vec![]), (2, vec![2])]);
     assert!(engine.awaits_restart(DroneId(2)) && engine.awaits_restarts());
@@ -124,8 +124,8 @@ fn a_role_is_waited_for_and_the_named_dead_are_left_out() {
 
 /// A fault that follows each event at once.
 fn waiting_for(events: &[(FaultTrigger, usize)]) -> Engine {
-    let when = |&(event, stage): &(FaultTrigger, usize)| When::On { event, stage, after_s: 0.0 };
-    engine(events.iter().map(|event| fault(Effect::Deaf, when(event), Whom::All, 1.0)).collect())
+    let when = |&(event, stage): &(FaultTrigger, usize)| FaultTime::On { event, stage, after_s: 0.0 };
+    engine(events.iter().map(|event| fault(FaultEffect::Deaf, when(event), FaultTargets::All, 1.0)).collect())
 }
 
 fn places(engine: &mut Engine, now: SimTime, stage: &Stage) -> Vec<usize> {
@@ -186,8 +186,8 @@ fn elections_are_counted() {
 #[test]
 fn after_an_event_counts_from_it() {
     let mut stage = Stage::new();
-    let when = When::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.5 };
-    let mut engine = engine(vec![fault(Effect::Deaf, when, Whom::All, 1.0)]);
+    let time = FaultTime::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.5 };
+    let mut engine = engine(vec![fault(FaultEffect::Deaf, time, FaultTargets::All, 1.0)]);
     stage.detect();
     assert_eq!(places(&mut engine, at(2.0), &stage), [0usize; 0]);
     assert_eq!(places(&mut engine, at(2.48), &stage), [0usize; 0]);
@@ -201,8 +201,13 @@ fn noise_is_drawn_each_tick_and_gusts_last() {
         Noise { position_bias_m: bias, position_std_m: 0.5, velocity_bias_mps: Vec2::zeros(), velocity_std_mps: 0.0 };
     let wind = Wind { acceleration_mps2: Vec2::new(0.0, 1.0), gust_mps2: 0.3, gust_s: 2.0 };
     let mut engine = engine(vec![
-        fault(Effect::Noise(noise), When::At(0.0), one(0), f64::INFINITY),
-        fault(Effect::Wind(wind), When::At(0.0), Whom::Drones(vec![DroneId(2), DroneId(0)]), f64::INFINITY),
+        fault(FaultEffect::Noise(noise), FaultTime::At(0.0), one(0), f64::INFINITY),
+        fault(
+            FaultEffect::Wind(wind),
+            FaultTime::At(0.0),
+            FaultTargets::Drones(vec![DroneId(2), DroneId(0)]),
+            f64::INFINITY,
+        ),
     ]);
     begun(&mut engine, at(0.0), &Stage::new());
     let errors: Vec<Vec2> = (0..1000).map(|tick| engine.sensor_fault(DroneId(0), tick).position_error_m).collect();

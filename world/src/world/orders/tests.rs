@@ -1,6 +1,6 @@
 //! Faults in whole worlds, flown by hand.
 
-use crate::faults::{Effect, Fault, FaultPlan, FaultTrigger, ProcessCommand, When, Whom, Wind};
+use crate::faults::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, ProcessCommand, Wind};
 use crate::params::{Failsafe, WorldParams};
 use crate::testing::{command, events, happenings, params, rectangle, starts};
 use crate::world::World;
@@ -10,8 +10,8 @@ use skein_protocol::{DroneId, Vec2};
 
 const ID: DroneId = DroneId(3);
 
-fn world(effect: Effect, when: When, for_s: f64, params: WorldParams) -> World {
-    let fault = Fault { effect, when, whom: Whom::Drones(vec![ID]), for_s };
+fn world(effect: FaultEffect, time: FaultTime, for_s: f64, params: WorldParams) -> World {
+    let fault = Fault { effect, time, targets: FaultTargets::Drones(vec![ID]), for_s };
     let faults = FaultPlan { seed: 1, faults: vec![fault] };
     World::new(WorldParams { faults, ..params }, &starts(8), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap()
 }
@@ -21,7 +21,7 @@ fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessCommand)>, Vec<RunEve
     let (mut orders, mut told) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
         let tick = world.tick();
-        orders.extend(world.orders().iter().map(|&order| (tick, order)));
+        orders.extend(world.process_commands().iter().map(|&order| (tick, order)));
         let drones = world.downlink().drones.len() as u32;
         (0..drones).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
         world.advance();
@@ -41,7 +41,7 @@ fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
 
 #[test]
 fn a_kill_is_ordered_once_at_its_tick() {
-    let mut world = world(Effect::Kill, When::At(1.0), f64::INFINITY, params());
+    let mut world = world(FaultEffect::Kill, FaultTime::At(1.0), f64::INFINITY, params());
     let (orders, told) = fly(&mut world, 100);
     assert_eq!(orders, [(50, ProcessCommand::Kill(ID))]);
     assert_eq!(fault_times(&told), [(1.0, true)]);
@@ -51,7 +51,7 @@ fn a_kill_is_ordered_once_at_its_tick() {
 #[test]
 fn a_frozen_drone_holds_and_flies_on_later() {
     let land = WorldParams { failsafe: Failsafe::Land, ..params() };
-    let mut world = world(Effect::Freeze, When::At(1.0), 3.0, land);
+    let mut world = world(FaultEffect::Freeze, FaultTime::At(1.0), 3.0, land);
     fly(&mut world, 190);
     let row = world.record().rows[ID.index()];
     assert!(world.is_frozen(ID) && world.is_alive(ID));
@@ -61,7 +61,7 @@ fn a_frozen_drone_holds_and_flies_on_later() {
     let (orders, told) = fly(&mut world, 30);
     assert_eq!(orders, [(200, ProcessCommand::Resume(ID))]);
     assert_eq!(fault_times(&told), [(4.0, false)]);
-    world.orders();
+    world.process_commands();
     world.downlink();
     world.take_slot(ID, &command(1.0, 0.0));
     world.advance();
@@ -71,7 +71,7 @@ fn a_frozen_drone_holds_and_flies_on_later() {
 
 #[test]
 fn a_frozen_drone_that_is_killed_is_not_resumed() {
-    let mut world = world(Effect::Freeze, When::At(1.0), 1.0, params());
+    let mut world = world(FaultEffect::Freeze, FaultTime::At(1.0), 1.0, params());
     fly(&mut world, 60);
     world.mark_dead(ID, FaultKind::Kill, false, "");
     assert!(!world.is_frozen(ID));
@@ -81,7 +81,7 @@ fn a_frozen_drone_that_is_killed_is_not_resumed() {
 
 #[test]
 fn a_restarted_drone_has_the_next_incarnation() {
-    let mut world = world(Effect::Restart, When::At(1.0), 2.0, params());
+    let mut world = world(FaultEffect::Restart, FaultTime::At(1.0), 2.0, params());
     let (orders, told) = fly(&mut world, 151);
     assert_eq!(orders, [(50, ProcessCommand::Kill(ID)), (150, ProcessCommand::Restart(ID, 2))]);
     assert_eq!(fault_times(&told), [(1.0, true), (3.0, false)]);
@@ -94,7 +94,7 @@ fn a_restarted_drone_has_the_next_incarnation() {
 #[test]
 fn who_has_landed_is_not_started_again() {
     let land = WorldParams { failsafe: Failsafe::Land, timeout_s: 60.0, ..params() };
-    let mut world = world(Effect::Restart, When::At(0.0), 14.0, land);
+    let mut world = world(FaultEffect::Restart, FaultTime::At(0.0), 14.0, land);
     let (orders, _) = fly(&mut world, 800);
     assert_eq!(orders, [(0, ProcessCommand::Kill(ID))]);
     assert!(!world.is_alive(ID));
@@ -102,8 +102,8 @@ fn who_has_landed_is_not_started_again() {
 
 #[test]
 fn a_swarm_that_is_restarted_is_not_given_up() {
-    let whom = Whom::All;
-    let fault = Fault { effect: Effect::Restart, when: When::At(1.0), whom, for_s: 1.0 };
+    let targets = FaultTargets::All;
+    let fault = Fault { effect: FaultEffect::Restart, time: FaultTime::At(1.0), targets, for_s: 1.0 };
     let faults = FaultPlan { seed: 1, faults: vec![fault] };
     let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &[]).unwrap();
     let (orders, _) = fly(&mut world, 120);
@@ -113,8 +113,9 @@ fn a_swarm_that_is_restarted_is_not_given_up() {
 #[test]
 fn who_is_blind_detects_nothing() {
     // The front, drone 0, comes into range at 1.5 s; the next two 2.47 s later.
-    let blind = Effect::Blind { obstacles: true, ranging: true };
-    let fault = Fault { effect: blind, when: When::At(0.0), whom: Whom::Drones(vec![DroneId(0)]), for_s: 60.0 };
+    let blind = FaultEffect::Blind { obstacles: true, ranging: true };
+    let fault =
+        Fault { effect: blind, time: FaultTime::At(0.0), targets: FaultTargets::Drones(vec![DroneId(0)]), for_s: 60.0 };
     let faults = FaultPlan { seed: 1, faults: vec![fault] };
     let shape = [rectangle(140.0, 0.0, 10.0, 5.0)];
     let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &shape).unwrap();
@@ -131,8 +132,8 @@ fn who_is_blind_detects_nothing() {
 
 #[test]
 fn a_fault_on_detection_begins_in_the_tick_that_detects() {
-    let when = When::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.0 };
-    let mut world = world(Effect::Slow(0.4), when, 1.0, params());
+    let time = FaultTime::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.0 };
+    let mut world = world(FaultEffect::Slow(0.4), time, 1.0, params());
     let (_, told) = fly(&mut world, 80);
     let detected = told.iter().find(|event| matches!(event.what, EventKind::Detected { .. })).unwrap();
     assert_eq!(fault_times(&told), [(detected.t_s, true)]);
@@ -142,7 +143,7 @@ fn a_fault_on_detection_begins_in_the_tick_that_detects() {
 #[test]
 fn wind_blows_those_that_fly() {
     let wind = Wind { acceleration_mps2: Vec2::new(0.0, 1.0), gust_mps2: 0.0, gust_s: 1.0 };
-    let mut world = world(Effect::Wind(wind), When::At(0.0), 1.0, params());
+    let mut world = world(FaultEffect::Wind(wind), FaultTime::At(0.0), 1.0, params());
     fly(&mut world, 100);
     let velocity = |world: &World, drone: usize| world.record().rows[drone].velocity_mps;
     assert!((velocity(&world, 3)[1] - 1.0).abs() < 1e-9, "a second of 1 m/s²: {:?}", velocity(&world, 3));
@@ -151,7 +152,7 @@ fn wind_blows_those_that_fly() {
 
 #[test]
 fn frames_carry_their_senders_radio() {
-    let mut world = world(Effect::Mute, When::At(0.0), 1.0, params());
+    let mut world = world(FaultEffect::Mute, FaultTime::At(0.0), 1.0, params());
     world.downlink();
     let passed = skein_protocol::payload::Passed {
         stamp: skein_protocol::SimTime::ZERO,
