@@ -31,7 +31,7 @@ impl SwarmPilot {
         let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
         let ranges = self.params.ranging && senses.broken & BROKEN_RANGING == 0;
         let least_m = if ranges { RANGING * self.params.safety.safe_distance_m } else { 0.0 };
-        for (id, pose) in self.leading.peers.living(now) {
+        for (id, pose) in self.leading.peers().living(now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
@@ -45,7 +45,7 @@ impl SwarmPilot {
     /// Less than half of an evasion falls to this drone only while the other shows that it obeys the same plan and is
     /// behind; more if this drone is behind; all of it if the other is silent.
     fn share(&self, now: SimTime, other: DroneId, places: &[QueuePlace; MAX_PLACES]) -> f64 {
-        let Some(pose) = self.leading.peers.last_of_living(other, now) else { return 1.0 };
+        let Some(pose) = self.leading.peers().last_of_living(other, now) else { return 1.0 };
         let age_s = now.since(pose.stamp);
         let open = |place: &&QueuePlace| place.set != 0 && self.way.is_open_set(place.set);
         for mine in places.iter().filter(open) {
@@ -54,7 +54,7 @@ impl SwarmPilot {
             if mine.rank > theirs.rank {
                 return self.params.precedence_share;
             }
-            if mine.rank < theirs.rank && age_s <= FRESH_S && pose.obeyed == self.leading.ledger.stamp() {
+            if mine.rank < theirs.rank && age_s <= FRESH_S && pose.obeyed == self.leading.stamp() {
                 return 1.0 - self.params.precedence_share;
             }
         }

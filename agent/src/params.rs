@@ -5,7 +5,7 @@ use crate::guidance::GuidanceParams;
 use crate::safety::SafetyParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::leading::LeadingParams;
-use skein_leader::planner::PlannerParams;
+use skein_leader::params::PlannerParams;
 use skein_protocol::{DroneId, SimTime};
 
 /// Parameters of a [`crate::SwarmPilot`].

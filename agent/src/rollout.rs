@@ -8,8 +8,9 @@
 
 use crate::stage::{Forecast, Stage, end_slots};
 use crate::swarm_pilot::SwarmPilot;
-use skein_leader::ledger::PlanBundle;
-use skein_leader::planner::{Member, Objective};
+use skein_leader::member::Member;
+use skein_leader::params::Objective;
+use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::SensedShape;
 use skein_protocol::{DroneId, SimTime};
 
@@ -79,14 +80,14 @@ impl Rollout {
         let shape =
             |(id, known): (_, &skein_leader::obstacles::Known)| SensedShape { shape: known.shape, id, reserved: 0 };
         let crew = leader.leading.living();
-        let meanwhile = leader.leading.meanwhile();
+        let meanwhile = leader.leading.interim();
         let thinking = Stage::new(leader, &crew, &all[meanwhile], (start.tick / ticks, start.now, step_s), steps);
         let decision = start.now.after(step_s * steps as f64);
         let most = STEPS_A_SECOND * dt_s / crew.len().max(1) as f64;
         Self {
             members: leader.leading.members().iter().map(|member| member.id).collect(),
             steps_a_tick: (most as usize).max(1),
-            shapes: leader.leading.obstacles.iter().map(shape).collect(),
+            shapes: leader.leading.obstacles().iter().map(shape).collect(),
             objective: start.objective,
             sees_the_end: leader.sees_the_end(crew.len()),
             decision_tick: start.tick + ticks * steps,
@@ -183,7 +184,7 @@ impl SwarmPilot {
     fn sees_the_end(&self, members: usize) -> bool {
         let planner = &self.params.planner;
         let last_x_m = end_slots(planner, members).into_iter().fold(f64::INFINITY, f64::min);
-        let known = self.leading.obstacles.iter().map(|(_, known)| known.shape.bounds().1.x);
+        let known = self.leading.obstacles().iter().map(|(_, known)| known.shape.bounds().1.x);
         last_x_m - known.fold(f64::NEG_INFINITY, f64::max) <= ROOM * planner.routes.planning_distance_m
     }
 }

@@ -6,11 +6,13 @@ use crate::pilot::{Heard, Pilot};
 use crate::safety::RANGING;
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::geometry::nearest;
-use skein_leader::ledger::{Ledger, PlanBundle};
-use skein_leader::planner::{Destination, Member, Objective, PlannerParams, Strategy};
+use skein_leader::ledger::Ledger;
+use skein_leader::member::Member;
+use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
+use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
-use skein_protocol::payload::{PHASE_AVOID, QueuePlace};
+use skein_protocol::payload::PHASE_AVOID;
 use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
 
 /// A rehearsal that takes longer has failed, s.
@@ -68,7 +70,7 @@ impl Stage {
         (tick, now, step_s): (u64, SimTime, f64),
         thinking: u64,
     ) -> Self {
-        let ledger = leader.united_ledger(now);
+        let ledger = leader.leading.united_ledger(now);
         let rollout_pilot = |member: &Member| leader.rollout_pilot(member.id, now, step_s, &ledger);
         let mut stage = Self {
             params: leader.params.clone(),
@@ -87,14 +89,14 @@ impl Stage {
             safe: true,
         };
         stage.obey(bundle);
-        let sets = stage.pilots.iter().flat_map(|pilot| pilot.leading.ledger.sets());
+        let sets = stage.pilots.iter().flat_map(|pilot| pilot.leading.planned_sets());
         stage.gate_x_m = sets.map(|set| set.routes.gate_x_m()).fold(f64::NEG_INFINITY, f64::max);
         stage
     }
 
     /// All obey these orders at once: what is on the air for a tick or two makes no difference.
     fn obey(&mut self, bundle: &PlanBundle) {
-        let newest = self.pilots.iter().map(|pilot| pilot.leading.ledger.newest()).max().unwrap_or_default();
+        let newest = self.pilots.iter().map(|pilot| pilot.leading.newest_stamp()).max().unwrap_or_default();
         let mut bundle = bundle.clone();
         bundle.plan.stamp = self.now;
         bundle.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
@@ -211,16 +213,14 @@ impl Stage {
 
     /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
     fn closed(&self) -> Option<f64> {
-        let bundle = self.pilots.first()?.leading.ledger.obeyed().filter(|bundle| bundle.plan.phase != PHASE_AVOID)?;
+        let bundle = self.pilots.first()?.leading.obeyed().filter(|bundle| bundle.plan.phase != PHASE_AVOID)?;
         let (place, velocity) = anchor(&bundle.plan, self.now);
         let error_m = self.params.planner.arrival_error_m;
         let holds = matches!(self.params.planner.destination, Destination::Hold { .. });
         let in_slot = |(pilot, (position, speed)): (&SwarmPilot, &(Vec2, Vec2))| {
-            let slot = pilot.leading.ledger.part().map(|part| place + Vec2::from(part.slot_m));
+            let slot = pilot.leading.part().map(|part| place + Vec2::from(part.slot_m));
             let still = !holds || (speed - velocity).norm() <= HOLD_SPEED_MPS;
-            pilot.leading.ledger.stamp() == bundle.plan.id
-                && still
-                && slot.is_some_and(|s| (s - position).norm() <= error_m)
+            pilot.leading.stamp() == bundle.plan.id && still && slot.is_some_and(|s| (s - position).norm() <= error_m)
         };
         let all = self.pilots.iter().zip(&self.bodies).all(in_slot);
         let rest_m = if velocity.x > 0.0 { (bundle.plan.anchor_stop_x_m - place.x).max(0.0) } else { 0.0 };
@@ -238,14 +238,6 @@ pub(crate) fn end_slots(planner: &PlannerParams, drones: usize) -> Vec<f64> {
 }
 
 impl SwarmPilot {
-    /// What this leader knows of plans, and of what others fly, as if all were one group.
-    fn united_ledger(&self, now: SimTime) -> Ledger {
-        let living = self.leading.peers.living(now);
-        let places = living.flat_map(|(id, pose)| pose.queue.into_iter().map(move |place| (id, place)));
-        let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
-        self.leading.ledger.united(self.leading.first_term(), &flown)
-    }
-
     /// A drone as this leader knows it, to be stepped every `dt_s`.
     fn rollout_pilot(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
         let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
@@ -253,7 +245,7 @@ impl SwarmPilot {
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // In the mind nothing is rehearsed again.
         params.planner.strategy = Strategy::PaperRule;
-        let leading = self.leading.of_crew(&params.leading(), now, ledger.of_member(me));
+        let leading = self.leading.rollout_member(&params.leading(), now, ledger.of_member(me));
         let mut study = Self::new(params);
         study.leading = leading;
         study

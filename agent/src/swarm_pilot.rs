@@ -14,8 +14,8 @@ use crate::stray::Stray;
 use crate::way::{OwnWay, Way};
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::{Leading, Own};
-use skein_leader::ledger::PlanBundle;
-use skein_leader::planner::Strategy;
+use skein_leader::params::Strategy;
+use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, PHASE_REFORM, QueuePlace, set_tag};
@@ -85,7 +85,7 @@ impl SwarmPilot {
     /// Elections, and planning while it leads.
     fn lead(&mut self, senses: &Senses<'_>, own: &Own, say: &mut Vec<Message>) {
         self.leading.elect(senses.now, own, say);
-        if self.leading.election.leads() {
+        if self.leading.is_leader() {
             self.plan(senses.now, own, say);
         } else {
             self.rollout = None;
@@ -96,7 +96,7 @@ impl SwarmPilot {
         self.leading.refresh_members(now, own);
         if let Some(mut rollout) = self.rollout.take() {
             // What became known meanwhile is planned for in the next tick.
-            let over = match rollout.still_holds(self.leading.members(), self.leading.obstacles.iter().count()) {
+            let over = match rollout.still_holds(self.leading.members(), self.leading.obstacles().iter().count()) {
                 true => rollout.work(own.tick),
                 false => Some(rollout.choose()),
             };
@@ -118,8 +118,8 @@ impl SwarmPilot {
 
     /// Sends all on the ways to fly meanwhile, in the groups they have, and begins to rehearse what else could be done.
     fn rehearse(&mut self, start: Start, alternatives: Vec<PlanBundle>) {
-        let (members, scope) = (self.leading.members(), self.leading.election.scope());
-        let mut first = alternatives[self.leading.meanwhile()].clone();
+        let (members, scope) = (self.leading.members(), self.leading.scope());
+        let mut first = alternatives[self.leading.interim()].clone();
         first.unsplit(members, scope);
         first.parts.retain(|id| members.iter().any(|m| m.id == id));
         self.rollout = Some(Box::new(Rollout::new(self, start, alternatives)));
@@ -130,7 +130,7 @@ impl SwarmPilot {
     /// beacon, and how far they took to stop.
     fn find_silent(&mut self, senses: &Senses<'_>) {
         let braking = 2.0 * self.params.safety.acceleration_max_mps2;
-        let peers = &self.leading.peers;
+        let peers = self.leading.peers();
         let mute = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
         self.silent.clear();
         self.silent.extend(mute.map(|n| senses.position + Vec2::from(n.position_m)));
@@ -146,17 +146,17 @@ impl SwarmPilot {
         let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
         let planned =
-            |id| self.leading.ledger.sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(self.params.me));
-        let past = |id| self.leading.obstacles.has_passed(self.params.me, id);
+            |id| self.leading.planned_sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(self.params.me));
+        let past = |id| self.leading.obstacles().has_passed(self.params.me, id);
         let urgent = near.filter(|(detection, id)| detection.danger && !planned(*id) && !past(*id));
         let sooner = |a: &(Detection, _), b: &(Detection, _)| a.0.time_to_impact_s.total_cmp(&b.0.time_to_impact_s);
         let Some((_, id)) = urgent.min_by(sooner) else { return };
-        let Some(set) = self.leading.obstacles.sets().iter().find(|set| set.contains(&id)) else { return };
+        let Some(set) = self.leading.obstacles().sets().iter().find(|set| set.contains(&id)) else { return };
         let tag = set_tag(set);
         if self.way.own.as_ref().is_some_and(|own| own.tag == tag) {
             return;
         }
-        let Some(shapes) = self.leading.obstacles.shapes(set) else { return };
+        let Some(shapes) = self.leading.obstacles().shapes(set) else { return };
         let routes = Routes::new(&shapes, &self.params.planner.routes);
         if senses.position.x >= routes.exit_x_m() {
             return;
@@ -182,7 +182,7 @@ impl SwarmPilot {
             return self.on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
         }
         let over = self.is_formation_over(senses.now);
-        match (self.leading.ledger.obeyed(), self.leading.ledger.part()) {
+        match (self.leading.obeyed(), self.leading.part()) {
             (Some(bundle), Some(part)) if bundle.plan.phase != PHASE_AVOID && !over => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
@@ -195,8 +195,8 @@ impl SwarmPilot {
     /// Whether the formation it obeys was one of another term than that of its leader, who for long has made no new one: the
     /// others are still on their way, and a drone that kept its slot might bar it.
     fn is_formation_over(&mut self, now: SimTime) -> bool {
-        let term = self.leading.election.obeyed();
-        let bundle = self.leading.ledger.obeyed();
+        let term = self.leading.term();
+        let bundle = self.leading.obeyed();
         let old = bundle.is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM && bundle.plan.id.ballot != term);
         self.old_formation = old.then(|| self.old_formation.unwrap_or(now));
         self.old_formation.is_some_and(|since| now.since(since) >= OLD_FORMATION_S)
@@ -204,7 +204,7 @@ impl SwarmPilot {
 
     /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
     fn on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
-        if self.leading.peers.silent(now).next().is_none() {
+        if self.leading.peers().silent(now).next().is_none() {
             return wanted;
         }
         let (speed, limit) = (wanted.norm(), self.safety.params().speed_on_sight_mps());
@@ -218,7 +218,7 @@ impl SwarmPilot {
             return speed;
         }
         for place in places.iter().filter(|place| place.set != 0 && self.way.is_open_set(place.set)) {
-            ahead_of(*place, &self.leading.peers, now, &mut self.ahead);
+            ahead_of(*place, self.leading.peers(), now, &mut self.ahead);
             let headway_s = self.params.planner.headway_s;
             let here =
                 queue_speed(&self.ahead, place.remaining_m, headway_s, guidance.speed_mps, guidance.speed_change_mps);
@@ -262,12 +262,12 @@ impl SwarmPilot {
         let open = places.iter().find(|place| place.set != 0 && self.way.is_open_set(place.set));
         Command {
             acceleration,
-            obeyed: self.leading.ledger.stamp(),
-            part_hash: self.leading.ledger.part_hash(),
-            group: self.leading.ledger.group(),
-            leads: self.leading.election.leads().then(|| self.leading.election.scope()),
-            term: self.leading.election.obeyed(),
-            phase: self.leading.ledger.obeyed().map_or(0, |bundle| bundle.plan.phase),
+            obeyed: self.leading.stamp(),
+            part_hash: self.leading.part_hash(),
+            group: self.leading.group(),
+            leads: self.leading.is_leader().then(|| self.leading.scope()),
+            term: self.leading.term(),
+            phase: self.leading.obeyed().map_or(0, |bundle| bundle.plan.phase),
             place: open.map(|place| (place.route, place.rank)),
         }
     }
@@ -282,17 +282,15 @@ impl Pilot for SwarmPilot {
             self.leading.hear(senses.now, source, message, say);
             self.stray.hear(message);
         }
-        self.leading.feel(senses.broken != 0);
+        self.leading.set_impaired(senses.broken != 0);
         self.sense(senses);
         self.find_silent(senses);
         self.lead(senses, &own, say);
         self.emergency_avoidance(senses);
         let radius_m = DEAD_BERTH * self.params.safety.safe_distance_m;
         let bodies: Vec<Body> = self.silent.iter().map(|&centre_m| Body { centre_m, radius_m }).collect();
-        self.way.update(&self.leading.ledger, senses.position, &bodies);
-        for set in self.leading.ledger.sets().iter().filter(|set| senses.position.x >= set.routes.exit_x_m()) {
-            self.leading.obstacles.note_passed(self.params.me, &set.ids);
-        }
+        self.way.update(self.leading.ledger(), senses.position, &bodies);
+        self.leading.note_passed(senses.position);
         let places = self.way.places(senses.position);
         let safe = self.steer(senses, &places);
         let acceleration = self.reaction.delay(safe);
@@ -303,6 +301,6 @@ impl Pilot for SwarmPilot {
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
-        ages.extend(self.leading.peers.living(now).map(|(_, pose)| now.since(pose.stamp)));
+        ages.extend(self.leading.peers().living(now).map(|(_, pose)| now.since(pose.stamp)));
     }
 }

@@ -3,7 +3,7 @@
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::funnel::{Corridor, RUN_OUT_M, Steering};
 use skein_leader::ledger::Ledger;
-use skein_leader::ledger::PlannedSet;
+use skein_leader::planned_set::PlannedSet;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::payload::{MAX_PLACES, QueuePlace};
 use skein_protocol::{DroneId, PlanStamp, Vec2};

@@ -2,10 +2,15 @@
 
 use crate::candidates::candidates;
 use crate::cost::{Flight, Trip, shortest, trips};
-use crate::ledger::{Ledger, PlanBundle, PlannedSet};
+use crate::ledger::Ledger;
+use crate::member::{Member, group_leaders};
+use crate::params::Strategy;
+use crate::plan_bundle::PlanBundle;
 use crate::plan_exchange;
-use crate::planner::{Member, Planner, Situation, Strategy};
+use crate::planned_set::PlannedSet;
+use crate::planner::Planner;
 use crate::routes::Routes;
+use crate::situation::Situation;
 use crate::split::{ArrivalTable, RouteAssignment};
 use skein_protocol::payload::{Arrivals, Assignment, PHASE_AVOID, Plan, set_tag};
 use skein_protocol::{GroupId, ObstacleId, Vec2};
@@ -104,7 +109,7 @@ impl Planner {
     ) -> PlanBundle {
         let Grouping { chosen, ranks, predicted_s } = grouping;
         let groups = groups(s, chosen, &survey.kept, replan);
-        let leaders = self.params.fronts(s.members, &groups);
+        let leaders = group_leaders(s.members, &groups, &self.params.destination);
         let plan = Plan {
             predicted_s: *predicted_s,
             routes: survey.routes.count() as u32,

@@ -4,9 +4,11 @@
 
 use crate::avoid::{Grouping, Survey, ranks};
 use crate::candidates::candidates;
-use crate::ledger::PlanBundle;
+use crate::params::Strategy;
+use crate::plan_bundle::PlanBundle;
 use crate::plan_exchange::{self, arrivals_s};
-use crate::planner::{Planner, Situation, Strategy};
+use crate::planner::Planner;
+use crate::situation::Situation;
 use crate::split::RouteAssignment;
 use skein_protocol::payload::{ARRIVALS_CHOSEN, Arrivals, Assignment, set_tag};
 use skein_protocol::{Ballot, DroneId, ObstacleId, SimTime};

@@ -6,15 +6,22 @@
 //! everything, the foremost leader claims the whole swarm again, and the formation closes.
 
 use crate::election::{Election, ElectionParams, Input};
-use crate::ledger::{Ledger, PlanBundle};
+use crate::ledger::Ledger;
+use crate::member::Member;
 use crate::membership::Peers;
 use crate::obstacles::Obstacles;
+use crate::params::PlannerParams;
 use crate::parts::Due;
-use crate::planner::{Member, Planner, PlannerParams, Situation};
+use crate::plan_bundle::PlanBundle;
+use crate::planned_set::PlannedSet;
+use crate::planner::Planner;
+use crate::situation::Situation;
 use crate::talk::Talk;
-use skein_protocol::payload::{LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_IMPAIRED, POSE_LEADS, Pose};
+use skein_protocol::payload::{
+    Assignment, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace,
+};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
 
 /// What the machine needs to know before it starts.
 #[derive(Clone, Debug)]
@@ -59,16 +66,11 @@ pub struct Leading {
     pub(crate) incarnation: u32,
     drones: u32,
     pub(crate) wait_s: f64,
-    /// Who is there.
-    pub peers: Peers,
-    /// What is in the way.
-    pub obstacles: Obstacles,
-    /// What is planned.
-    pub ledger: Ledger,
-    /// Who leads.
-    pub election: Election,
-    /// How groupings are chosen, should it lead.
-    pub planner: Planner,
+    pub(crate) peers: Peers,
+    pub(crate) obstacles: Obstacles,
+    pub(crate) ledger: Ledger,
+    pub(crate) election: Election,
+    pub(crate) planner: Planner,
     pub(crate) talk: Talk,
     pub(crate) members: Vec<Member>,
     pub(crate) others: Vec<Member>,
@@ -99,6 +101,101 @@ impl Leading {
         }
     }
 
+    /// Whether this drone leads a group.
+    #[must_use]
+    pub fn is_leader(&self) -> bool {
+        self.election.leads()
+    }
+
+    /// The term this drone obeys, or leads in; [`Ballot::NONE`] before the first.
+    #[must_use]
+    pub fn term(&self) -> Ballot {
+        self.election.obeyed()
+    }
+
+    /// The group that the term is for.
+    #[must_use]
+    pub fn scope(&self) -> GroupId {
+        self.election.scope()
+    }
+
+    /// The group this drone is in: the scope of its term, or a part of it.
+    #[must_use]
+    pub fn group(&self) -> GroupId {
+        self.ledger.group()
+    }
+
+    /// The stamp of the plan this drone obeys; the default, lower than any, before the first.
+    #[must_use]
+    pub fn stamp(&self) -> PlanStamp {
+        self.ledger.stamp()
+    }
+
+    /// The newest stamp this drone has heard of, whether it can obey that plan yet or not.
+    #[must_use]
+    pub fn newest_stamp(&self) -> PlanStamp {
+        self.ledger.newest()
+    }
+
+    /// The plan this drone obeys, with the assignments it has heard of.
+    #[must_use]
+    pub fn obeyed(&self) -> Option<&PlanBundle> {
+        self.ledger.obeyed()
+    }
+
+    /// This drone's assignment in the plan it obeys.
+    #[must_use]
+    pub fn part(&self) -> Option<&Assignment> {
+        self.ledger.part()
+    }
+
+    /// Hash of this drone's assignment: equal stamps must mean equal hashes. 0 before the first plan.
+    #[must_use]
+    pub fn part_hash(&self) -> u64 {
+        self.ledger.part_hash()
+    }
+
+    /// The obstacle sets that are being passed, in flight order.
+    #[must_use]
+    pub fn planned_sets(&self) -> &[PlannedSet] {
+        self.ledger.sets()
+    }
+
+    /// All that this drone knows of plans.
+    #[must_use]
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// The beacons this drone has heard.
+    #[must_use]
+    pub fn peers(&self) -> &Peers {
+        &self.peers
+    }
+
+    /// The obstacles this drone knows.
+    #[must_use]
+    pub fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
+    /// Notes which planned sets this drone has left behind, being at `position` (world frame, m).
+    pub fn note_passed(&mut self, position: Vec2) {
+        for set in self.ledger.sets().iter().filter(|set| position.x >= set.routes.exit_x_m()) {
+            self.obstacles.note_passed(self.me, &set.ids);
+        }
+    }
+
+    /// The ledger as if all drones were one group in this drone's [`Self::first_term`], with the queue places that living
+    /// peers show in their beacons: what a rollout of the whole swarm starts from.
+    #[must_use]
+    pub fn united_ledger(&self, now: SimTime) -> Ledger {
+        let living = self.peers.living(now);
+        let places = living.flat_map(|(id, pose)| pose.queue.into_iter().map(move |place| (id, place)));
+        let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
+        self.ledger.united(self.first_term(), &flown)
+    }
+
     /// The term in which this drone would lead all, had nobody led before.
     #[must_use]
     pub fn first_term(&self) -> Ballot {
@@ -108,7 +205,7 @@ impl Leading {
     /// The machine of a drone that knows what this one knows, and of plans this ledger, were all drones one group that
     /// this one leads in its [`Self::first_term`].
     #[must_use]
-    pub fn of_crew(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
+    pub fn rollout_member(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
         let mut study = Self::new(params);
         study.obstacles = self.obstacles.clone();
         study.peers = self.peers.clone();
@@ -224,7 +321,7 @@ impl Leading {
     }
 
     /// Whether a sensor of its own is broken: then it leads only while nobody else can.
-    pub fn feel(&mut self, impaired: bool) {
+    pub fn set_impaired(&mut self, impaired: bool) {
         self.impaired = impaired;
     }
 
@@ -281,7 +378,7 @@ impl Leading {
 
     /// Which of the alternatives decided on last is to be flown while this leader thinks.
     #[must_use]
-    pub fn meanwhile(&self) -> usize {
+    pub fn interim(&self) -> usize {
         self.planner.meanwhile
     }
 

@@ -2,61 +2,14 @@
 //! ledger serves the one who obeys and the one who plans; a new leader continues from its own.
 
 use crate::obstacles::{Obstacles, set_ids};
-use crate::planner::Member;
+use crate::plan_bundle::PlanBundle;
+use crate::planned_set::PlannedSet;
 use crate::roster::Roster;
 use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, Pose, QueuePlace, set_tag};
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime};
-
-/// A plan and everybody's part in it, as its leader made it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlanBundle {
-    /// The plan.
-    pub plan: Plan,
-    /// One part a member, by id.
-    pub parts: Roster,
-}
-
-impl PlanBundle {
-    /// Leaves the members in the groups they have; who is of none within the scope, in that one.
-    pub fn unsplit(&mut self, members: &[Member], scope: GroupId) {
-        for member in members {
-            let group = if scope.contains(member.group) { member.group } else { scope };
-            self.parts.get_mut(member.id).into_iter().for_each(|part| part.group = group);
-        }
-    }
-
-    /// Makes these orders some for all drones as one group, under this stamp.
-    pub fn unite(&mut self, stamp: PlanStamp) {
-        (self.plan.id, self.plan.group) = (stamp, GroupId::ALL);
-        for part in self.parts.iter_mut() {
-            (part.id, part.scope, part.group) = (stamp, GroupId::ALL, GroupId::ALL);
-        }
-    }
-}
-
-/// An obstacle set that is being passed: its routes, and who flies which.
-#[derive(Clone, Debug)]
-pub struct PlannedSet {
-    /// Its obstacles, ascending.
-    pub ids: Vec<ObstacleId>,
-    /// Their short name.
-    pub tag: u32,
-    /// Under which plan the parts were given.
-    pub stamp: PlanStamp,
-    /// When that plan was made.
-    pub made: SimTime,
-    /// How many have a part in it.
-    pub members: u32,
-    /// The group that the plan was for.
-    pub scope: GroupId,
-    /// The ways past it.
-    pub routes: Routes,
-    /// Everybody's part, as far as it was heard.
-    pub parts: Roster,
-}
+use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp};
 
 /// The ledger of one drone. Bounded by the size of the swarm and of an obstacle set.
 #[derive(Clone, Debug)]

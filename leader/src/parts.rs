@@ -2,8 +2,8 @@
 
 use crate::election::Input;
 use crate::leading::{Leading, Own};
+use crate::member::Member;
 use crate::membership::extrapolated;
-use crate::planner::Member;
 use skein_protocol::payload::POSE_LEADS;
 use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, Vec2};
 

@@ -2,149 +2,19 @@
 //! senses or by messages.
 
 use crate::joint::Joint;
-use crate::ledger::{Ledger, PlanBundle, PlannedSet};
+use crate::member::Member;
 use crate::obstacles::{Obstacles, set_array};
+use crate::params::PlannerParams;
+use crate::plan_bundle::PlanBundle;
 use crate::plan_exchange::PlanExchange;
+use crate::planned_set::PlannedSet;
 use crate::reform::Reform;
-use crate::routes::RouteParams;
-use crate::slots::Reformation;
-use skein_protocol::formation::Shape;
+use crate::situation::Situation;
 use skein_protocol::payload::{Arrivals, PHASE_AVOID, Plan};
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
-use std::collections::BTreeMap;
-
-/// How a leader chooses among the groupings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Strategy {
-    /// Least time of the last drone past the gate (paper, Algorithm 3).
-    PaperRule,
-    /// The best few groupings by that rule and the shortest ways, flown ahead in a rehearsal; the best wins.
-    LookAhead(Objective),
-    /// Each drone takes its own shortest way.
-    ShortestPath,
-    /// So many drones on the left and on the right of one obstacle, each side filled in the least time.
-    Fixed {
-        /// On the left route.
-        left: usize,
-        /// On the right route.
-        right: usize,
-    },
-}
-
-/// What a rehearsed mission costs: a weighted sum. Ties go to the lower energy, then to the earlier end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Objective {
-    /// Weight of the energy of all drones until the mission's end, 1/kJ.
-    pub energy_per_kj: f64,
-    /// Weight of the time until the mission's end, 1/s.
-    pub time_per_s: f64,
-}
-
-impl Objective {
-    /// The cost of so much energy (J) and time (s).
-    #[must_use]
-    pub fn cost(&self, energy_j: f64, time_s: f64) -> f64 {
-        self.energy_per_kj * energy_j / 1000.0 + self.time_per_s * time_s
-    }
-}
-
-/// Where a mission ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Destination {
-    /// In formation, at rest, once the front slot is this far along the flight, m.
-    Hold {
-        /// Abscissa at which a moving anchor stops, m.
-        stop_x_m: f64,
-    },
-    /// In the slots of a formation whose front slot is here, m.
-    Goal {
-        /// The front slot.
-        front_m: Vec2,
-    },
-}
+use skein_protocol::{DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
 
 /// The parts of a plan, said and repeated, are heard within so long, s; the air's delay comes on top, both ways.
 const AWAITED_S: f64 = 1.0;
-
-impl Destination {
-    /// Distance that decides elections: the smaller, the closer to the destination. m.
-    #[must_use]
-    pub fn distance_m(&self, position: Vec2) -> f64 {
-        match self {
-            Self::Hold { .. } => -position.x,
-            Self::Goal { front_m } => (front_m - position).norm(),
-        }
-    }
-}
-
-/// What planning needs to know of the mission.
-#[derive(Clone, Debug)]
-pub struct PlannerParams {
-    /// How groupings are chosen.
-    pub strategy: Strategy,
-    /// Nominal speed, m/s.
-    pub speed_mps: f64,
-    /// Time between two drones on a route, s.
-    pub headway_s: f64,
-    /// Clearances of routes.
-    pub routes: RouteParams,
-    /// The formation.
-    pub shape: Shape,
-    /// Its spacing, m.
-    pub spacing_m: f64,
-    /// Who takes which slot.
-    pub reformation: Reformation,
-    /// A drone has arrived when it is as near as this to its slot, m.
-    pub arrival_error_m: f64,
-    /// Distance of slots from drones that hang dead in the air, m.
-    pub safe_distance_m: f64,
-    /// Ordinate of the course line, m.
-    pub course_y_m: f64,
-    /// Where the mission ends.
-    pub destination: Destination,
-    /// A new obstacle waits for others so long before it is planned for, and a changed membership before slots are, s.
-    pub debounce_s: f64,
-}
-
-/// A living member of the group, as its leader knows it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Member {
-    /// Who.
-    pub id: DroneId,
-    /// Where it is by now, m.
-    pub position: Vec2,
-    /// How fast it flies, m/s.
-    pub speed_mps: f64,
-    /// Its velocity, m/s.
-    pub velocity: Vec2,
-    /// The group it is in.
-    pub group: GroupId,
-    /// Whether its last beacon shows that it obeys this leader's term.
-    pub follows: bool,
-}
-
-/// What a leader knows when it decides.
-#[derive(Clone, Copy, Debug)]
-pub struct Situation<'a> {
-    /// Now.
-    pub now: SimTime,
-    /// Its term.
-    pub ballot: Ballot,
-    /// The group that it leads.
-    pub scope: GroupId,
-    /// The living members, itself included, by id.
-    pub members: &'a [Member],
-    /// Living drones of other groups, by id.
-    pub others: &'a [Member],
-    /// How long a message is on the air, s.
-    pub delay_s: f64,
-    /// Where silent drones may hang in the air, m.
-    pub silent: &'a [Vec2],
-    /// Known obstacles.
-    pub obstacles: &'a Obstacles,
-    /// What was planned so far.
-    pub ledger: &'a Ledger,
-}
 
 /// The deciding part of a drone; idle unless the drone leads.
 #[derive(Clone, Debug)]
@@ -266,10 +136,7 @@ impl Planner {
 
     /// The plan's common part. An anchor that is already where it stops does not move.
     pub(crate) fn plan(&self, s: &Situation<'_>, phase: u32, set: &[ObstacleId], anchor: Vec2) -> Plan {
-        let stop_x_m = match self.params.destination {
-            Destination::Hold { stop_x_m } => stop_x_m,
-            Destination::Goal { front_m } => front_m.x,
-        };
+        let stop_x_m = self.params.destination.stop_x_m();
         let moving = phase != PHASE_AVOID && anchor.x < stop_x_m;
         let newest = s.ledger.newest();
         let epoch = if newest.ballot == s.ballot { newest.epoch.saturating_add(1) } else { 1 };
@@ -305,19 +172,4 @@ fn is_awaited(planned: &PlannedSet, s: &Situation<'_>) -> bool {
 /// Whether a plan for a set was made in this term, or by the leader of the group that this one was split from.
 fn holds(planned: &PlannedSet, s: &Situation<'_>) -> bool {
     planned.stamp.ballot == s.ballot || (planned.scope != s.scope && planned.scope.contains(s.scope))
-}
-
-impl PlannerParams {
-    /// Who leads the group of each member: the one of it that is closest to the destination; ties: the lower id.
-    pub(crate) fn fronts(&self, members: &[Member], groups: &[GroupId]) -> Vec<DroneId> {
-        let distance_m = |m: &Member| self.destination.distance_m(m.position);
-        let mut first: BTreeMap<GroupId, &Member> = BTreeMap::new();
-        for (member, &group) in members.iter().zip(groups) {
-            let best = first.entry(group).or_insert(member);
-            if distance_m(member) < distance_m(best) {
-                *best = member;
-            }
-        }
-        groups.iter().map(|group| first.get(group).map_or(DroneId::NONE, |m| m.id)).collect()
-    }
 }

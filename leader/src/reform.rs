@@ -1,8 +1,11 @@
 //! Who takes which slot (paper, Algorithm 5).
 
 use crate::geometry::nearest;
-use crate::ledger::PlanBundle;
-use crate::planner::{Destination, Member, Planner, Situation};
+use crate::member::{Member, group_leaders};
+use crate::params::Destination;
+use crate::plan_bundle::PlanBundle;
+use crate::planner::Planner;
+use crate::situation::Situation;
 use crate::slots::{self, Reformation};
 use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
 use skein_protocol::{GroupId, SimTime, Vec2};
@@ -89,7 +92,7 @@ impl Planner {
         let plan = self.plan(s, phase, &[], anchor);
         let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
         let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
-        let leaders = self.params.fronts(s.members, &groups);
+        let leaders = group_leaders(s.members, &groups, &self.params.destination);
         let part = |(i, m): (usize, &Member)| Assignment {
             id: plan.id,
             scope: s.scope,

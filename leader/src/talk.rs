@@ -1,8 +1,8 @@
 //! What a drone says, and when: its beacon, what it leads with, and repetitions of whatever others may have missed.
 
 use crate::leading::{Leading, Own};
-use crate::ledger::PlanBundle;
 use crate::obstacles::{Obstacles, set_array, set_ids};
+use crate::plan_bundle::PlanBundle;
 use skein_protocol::payload::{MAX_PLACES, Obstacle, PHASE_AVOID, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime};
 

@@ -211,11 +211,11 @@ fn plan_conflict_seen(swarm: &Swarm) -> Option<String> {
     let leader = |ballot: Ballot| swarm.drones.get(ballot.claimant.index())?.as_ref();
     let drones = swarm.side(0);
     let liar = drones.iter().find(|(_, drone)| {
-        let stamp = drone.ledger.stamp();
-        let made = leader(stamp.ballot).map(|leader| leader.ledger.stamp()).filter(|made| made.ballot == stamp.ballot);
-        drone.election.obeyed() == stamp.ballot && made.is_none_or(|made| stamp.epoch > made.epoch)
+        let stamp = drone.stamp();
+        let made = leader(stamp.ballot).map(|leader| leader.stamp()).filter(|made| made.ballot == stamp.ballot);
+        drone.term() == stamp.ballot && made.is_none_or(|made| stamp.epoch > made.epoch)
     });
-    liar.map(|(id, drone)| format!("{id} obeys {:?}", drone.ledger.stamp()))
+    liar.map(|(id, drone)| format!("{id} obeys {:?}", drone.stamp()))
 }
 
 proptest! {
@@ -236,10 +236,10 @@ proptest! {
             }
         }
         for (_, leading) in swarm.side(0) {
-            let bundle = [leading.ledger.obeyed(), leading.ledger.origin()];
+            let bundle = [leading.obeyed(), leading.ledger().origin()];
             prop_assert!(bundle.into_iter().flatten().all(|bundle| bundle.parts.len() <= HONEST + 1));
-            prop_assert!(leading.obstacles.iter().count() <= noise.len() + 1);
-            prop_assert!(leading.ledger.sets().len() <= noise.len() + 1);
+            prop_assert!(leading.obstacles().iter().count() <= noise.len() + 1);
+            prop_assert!(leading.planned_sets().len() <= noise.len() + 1);
         }
         let regained = swarm.until(20.0, |s| discord(&s.side(0)).or_else(|| plan_conflict_seen(s)));
         prop_assert!(regained.is_ok(), "{regained:?}");

@@ -193,10 +193,10 @@ proptest! {
         }
         let walls = swarm.scenery.len();
         for leading in swarm.drones.iter().flatten() {
-            let bundle = [leading.ledger.obeyed(), leading.ledger.origin()];
+            let bundle = [leading.obeyed(), leading.ledger().origin()];
             prop_assert!(bundle.into_iter().flatten().all(|bundle| bundle.parts.len() <= 4));
-            prop_assert!(leading.ledger.sets().len() <= walls && leading.obstacles.iter().count() <= walls);
-            prop_assert!(leading.peers.living(SimTime::ZERO).count() <= 3);
+            prop_assert!(leading.planned_sets().len() <= walls && leading.obstacles().iter().count() <= walls);
+            prop_assert!(leading.peers().living(SimTime::ZERO).count() <= 3);
         }
     }
 }

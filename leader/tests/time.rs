@@ -45,7 +45,7 @@ fn sides_of_a_partition_lead_themselves_and_become_one_within_a_second() {
         swarm.run(8.0);
         swarm.sides = vec![0; 8];
         let leads = |s: &Swarm| {
-            let leaders: Vec<_> = s.side(0).iter().filter(|(_, l)| l.election.leads()).map(|(id, _)| *id).collect();
+            let leaders: Vec<_> = s.side(0).iter().filter(|(_, l)| l.is_leader()).map(|(id, _)| *id).collect();
             let terms: BTreeSet<_> = (0..8).map(|i| s.term(i)).collect();
             (leaders.len() != 1 || terms.len() != 1).then(|| format!("{leaders:?} lead, {terms:?} are obeyed"))
         };
@@ -63,7 +63,7 @@ fn failovers(periods: Periods, air: Air) -> Vec<f64> {
             let old = swarm.term(7).unwrap();
             swarm.kill(old.claimant.index());
             let follows = |s: &Swarm| {
-                let terms: BTreeSet<_> = s.side(0).iter().map(|(_, l)| l.election.obeyed()).collect();
+                let terms: BTreeSet<_> = s.side(0).iter().map(|(_, l)| l.term()).collect();
                 let one = terms.len() == 1 && terms.iter().all(|t| *t != old && s.drones[t.claimant.index()].is_some());
                 (!one).then(|| format!("{terms:?}"))
             };
@@ -102,7 +102,7 @@ fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
         let mut handed_over_s = None;
         for _ in 0..(120.0 / DEFAULT.dt_s) as u64 {
             swarm.step().unwrap();
-            let leaders = swarm.side(0).iter().filter(|(_, l)| l.election.leads()).count();
+            let leaders = swarm.side(0).iter().filter(|(_, l)| l.is_leader()).count();
             assert!(leaders >= 1, "nobody leads in {:?}", swarm.now());
             handed_over_s = handed_over_s.or((swarm.term(0) != Some(old)).then(|| swarm.now().secs()));
         }
@@ -121,24 +121,24 @@ fn a_leader_whose_sensor_breaks_hands_over_at_once_and_without_a_gap() {
         swarm.run(3.0);
         let old = swarm.term(0).unwrap();
         assert_eq!(old.claimant, DroneId(0));
-        let leads = |s: &Swarm| s.side(0).iter().filter(|(_, l)| l.election.leads()).count();
+        let leads = |s: &Swarm| s.side(0).iter().filter(|(_, l)| l.is_leader()).count();
         let led_by = |s: &Swarm, heir: u32| {
             assert!(leads(s) >= 1, "nobody leads in {:?}", s.now());
             let terms: BTreeSet<_> = (0..8).map(|i| s.term(i).unwrap()).collect();
             (terms.len() != 1 || terms.iter().any(|t| t.claimant != DroneId(heir))).then(|| format!("{terms:?}"))
         };
-        swarm.drones[0].as_mut().unwrap().feel(true);
+        swarm.drones[0].as_mut().unwrap().set_impaired(true);
         swarm.until(limit_s, |s| led_by(s, 1)).unwrap();
         // Until its next beacon nobody knows that the second is broken as well: of those who are sound the first leads.
-        swarm.drones[2].as_mut().unwrap().feel(true);
+        swarm.drones[2].as_mut().unwrap().set_impaired(true);
         swarm.run(1.0);
-        swarm.drones[1].as_mut().unwrap().feel(true);
+        swarm.drones[1].as_mut().unwrap().set_impaired(true);
         swarm.until(limit_s, |s| led_by(s, 3)).unwrap();
         // Nobody takes it back, nor is anybody asked who is no better.
         let terms = swarm.watch.as_ref().unwrap().leaders.len();
-        (4..8).for_each(|i| swarm.drones[i].as_mut().unwrap().feel(true));
+        (4..8).for_each(|i| swarm.drones[i].as_mut().unwrap().set_impaired(true));
         swarm.run(1.0);
-        swarm.drones[3].as_mut().unwrap().feel(true);
+        swarm.drones[3].as_mut().unwrap().set_impaired(true);
         swarm.run(20.0);
         assert_eq!(led_by(&swarm, 3), None);
         assert_eq!(swarm.watch.as_ref().unwrap().leaders.len(), terms, "loss {loss}");
@@ -149,7 +149,7 @@ fn a_leader_whose_sensor_breaks_hands_over_at_once_and_without_a_gap() {
 fn whoever_dies_is_followed_by_one_with_all_sensors() {
     let mut swarm = Swarm::new(DEFAULT, Air { seed: 4, ..Air::default() }, 8);
     swarm.run(3.0);
-    (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().feel(true));
+    (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().set_impaired(true));
     swarm.run(1.0);
     swarm.kill(0);
     let heir = |s: &Swarm| Some(s.term(7)?.claimant).filter(|&id| id != DroneId(3)).map(|id| id.to_string());
@@ -164,9 +164,9 @@ fn whoever_dies_is_followed_by_one_with_all_sensors() {
 /// What is wrong where not everybody hears everybody: each is to follow a leader that it hears itself, or to lead.
 fn unled(swarm: &Swarm) -> Option<String> {
     for (id, leading) in swarm.side(0) {
-        let term = leading.election.obeyed();
+        let term = leading.term();
         let leader = swarm.drones[term.claimant.index()].as_ref();
-        let leads = leader.is_some_and(|l| l.election.leads() && l.election.obeyed() == term);
+        let leads = leader.is_some_and(|l| l.is_leader() && l.term() == term);
         if !leads || id.index().abs_diff(term.claimant.index()) > swarm.reach {
             return Some(format!("{id} obeys {term:?}"));
         }
@@ -190,8 +190,7 @@ fn along_a_chain_everybody_follows_a_leader_it_hears_and_nobody_is_deposed() {
         let settled = swarm.watch.as_ref().unwrap().leaders.len();
         swarm.run(120.0);
         assert_eq!((unled(&swarm), swarm.watch.as_ref().unwrap().leaders.len()), (None, settled), "{name}");
-        let leaders: Vec<_> =
-            swarm.side(0).iter().filter(|(_, l)| l.election.leads()).map(|(id, _)| id.index()).collect();
+        let leaders: Vec<_> = swarm.side(0).iter().filter(|(_, l)| l.is_leader()).map(|(id, _)| id.index()).collect();
         assert!(leaders.windows(2).all(|pair| pair[0].abs_diff(pair[1]) > reach), "{name}: {leaders:?}");
         println!("{name}: {leaders:?} lead");
         swarm.reach = usize::MAX;

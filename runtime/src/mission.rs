@@ -8,7 +8,7 @@ use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::{RANGING, SafetyParams};
 use skein_agent::{Pilot, PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
-use skein_leader::planner::{Destination, Objective, PlannerParams, Strategy};
+use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::radio::Radio;

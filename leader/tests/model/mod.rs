@@ -117,8 +117,8 @@ impl State {
 
     /// The groups that are led, by whoever leads.
     fn led(&self) -> Vec<GroupId> {
-        let leading = self.processes.iter().filter_map(|p| p.machine.as_ref()).filter(|l| l.election.leads());
-        leading.map(|l| l.election.scope()).collect()
+        let leading = self.processes.iter().filter_map(|p| p.machine.as_ref()).filter(|l| l.is_leader());
+        leading.map(|l| l.scope()).collect()
     }
 }
 
@@ -200,7 +200,7 @@ impl Mission {
                 let (obstacle, shape) = wall_at(wall);
                 machine.sense(now, obstacle, shape);
             }
-            step(&mut machine, now, &Self::own(id, state.step), DroneId(id), &mut say);
+            step(&mut machine, now, &Self::own(id, state.step), &mut say);
             let seen = Arc::make_mut(&mut state.watch).see(DroneId(id), process.incarnation, &machine);
             state.breach = state.breach.take().or(seen.err());
             let process = &mut state.processes[id as usize];
@@ -335,7 +335,7 @@ impl Model for Mission {
                 (1..=2).all(|number| led.contains(&GroupId::ALL.child(number)))
             }),
             Property::sometimes("all fly in formation again", |_, s: &State| {
-                let part = |l: &Leading| l.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM);
+                let part = |l: &Leading| l.obeyed().is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM);
                 let all = s.processes.iter().all(|p| p.machine.as_ref().is_some_and(|l| part(l)));
                 all && s.sides().iter().all(|side| discord(side).is_none())
             }),

@@ -138,7 +138,7 @@ impl Swarm {
                 }
             }
             let mut say = Vec::new();
-            step(leading, now, &own, DroneId(i as u32), &mut say);
+            step(leading, now, &own, &mut say);
             if let Some(watch) = &mut self.watch {
                 watch.see(DroneId(i as u32), self.incarnations[i], leading)?;
             }
@@ -205,6 +205,6 @@ impl Swarm {
 
     /// Who leads a living drone, and in which term.
     pub fn term(&self, drone: usize) -> Option<Ballot> {
-        self.drones[drone].as_ref().map(|leading| leading.election.obeyed())
+        self.drones[drone].as_ref().map(|leading| leading.term())
     }
 }

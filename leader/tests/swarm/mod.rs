@@ -6,7 +6,7 @@ pub mod air;
 
 use skein_leader::election::ElectionParams;
 use skein_leader::leading::{Leading, LeadingParams, Own};
-use skein_leader::planner::{Destination, PlannerParams, Strategy};
+use skein_leader::params::{Destination, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::digest::Digest;
@@ -83,18 +83,16 @@ pub fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
 }
 
 /// What a drone does in a tick after it has heard: the order of the pilot.
-pub fn step(leading: &mut Leading, now: SimTime, own: &Own, me: DroneId, say: &mut Vec<Message>) {
+pub fn step(leading: &mut Leading, now: SimTime, own: &Own, say: &mut Vec<Message>) {
     leading.elect(now, own, say);
-    if leading.election.leads() {
+    if leading.is_leader() {
         leading.refresh_members(now, own);
         let mut bundle = leading.decide(now, &[], say);
         if !bundle.is_empty() {
             leading.adopt(now, bundle.swap_remove(0));
         }
     }
-    for set in leading.ledger.sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m()) {
-        leading.obstacles.note_passed(me, &set.ids);
-    }
+    leading.note_passed(own.position);
     leading.speak(now, own, &Default::default(), say);
 }
 
@@ -125,12 +123,12 @@ pub struct Watch {
 impl Watch {
     /// Looks at a drone.
     pub fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
-        let (term, stamp) = (leading.election.obeyed(), leading.ledger.stamp());
+        let (term, stamp) = (leading.term(), leading.stamp());
         let (from, to) = (self.obeyed.insert((drone, incarnation), (term, stamp)).unwrap_or_default(), (term, stamp));
         if from.0 > to.0 || from.1 > to.1 {
             return Err(Breach::WentBack { drone, from, to });
         }
-        if leading.election.leads() {
+        if leading.is_leader() {
             let first = *self.leaders.entry(term).or_insert(drone);
             if let Some(&other) = [first, term.claimant].iter().find(|&&other| other != drone) {
                 return Err(Breach::TwoLeaders { drone, other, ballot: term });
@@ -139,7 +137,7 @@ impl Watch {
         if stamp.ballot > term {
             return Err(Breach::NotOfTheTerm { drone, term, stamp });
         }
-        let Some(bundle) = leading.ledger.obeyed() else { return Ok(()) };
+        let Some(bundle) = leading.obeyed() else { return Ok(()) };
         let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&bundle.plan)));
         let parts = bundle.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(part))));
         for (of, value) in std::iter::once(plan).chain(parts) {
@@ -160,13 +158,13 @@ pub fn hash(bytes: &[u8]) -> u64 {
 /// What is wrong among drones that hear each other, by id: each is to obey the highest term for its group that one of
 /// them leads.
 pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
-    let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.election.leads()).collect();
+    let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.is_leader()).collect();
     for (id, leading) in drones {
-        let group = leading.election.group();
-        let mine = leaders.iter().filter(|(_, l)| l.election.scope().contains(group));
-        let highest = mine.map(|(_, l)| l.election.obeyed()).max();
-        if highest != Some(leading.election.obeyed()) {
-            return Some(format!("{id} of {group} obeys {:?}, the highest is {highest:?}", leading.election.obeyed()));
+        let group = leading.group();
+        let mine = leaders.iter().filter(|(_, l)| l.scope().contains(group));
+        let highest = mine.map(|(_, l)| l.term()).max();
+        if highest != Some(leading.term()) {
+            return Some(format!("{id} of {group} obeys {:?}, the highest is {highest:?}", leading.term()));
         }
     }
     None
@@ -178,11 +176,11 @@ pub fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
     if let Some(discord) = discord(drones) {
         return Some(discord);
     }
-    let terms = |(id, l): &(DroneId, &Leading)| (*id, l.election.obeyed(), l.election.scope(), l.ledger.stamp());
+    let terms = |(id, l): &(DroneId, &Leading)| (*id, l.term(), l.scope(), l.stamp());
     let all: Vec<_> = drones.iter().map(terms).collect();
     let (_, ballot, _, stamp) = *all.first()?;
     let one = all.iter().all(|(_, other, _, plan)| (*other, *plan) == (ballot, stamp));
-    let members = drones[0].1.ledger.obeyed().map_or(0, |bundle| bundle.plan.members as usize);
+    let members = drones[0].1.obeyed().map_or(0, |bundle| bundle.plan.members as usize);
     (!one || members != drones.len() || stamp.ballot != ballot)
         .then(|| format!("{} drones, a plan for {members}, terms {all:?}", drones.len()))
 }

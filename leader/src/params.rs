@@ -1,0 +1,107 @@
+//! What planning needs to know of the mission.
+
+use crate::routes::RouteParams;
+use crate::slots::Reformation;
+use skein_protocol::Vec2;
+use skein_protocol::formation::Shape;
+
+/// How a leader chooses among the groupings of its members.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Strategy {
+    /// The grouping in which the last drone passes the gate earliest (paper, Algorithm 3).
+    PaperRule,
+    /// The shortest paths, the paper's rule and the best few other groupings are flown ahead in a rollout. The best wins.
+    LookAhead(Objective),
+    /// Each drone takes its own shortest path.
+    ShortestPath,
+    /// A fixed number of drones on each side of one obstacle. Each side is filled in the least time.
+    Fixed {
+        /// Number of drones on the left route.
+        left: usize,
+        /// Number of drones on the right route.
+        right: usize,
+    },
+}
+
+/// Cost of a simulated mission: a weighted sum of energy and time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Objective {
+    /// Weight of the energy of all drones until the end of the mission, 1/kJ.
+    pub energy_per_kj: f64,
+    /// Weight of the time until the end of the mission, 1/s.
+    pub time_per_s: f64,
+}
+
+impl Objective {
+    /// The cost of a mission that takes `energy_j` (J) and `time_s` (s). No unit.
+    #[must_use]
+    pub fn cost(&self, energy_j: f64, time_s: f64) -> f64 {
+        self.energy_per_kj * energy_j / 1000.0 + self.time_per_s * time_s
+    }
+}
+
+/// Where a mission ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Destination {
+    /// The mission ends when the swarm holds its formation. A moving anchor stops at this abscissa.
+    Hold {
+        /// World frame, m; infinity: the anchor never stops.
+        stop_x_m: f64,
+    },
+    /// The mission ends in the slots of a formation whose front slot is here.
+    Goal {
+        /// The front slot, world frame, m.
+        front_m: Vec2,
+    },
+}
+
+impl Destination {
+    /// The distance that decides elections, m. The drone with the smallest one claims first. For [`Self::Hold`] it is the
+    /// negative abscissa of `position` (world frame, m).
+    #[must_use]
+    pub fn distance_m(&self, position: Vec2) -> f64 {
+        match self {
+            Self::Hold { .. } => -position.x,
+            Self::Goal { front_m } => (front_m - position).norm(),
+        }
+    }
+
+    /// The abscissa at which a moving anchor stops, world frame, m.
+    #[must_use]
+    pub fn stop_x_m(&self) -> f64 {
+        match self {
+            Self::Hold { stop_x_m } => *stop_x_m,
+            Self::Goal { front_m } => front_m.x,
+        }
+    }
+}
+
+/// Parameters of planning.
+#[derive(Clone, Debug)]
+pub struct PlannerParams {
+    /// How groupings are chosen.
+    pub strategy: Strategy,
+    /// Nominal speed, m/s.
+    pub speed_mps: f64,
+    /// Time between two drones on one route, s.
+    pub headway_s: f64,
+    /// Clearances of routes.
+    pub routes: RouteParams,
+    /// Shape of the formation.
+    pub shape: Shape,
+    /// Distance of neighbouring slots, m.
+    pub spacing_m: f64,
+    /// How slots are assigned to drones.
+    pub reformation: Reformation,
+    /// A drone has arrived when its distance to its slot is at most this, m.
+    pub arrival_error_m: f64,
+    /// Least distance of two drones, m.
+    pub safe_distance_m: f64,
+    /// Ordinate of the course line, m.
+    pub course_y_m: f64,
+    /// Where the mission ends.
+    pub destination: Destination,
+    /// Delay between learning an obstacle and planning for it, so that one plan covers obstacles that are learnt together;
+    /// also between a change of the members and new slots, s.
+    pub debounce_s: f64,
+}
