@@ -18,7 +18,18 @@ const DIRECTIONS: [(&str, &[&str]); 9] = [
     ("skein-scenario", &["skein-protocol", "skein-leader", "skein-agent", "skein-world"]),
     ("skein-bus", &["skein-protocol"]),
     ("skein-report", &["skein-protocol"]),
-    ("skein-runtime", &["skein-protocol", "skein-leader", "skein-agent", "skein-world", "skein-scenario", "skein-bus"]),
+    (
+        "skein-runtime",
+        &[
+            "skein-protocol",
+            "skein-leader",
+            "skein-agent",
+            "skein-world",
+            "skein-scenario",
+            "skein-bus",
+            "skein-report",
+        ],
+    ),
     (
         "skein",
         &[

@@ -1,18 +1,17 @@
 //! The summary, tick by tick.
 
+use crate::completion::RunCompletion;
+use crate::error::TickError;
 use crate::facts::RunFacts;
 use crate::formation::{self, Closing};
 use crate::leading::Leading;
 use crate::metrics::SwarmMetrics;
-use crate::recorder::Ending;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
-use crate::summary::{
-    Dropped, Energy, FaultEntry, Messages, Percentiles, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers,
-};
+use crate::summary::{Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
 use crate::vicinity::Vicinity;
 use skein_protocol::payload::PHASE_REFORM;
-use skein_protocol::record::{self, DroneRow, EventKind, Outcome, ROW_LATE, RecordView, RunEvent, Totals};
+use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, ROW_LATE, RecordView, RunEvent, Totals};
 use skein_protocol::{SimTime, Vec2};
 
 /// Time between two samples of the swarm metrics, s.
@@ -93,11 +92,12 @@ impl Accumulator {
     }
 
     /// Takes one record and its events. The last record may repeat the rows of the one before.
-    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), String> {
+    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), TickError> {
         let tick = record.head.tick;
         let fresh = !record.rows.is_empty() && self.counts.tick.is_none_or(|last| tick > last);
         if fresh && record.rows.len() != self.facts.drones as usize {
-            return Err(format!("tick {tick}: a record of {} rows, expected {}", record.rows.len(), self.facts.drones));
+            let expected = self.facts.drones as usize;
+            return Err(TickError::Rows { tick, expected, found: record.rows.len() });
         }
         self.counts.digest = Some(record.head.digest);
         self.counts.lost += u64::from(record.head.lost);
@@ -199,10 +199,11 @@ impl Accumulator {
     }
 
     /// The summary of what was taken.
-    pub fn finish(self, ending: &Ending) -> Summary {
+    pub fn finish(self, completion: &RunCompletion) -> Summary {
         let error = formation::error(&self.facts, &self.positions);
         let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick + 1), self.counts.t_s);
-        let wall_s = self.end.as_ref().map(|end| end.totals.wall_s).or(ending.wall_s).filter(|wall_s| *wall_s > 0.0);
+        let wall_s =
+            self.end.as_ref().map(|end| end.totals.wall_s).or(completion.wall_s).filter(|wall_s| *wall_s > 0.0);
         let steps = ticks as f64 * f64::from(self.facts.drones);
         let totals = self.end.as_ref().map(|end| &end.totals);
         Summary {
@@ -214,9 +215,9 @@ impl Accumulator {
             realtime_factor: wall_s.map(|wall_s| sim_s / wall_s),
             agent_steps_per_s: wall_s.map(|wall_s| steps / wall_s),
             wall_s,
-            startup_s: ending.startup_s,
+            startup_s: completion.startup_s,
             report_s: None,
-            outcome: self.end.as_ref().map_or(ending.fallback, |end| end.outcome),
+            outcome: self.end.as_ref().map_or(completion.fallback, |end| end.outcome),
             reason: self.end.as_ref().map(|end| end.reason.clone()),
             mission_s: self.end.as_ref().map_or(sim_s, |end| end.t_s),
             reform_start_s: self.reform_start_s,
@@ -284,7 +285,7 @@ fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
     rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
 }
 
-fn lateness(late_s: &record::Percentiles) -> Option<StepTimes> {
+fn lateness(late_s: &Percentiles) -> Option<StepTimes> {
     let us = |s: Option<f64>| s.map(|s| s * 1e6);
     Some(StepTimes { p50: us(late_s.p50)?, p99: us(late_s.p99)?, max: us(late_s.max)? })
 }
@@ -301,11 +302,7 @@ fn messages(counts: &Counts, totals: Option<&Totals>) -> Messages {
         delivered: totals.delivered,
         duplicates: Some(totals.duplicates),
         dropped: Dropped { loss, burst, range, partition, deaf, malformed, queue },
-        delay_s: spread(&totals.delay_s),
-        age_s: spread(&totals.age_s),
+        delay_s: totals.delay_s,
+        age_s: totals.age_s,
     }
-}
-
-fn spread(counted: &record::Percentiles) -> Percentiles {
-    Percentiles { mean: counted.mean, p50: counted.p50, p99: counted.p99, max: counted.max }
 }

@@ -1,4 +1,4 @@
-//! What can go wrong with a run's folder.
+//! What can go wrong with a run's record and folder.
 
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -6,45 +6,45 @@ use thiserror::Error;
 /// Why a run's folder cannot be made, written or read.
 #[derive(Debug, Error)]
 pub enum ReportError {
-    /// The folder is there already.
-    #[error("{0} exists already; another --out, or --force to replace the run in it")]
+    /// The folder exists already.
+    #[error("{0} exists already; name another folder with --out, or replace the run in it with --force")]
     Exists(PathBuf),
-    /// Something that is not a run is there.
-    #[error("{0} is not a run's folder (it holds no manifest.json of a run): it is left untouched")]
+    /// The folder holds something that is not a run.
+    #[error("{0} is not the folder of a run (it has no manifest.json of a run); nothing in it was changed")]
     NotARun(PathBuf),
-    /// The file system refused.
+    /// An operation of the file system failed.
     #[error("{path}: {source}")]
     Io {
-        /// Which file or folder.
+        /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// What the operating system reported.
         source: std::io::Error,
     },
-    /// A file holds something else than it should.
+    /// The content of a file is not what it should be.
     #[error("{path}: expected {expected}: {found}")]
     Content {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What should be there.
+        /// What the file should contain.
         expected: &'static str,
-        /// What is there, and where.
+        /// What it contains, and where.
         found: String,
     },
-    /// A recording cannot be written or read.
+    /// run.mcap cannot be written or read.
     #[error("{path}: {source}")]
     Recording {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// What the MCAP library reported.
         source: mcap::McapError,
     },
     /// A plot cannot be drawn.
-    #[error("{path}: cannot be drawn: {reason}")]
+    #[error("{path}: {source}")]
     Plot {
-        /// Which file.
+        /// The file that was to hold the plot.
         path: PathBuf,
         /// Why.
-        reason: String,
+        source: DrawError,
     },
 }
 
@@ -53,9 +53,48 @@ impl ReportError {
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }
     }
-    /// For `map_err`: an error with the recording at `path`.
+
+    /// For `map_err`: an error in the recording at `path`.
     pub(crate) fn recording(path: &Path) -> impl FnOnce(mcap::McapError) -> Self + use<> {
         let path = path.to_owned();
         move |source| Self::Recording { path, source }
     }
+}
+
+/// Why a plot cannot be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the plot cannot be drawn: {reason}")]
+pub struct DrawError {
+    /// What the SVG backend reported.
+    reason: String,
+}
+
+impl DrawError {
+    /// For `map_err`: an error of the SVG backend, whose type depends on the backend.
+    pub(crate) fn new(error: impl std::error::Error) -> Self {
+        Self { reason: error.to_string() }
+    }
+}
+
+/// Why the record of a tick cannot be used.
+#[derive(Debug, Error)]
+pub enum TickError {
+    /// The record does not have one row per drone.
+    #[error("tick {tick}: expected a record of {expected} rows, one per drone, found {found}")]
+    Rows {
+        /// The tick of the record.
+        tick: u64,
+        /// Number of drones of the run.
+        expected: usize,
+        /// Number of rows of the record.
+        found: usize,
+    },
+    /// A line of the record's events is not an event.
+    #[error("tick {tick}: expected an event as JSON: {source}")]
+    Event {
+        /// The tick of the record.
+        tick: u64,
+        /// What the JSON parser reported.
+        source: serde_json::Error,
+    },
 }

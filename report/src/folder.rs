@@ -21,7 +21,7 @@ const OWN_FILES: [&str; 9] = [
     SUMMARY,
     "events.jsonl",
     "trace.csv",
-    crate::morph::FILE,
+    crate::deviation::FILE,
     "run.mcap",
     "report.html",
     crate::spool::FILE,

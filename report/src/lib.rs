@@ -6,6 +6,8 @@
 mod accumulate;
 mod assign;
 mod close;
+mod completion;
+pub mod deviation;
 mod error;
 mod facts;
 mod folder;
@@ -13,7 +15,6 @@ mod formation;
 mod leading;
 mod mcap;
 mod metrics;
-pub mod morph;
 pub mod page;
 pub mod plot;
 mod recorder;
@@ -28,8 +29,9 @@ pub mod text;
 mod trace;
 mod vicinity;
 
-pub use error::ReportError;
+pub use completion::RunCompletion;
+pub use error::{DrawError, ReportError, TickError};
 pub use facts::{MissionEnd, RunFacts};
 pub use folder::{Manifest, ProcessEntry, Role, RunFolder};
-pub use recorder::{Ending, Recorder};
+pub use recorder::Recorder;
 pub use summary::*;

@@ -1,28 +1,18 @@
 //! Takes a run's record, tick by tick, into a summary; and into the files of the run's folder, once it is over.
 
 use crate::accumulate::Accumulator;
-use crate::error::ReportError;
+use crate::completion::RunCompletion;
+use crate::error::{ReportError, TickError};
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
 use crate::mcap::McapWriter;
 use crate::spool::{self, Spool};
 use crate::summary::Summary;
 use crate::trace::{self, TraceWriter};
-use skein_protocol::record::{Outcome, RecordSink, RecordView, RunEvent};
+use skein_protocol::record::{RecordSink, RecordView, RunEvent};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-
-/// What is known of a run once it is over, and the record did not tell.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ending {
-    /// How it ended if the record has no end: the world died, or could not tell.
-    pub fallback: Outcome,
-    /// Wall time from the first tick opened to the last tick done, s; used if the record has no end.
-    pub wall_s: Option<f64>,
-    /// Wall time from the command to the first tick, s.
-    pub startup_s: Option<f64>,
-}
 
 /// Accumulates the summary, and for a run's folder keeps the records; [`Recorder::finish`] makes trace.csv, events.jsonl
 /// and run.mcap of them, and tells if something is missing in there. A full disk costs files, never the summary.
@@ -62,14 +52,15 @@ impl Recorder {
     ///
     /// # Errors
     /// In the second part: [`ReportError::Io`] or [`ReportError::Recording`], the first trouble with the files.
-    pub fn finish(self, ending: &Ending) -> (Summary, Result<(), ReportError>) {
-        (self.accumulator.finish(ending), self.kept.map_or(Ok(()), Kept::finish))
+    pub fn finish(self, completion: &RunCompletion) -> (Summary, Result<(), ReportError>) {
+        (self.accumulator.finish(completion), self.kept.map_or(Ok(()), Kept::finish))
     }
 }
 
 impl RecordSink for Recorder {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
-        self.accumulator.take(record, &events(record)?)?;
+        let taken = events(record).and_then(|events| self.accumulator.take(record, &events));
+        taken.map_err(|error| error.to_string())?;
         if let Some(kept) = self.kept.as_mut().filter(|kept| !kept.refused) {
             kept.refused = !kept.spool.take(record);
         }
@@ -85,7 +76,10 @@ impl Kept {
     /// Makes the files of what was kept.
     fn finish(mut self) -> Result<(), ReportError> {
         let kept = self.spool.finish().map_err(ReportError::io(&self.path));
-        let content = |found| ReportError::Content { path: self.path.clone(), expected: "the run's records", found };
+        let content = |error: TickError| {
+            let (path, found) = (self.path.clone(), error.to_string());
+            ReportError::Content { path, expected: "the run's records", found }
+        };
         let made = spool::consume(&self.path, |record| {
             let events = events(record).map_err(content)?;
             self.files.write(record, &events)
@@ -97,9 +91,9 @@ impl Kept {
     }
 }
 
-fn events(record: RecordView<'_>) -> Result<Vec<RunEvent>, String> {
+fn events(record: RecordView<'_>) -> Result<Vec<RunEvent>, TickError> {
     let events = record.parse_events(|line| serde_json::from_slice::<RunEvent>(line));
-    events.map_err(|error| format!("tick {}: not an event: {error}", record.head.tick))
+    events.map_err(|source| TickError::Event { tick: record.head.tick, source })
 }
 
 struct Files {

@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
-use skein_protocol::record::{FaultKind, Outcome, ViolationKind};
+use skein_protocol::record::{FaultKind, Outcome, Percentiles, ViolationKind};
 use skein_protocol::{Ballot, DroneId};
 
 /// [`Summary::schema`] of this version.
@@ -221,8 +221,10 @@ pub struct Messages {
     /// Not heard, by reason.
     pub dropped: Dropped,
     /// From sending to hearing.
+    #[schemars(with = "PercentilesSchema")]
     pub delay_s: Percentiles,
     /// Age of a peer's last known pose.
+    #[schemars(with = "PercentilesSchema")]
     pub age_s: Percentiles,
 }
 
@@ -245,17 +247,20 @@ pub struct Dropped {
     pub queue: Option<u64>,
 }
 
-/// A range of counted times, s; null if nothing was counted.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Percentiles {
+/// The JSON schema of [`Percentiles`], which protocol defines without one.
+#[derive(JsonSchema)]
+#[serde(remote = "Percentiles", rename = "Percentiles")]
+#[schemars(description = "Statistics of counted times, s; null if nothing was counted.")]
+#[allow(dead_code, reason = "only its schema is used")]
+struct PercentilesSchema {
     /// Mean, s.
-    pub mean: Option<f64>,
+    mean: Option<f64>,
     /// Median, s.
-    pub p50: Option<f64>,
+    p50: Option<f64>,
     /// 99th percentile, s.
-    pub p99: Option<f64>,
+    p99: Option<f64>,
     /// Maximum, s.
-    pub max: Option<f64>,
+    max: Option<f64>,
 }
 
 /// A fault.

@@ -1,7 +1,7 @@
 //! A summary for people: the verdict first, then what they ask next.
 
-use crate::summary::{Percentiles, Stage, Summary};
-use skein_protocol::record::Outcome;
+use crate::summary::{Stage, Summary};
+use skein_protocol::record::{Outcome, Percentiles};
 use std::fmt::Write;
 
 /// What came of the run, in lines of at most some hundred characters. `colour` sets the verdict in the terminal's

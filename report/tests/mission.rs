@@ -7,7 +7,7 @@ use skein_protocol::payload::{Assignment, MAX_SET, PHASE_AVOID, PHASE_REFORM, Pl
 use skein_protocol::record::*;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
-use skein_report::{Ending, Manifest, MissionEnd, Recorder, RunFacts, RunFolder, Summary};
+use skein_report::{Manifest, MissionEnd, Recorder, RunCompletion, RunFacts, RunFolder, Summary};
 
 /// Last tick; a tick is 0.1 s.
 const LAST: u64 = 99;
@@ -41,8 +41,8 @@ fn facts() -> RunFacts {
     }
 }
 
-fn ending() -> Ending {
-    Ending { fallback: Outcome::Aborted, wall_s: Some(4.0), startup_s: Some(0.25) }
+fn completion() -> RunCompletion {
+    RunCompletion { fallback: Outcome::Aborted, wall_s: Some(4.0), startup_s: Some(0.25) }
 }
 
 /// Abreast at y = 45, 75, 15, 105, 10 m/s; 100 W.
@@ -194,7 +194,7 @@ fn flown() -> Summary {
     fly(&mut recorder, 0..=LAST);
     // The last word comes with the last tick's rows once more.
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
-    let (summary, files) = recorder.finish(&ending());
+    let (summary, files) = recorder.finish(&completion());
     files.unwrap();
     summary
 }
@@ -270,7 +270,7 @@ fn the_worlds_last_word_counts() {
 fn without_a_last_word_the_record_is_counted() {
     let mut recorder = Recorder::in_memory(RunFacts { runtime: "inline".to_owned(), ..facts() });
     fly(&mut recorder, 0..=29);
-    let (summary, _) = recorder.finish(&ending());
+    let (summary, _) = recorder.finish(&completion());
     assert_eq!((summary.outcome, summary.mission_s, summary.wall_s), (Outcome::Aborted, 3.0, Some(4.0)));
     assert_eq!((summary.messages.sent, summary.messages.delivered), (10, 360));
     assert_eq!((summary.messages.dropped.loss, summary.step_us), (None, None));
@@ -281,7 +281,7 @@ fn without_a_last_word_the_record_is_counted() {
 
 #[test]
 fn a_run_that_never_began_is_a_summary_too() {
-    let (summary, _) = Recorder::in_memory(facts()).finish(&Ending { wall_s: None, ..ending() });
+    let (summary, _) = Recorder::in_memory(facts()).finish(&RunCompletion { wall_s: None, ..completion() });
     assert_eq!((summary.ticks, summary.digest, summary.formation_error_m), (0, None, None));
     assert_eq!((summary.realtime_factor, summary.stages[0].groups.as_ref()), (None, None));
 }
@@ -290,11 +290,11 @@ fn a_run_that_never_began_is_a_summary_too() {
 fn a_broken_record_is_refused_with_its_tick() {
     let mut recorder = Recorder::in_memory(RunFacts { drones: 5, ..facts() });
     let error = give(&mut recorder, 3, &[], &[]).unwrap_err();
-    assert_eq!(error, "tick 3: a record of 4 rows, expected 5");
+    assert_eq!(error, "tick 3: expected a record of 5 rows, one per drone, found 4");
     let head = RecordHead { tick: 7, ..RecordHead::default() };
     let record = RecordView { head: &head, rows: &[], frames: &[], events: b"{\"t_s\": 1}\n" };
     let error = recorder.take(record).unwrap_err();
-    assert!(error.starts_with("tick 7: not an event"), "{error}");
+    assert!(error.starts_with("tick 7: expected an event"), "{error}");
 }
 
 /// Every key that the summary promises, `a.b` for a key of an object, `a[].b` for one of its entries.
@@ -338,7 +338,7 @@ fn the_runs_folder_holds_trace_and_events() {
     let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
     fly(&mut recorder, 0..=LAST);
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
-    let (summary, files) = recorder.finish(&ending());
+    let (summary, files) = recorder.finish(&completion());
     files.unwrap();
     folder.write_summary(&summary).unwrap();
     assert_eq!(folder.read_summary().unwrap(), summary);
@@ -363,7 +363,7 @@ fn files_that_cannot_be_written_do_not_cost_the_summary() {
         let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
         fly(&mut recorder, 0..=LAST);
         assert!(recorder.ready());
-        let (summary, files) = recorder.finish(&ending());
+        let (summary, files) = recorder.finish(&completion());
         assert_eq!(summary.ticks, 100);
         assert!(files.unwrap_err().to_string().contains(name), "{name} is not named");
         assert!(!folder.path().join("flight.spool").exists());

@@ -20,6 +20,7 @@ pub mod mission;
 pub mod pilot_host;
 mod plan;
 mod radio_receiver;
+pub mod run_facts;
 pub mod supervisor;
 pub mod world_process;
 

@@ -2,15 +2,15 @@
 
 use crate::cli::CheckArgs;
 use crate::exit::{Exit, Failure};
-use crate::{input, outlook};
+use crate::input;
 use serde_json::json;
-use skein_runtime::mission;
+use skein_runtime::{mission, run_facts};
 use std::io::Write;
 
 /// Prints processes, services and routes.
 pub fn check(args: &CheckArgs) -> Result<Exit, Failure> {
     let scenario = input::scenario(&args.scenario)?;
-    let sets = outlook::sets(&scenario)?;
+    let sets = run_facts::obstacle_sets(&scenario).map_err(Failure::usage)?;
     let drones = mission::drones(&scenario);
     let shards = skein_bus::shards(drones);
     let mut out = std::io::stdout().lock();

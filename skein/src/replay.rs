@@ -2,12 +2,12 @@
 
 use crate::cli::{PinChoice, RuntimeChoice, WaitChoice};
 use crate::exit::{Exit, Failure};
-use crate::facts::facts;
 use crate::interrupt::Interrupt;
 use clap::Args;
 use serde_json::json;
 use skein_protocol::record::Outcome;
-use skein_report::{Ending, Recorder, RunFolder, Summary};
+use skein_report::{Recorder, RunCompletion, RunFolder, Summary};
+use skein_runtime::run_facts::run_facts;
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
 use skein_runtime::{Clock, PilotKind, RunEnd, RuntimeError, inline};
 use skein_scenario::Scenario;
@@ -47,10 +47,10 @@ pub fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
     });
     let interrupt = Interrupt::watch()?;
     let name = if runtime == RuntimeChoice::Inline { "inline" } else { "processes" };
-    let mut recorder = Recorder::in_memory(facts(&scenario, name, "lockstep")?);
+    let mut recorder = Recorder::in_memory(run_facts(&scenario, name, "lockstep").map_err(Failure::usage)?);
     let end = fly(runtime, &scenario, &interrupt, &mut recorder).map_err(Failure::environment)?;
-    let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-    let (flown, _) = recorder.finish(&ending);
+    let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+    let (flown, _) = recorder.finish(&completion);
     if let Some(signal) = end.signal {
         return Ok(Exit::Interrupted(signal));
     }

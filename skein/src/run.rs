@@ -3,12 +3,12 @@
 use crate::cli::{RunArgs, RuntimeChoice};
 use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
-use crate::facts::facts;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use skein_protocol::record::{Outcome, RecordSink};
-use skein_report::{Ending, Manifest, ProcessEntry, Recorder, Role, RunFacts, RunFolder, Summary, page, text};
+use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};
+use skein_runtime::run_facts::run_facts;
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
 use skein_runtime::{PilotKind, RunEnd, RuntimeError, inline};
 use skein_scenario::Scenario;
@@ -28,7 +28,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         RuntimeChoice::Processes => "processes",
         RuntimeChoice::Inline => "inline",
     };
-    let facts = facts(&scenario, runtime, &args.clock.to_string())?;
+    let facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
     let manifest = write_manifest(&folder, &facts, &scenario)?;
@@ -40,9 +40,9 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let mut sink = Progress::new(recorder, args.quiet || args.json, ticks);
     let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
-    let ending = Ending { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
+    let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
     let reporting = Instant::now();
-    let (mut summary, recorded) = sink.finish().finish(&ending);
+    let (mut summary, recorded) = sink.finish().finish(&completion);
     if let (None, Some(signal)) = (&summary.reason, end.signal) {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }

@@ -173,7 +173,7 @@ fn links(sample: &Sample, at: Time) -> SceneEntity {
     }
     let mut lost = Vec::new();
     for frame in sample.radio.frames.iter().filter(|_| sample.radio.receiver.is_none()) {
-        let dropped = frame.fate.chars().enumerate().filter(|(_, fate)| !['h', '-', 'r'].contains(fate));
+        let dropped = frame.deliveries.chars().enumerate().filter(|(_, delivery)| !['h', '-', 'r'].contains(delivery));
         for (receiver, _) in dropped.filter(|&(receiver, _)| receiver < state.x_m.len()) {
             let ends = [place(state, frame.source as usize), place(state, receiver)];
             lost.extend(ends.map(|end| point(end, ALTITUDE_M)));

@@ -20,7 +20,7 @@ mod tests;
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
-use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, fine, words};
+use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, event_text, fine};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
 use draw::Drones;
@@ -189,12 +189,12 @@ impl McapWriter {
 
     fn event(&mut self, event: &RunEvent) -> McapResult<()> {
         let at = SimTime::from_secs(event.t_s);
-        let level = match words::weight(event) {
-            words::Weight::Info => 2,
-            words::Weight::Warning => 3,
-            words::Weight::Error => 4,
+        let level = match event_text::severity(event) {
+            event_text::Severity::Info => 2,
+            event_text::Severity::Warning => 3,
+            event_text::Severity::Error => 4,
         };
-        let (message, name) = (words::line(event), "world".to_owned());
+        let (message, name) = (event_text::line(event), "world".to_owned());
         let file = String::new();
         self.put(To::Log, at, &Log { timestamp: at.into(), level, message, name, file, line: 0 })?;
         let topic = match event.what {

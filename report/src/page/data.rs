@@ -5,7 +5,7 @@ use crate::facts::RunFacts;
 use crate::folder::RunFolder;
 use crate::mcap;
 use crate::plot::outline;
-use crate::scene::{Sample, words};
+use crate::scene::{Sample, event_text};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -43,12 +43,12 @@ pub fn event_line(event: &RunEvent) -> Option<String> {
     if matches!(event.what, EventKind::Assigned { .. }) {
         return None;
     }
-    let weight = match words::weight(event) {
-        words::Weight::Info => "info",
-        words::Weight::Warning => "warning",
-        words::Weight::Error => "error",
+    let severity = match event_text::severity(event) {
+        event_text::Severity::Info => "info",
+        event_text::Severity::Warning => "warning",
+        event_text::Severity::Error => "error",
     };
-    Some(json!({ "event": event, "text": words::line(event), "weight": weight }).to_string())
+    Some(json!({ "event": event, "text": event_text::line(event), "severity": severity }).to_string())
 }
 
 /// A word in the page's head.

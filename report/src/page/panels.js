@@ -114,8 +114,8 @@ class Panels {
 
   showEvents(t) {
     for (; this.told < this.story.events.length; this.told++) {
-      const { event, text, weight } = this.story.events[this.told];
-      const line = element("li", undefined, weight === "info" ? "" : weight);
+      const { event, text, severity } = this.story.events[this.told];
+      const line = element("li", undefined, severity === "info" ? "" : severity);
       const stamp = element("time", event.t_s.toFixed(2) + " s");
       const jump = element("button", text);
       jump.title = "Show this moment";

@@ -1,8 +1,9 @@
 //! The summary of a run in tables.
 
 use super::escaped;
-use crate::summary::{Percentiles, Summary};
+use crate::summary::Summary;
 use crate::text;
+use skein_protocol::record::Percentiles;
 
 /// The outcome's name.
 pub(super) fn outcome(summary: &Summary) -> String {
@@ -46,19 +47,19 @@ fn messages(summary: &Summary) -> String {
         let count = count.as_u64().map_or("unknown".to_owned(), |count| count.to_string());
         lines.push(vec![format!("dropped: {reason}"), count]);
     }
-    lines.push(vec!["delay from sending to hearing".to_owned(), spread(&said.delay_s)]);
-    lines.push(vec!["age of a peer's last known pose".to_owned(), spread(&said.age_s)]);
+    lines.push(vec!["delay from sending to hearing".to_owned(), percentiles(&said.delay_s)]);
+    lines.push(vec!["age of a peer's last known pose".to_owned(), percentiles(&said.age_s)]);
     table(&[], lines)
 }
 
-fn spread(spread: &Percentiles) -> String {
+fn percentiles(times: &Percentiles) -> String {
     let ms = |value: Option<f64>| value.map_or("unknown".to_owned(), |s| format!("{:.0} ms", s * 1e3));
     format!(
         "mean {}, median {}, 99 % within {}, at most {}",
-        ms(spread.mean),
-        ms(spread.p50),
-        ms(spread.p99),
-        ms(spread.max)
+        ms(times.mean),
+        ms(times.p50),
+        ms(times.p99),
+        ms(times.max)
     )
 }
 

@@ -1,6 +1,7 @@
 //! One quantity over time: its mean, a shaded standard deviation, and a level it is measured against.
 
-use super::style::{Axes, Heading, Sign, plot, px, words};
+use super::style::{Axes, Heading, Sign, plot, px};
+use crate::error::DrawError;
 use plotters::prelude::*;
 
 /// Height of the plotting area.
@@ -33,21 +34,23 @@ pub(super) struct Figure {
 
 impl Figure {
     /// The SVG.
-    pub fn draw(&self, colour: RGBColor) -> Result<String, String> {
+    pub fn draw(&self, colour: RGBColor) -> Result<String, DrawError> {
         let spread = self.band.iter().any(|band| band.deviation > 0.0);
         let heading = self.heading(colour, spread);
         let (from, to) = (0.0, self.band.last().map_or(1.0, |band| band.t_s).max(1e-3));
         let axes = Axes { x: ("time (s)", from..to), y: (self.y_label, 0.0..self.top()), height: HEIGHT };
         plot(&heading, axes, |_, chart| {
             if spread {
-                chart.draw_series([Polygon::new(self.outline(), colour.mix(0.2))]).map_err(words)?;
+                chart.draw_series([Polygon::new(self.outline(), colour.mix(0.2))]).map_err(DrawError::new)?;
             }
             if let Some(level) = &self.level {
                 let line = [(from, level.level), (to, level.level)];
-                chart.draw_series([PathElement::new(line, level.colour.stroke_width(px(2)))]).map_err(words)?;
+                chart
+                    .draw_series([PathElement::new(line, level.colour.stroke_width(px(2)))])
+                    .map_err(DrawError::new)?;
             }
             let line = self.band.iter().map(|band| (band.t_s, band.mean));
-            chart.draw_series(LineSeries::new(line, colour.stroke_width(px(2)))).map_err(words)?;
+            chart.draw_series(LineSeries::new(line, colour.stroke_width(px(2)))).map_err(DrawError::new)?;
             Ok(())
         })
     }

@@ -1,6 +1,7 @@
 //! Several quantities of one unit over time.
 
-use super::style::{Axes, Heading, PALETTE, Sign, plot, px, words};
+use super::style::{Axes, Heading, PALETTE, Sign, plot, px};
+use crate::error::DrawError;
 use plotters::prelude::*;
 
 const HEIGHT: u32 = px(320);
@@ -12,7 +13,7 @@ pub(super) struct Line {
 }
 
 /// The SVG.
-pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String, String> {
+pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String, DrawError> {
     let colours = || PALETTE.iter().cycle();
     let signs = lines.iter().zip(colours()).map(|(line, &colour)| (Sign::Line(colour), line.label.clone()));
     let heading = Heading::new(title, signs.collect());
@@ -23,7 +24,7 @@ pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String,
     plot(&heading, axes, |_, chart| {
         for (line, colour) in lines.iter().zip(colours()) {
             let points = line.points.iter().copied();
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(px(2)))).map_err(words)?;
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(px(2)))).map_err(DrawError::new)?;
         }
         Ok(())
     })

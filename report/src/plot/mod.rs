@@ -4,24 +4,24 @@
 mod curves;
 mod flight;
 mod lines;
+mod recording;
 pub mod reproduce;
 mod samples;
 mod style;
 pub mod surface;
 pub mod sweep;
 mod timeline;
-mod told;
 mod tracks;
 
-use crate::error::ReportError;
+use crate::deviation::ShapeDeviation;
+use crate::error::{DrawError, ReportError};
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
-use crate::morph::Morph;
 use curves::{Band, Curve, Figure};
+use recording::Recording;
 use samples::Samples;
 use std::path::PathBuf;
 use style::{BLUE, RED};
-use told::Told;
 pub(crate) use tracks::outline;
 
 /// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones, energy,
@@ -48,14 +48,14 @@ pub const FILES: [&str; 11] = [
 /// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Recording`], [`ReportError::Plot`].
 pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
     let samples = Samples::read(&folder.path().join(crate::trace::FILE), facts)?;
-    crate::morph::write(folder.path(), &samples.morphing.samples)?;
-    let told = Told::read(folder)?;
+    crate::deviation::write(folder.path(), &samples.deviations.samples)?;
+    let recording = Recording::read(folder)?;
     let plots = folder.plots()?;
     let mut written = Vec::new();
-    for (name, svg) in FILES.iter().zip(draw(&samples, &told, facts)) {
+    for (name, svg) in FILES.iter().zip(draw(&samples, &recording, facts)) {
         let path = plots.join(name);
         if let Some(svg) = svg {
-            let svg = svg.map_err(|reason| ReportError::Plot { path: path.clone(), reason })?;
+            let svg = svg.map_err(|source| ReportError::Plot { path: path.clone(), source })?;
             std::fs::write(&path, svg).map_err(ReportError::io(&path))?;
             written.push(path);
         }
@@ -69,9 +69,9 @@ pub(crate) fn palette() -> [(u8, u8, u8); 7] {
 }
 
 /// A drawn plot, or why it cannot be drawn; `None` without data.
-type Drawn = Option<Result<String, String>>;
+type Drawn = Option<Result<String, DrawError>>;
 
-fn draw(samples: &Samples, told: &Told, facts: &RunFacts) -> [Drawn; 11] {
+fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -> [Drawn; 11] {
     let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
     let safe = || Curve {
         label: format!("safe distance, {} m", facts.safe_distance_m),
@@ -99,22 +99,22 @@ fn draw(samples: &Samples, told: &Told, facts: &RunFacts) -> [Drawn; 11] {
         band: samples.distance.clone(),
         level: Some(safe()),
     };
-    let shape = |title: &str, y_label, line_label, of: fn(&Morph) -> f64| {
-        let band = |morph: &Morph| Band { t_s: morph.t_s, mean: of(morph), deviation: 0.0 };
-        let band = samples.morphing.samples.iter().map(band).collect();
+    let shape = |title: &str, y_label, line_label, of: fn(&ShapeDeviation) -> f64| {
+        let band = |deviation: &ShapeDeviation| Band { t_s: deviation.t_s, mean: of(deviation), deviation: 0.0 };
+        let band = samples.deviations.samples.iter().map(band).collect();
         Figure { title: format!("{title}: {run}"), y_label, line_label, band, level: None }
     };
     let disturbance = shape(
         "Disturbance of the formation",
         "distance from the target shape (m)",
         "root mean square over drones, after the best translation and assignment",
-        |morph| morph.disturbance_m,
+        |deviation| deviation.disturbance_m,
     );
     let bending = shape(
         "Bending energy",
         "bending energy (1)",
         "of the thin-plate spline that takes the target shape to the drones",
-        |morph| morph.bending,
+        |deviation| deviation.bending,
     );
     let energy = Figure {
         title: format!("Energy: {run}"),
@@ -136,9 +136,10 @@ fn draw(samples: &Samples, told: &Told, facts: &RunFacts) -> [Drawn; 11] {
     };
     let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
     let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
-    let terms = timeline::terms(&told.events, samples.end_s);
-    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, &told.events, facts, samples.end_s));
-    let messages = told.any().then(|| lines::draw(&format!("Messages: {run}"), "messages a second", &told.lines()));
+    let terms = timeline::terms(&recording.events, samples.end_s);
+    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, &recording.events, facts, samples.end_s));
+    let messages =
+        recording.any().then(|| lines::draw(&format!("Messages: {run}"), "messages a second", &recording.lines()));
     let [separation, speed, distance, energy, formation] = [separation, speed, distance, energy, formation].map(curve);
     let flight = flight::draw(samples, facts).map(Ok);
     let (disturbance, bending) = (curve(disturbance), curve(bending));

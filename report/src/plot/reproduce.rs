@@ -27,9 +27,9 @@ struct Seen {
     tail: Vec<Vec2>,
 }
 
-/// How far the swarm is spread in a tick.
+/// How far the swarm extends in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Percentiles {
+pub struct SwarmExtent {
     /// When, s.
     pub t_s: f64,
     /// Extent across the flight direction, m.
@@ -45,7 +45,7 @@ pub struct Snapshots {
     /// Where drones were, m: lower left and upper right corner.
     corners: (Vec2, Vec2),
     /// Of every tick.
-    spreads: Vec<Percentiles>,
+    extents: Vec<SwarmExtent>,
 }
 
 impl Snapshots {
@@ -58,7 +58,7 @@ impl Snapshots {
         let mut found = Self {
             moments: Vec::new(),
             corners: (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)),
-            spreads: Vec::new(),
+            extents: Vec::new(),
         };
         let mut last: Vec<trace::TraceRow> = Vec::new();
         trace::read(&folder.path().join(trace::FILE), |rows| {
@@ -90,12 +90,12 @@ impl Snapshots {
         let total: f64 = (0..rows.len()).flat_map(pair).sum();
         let pairs = rows.len() * (rows.len() - 1) / 2;
         let distance_m = total / pairs.max(1) as f64;
-        self.spreads.push(Percentiles { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
+        self.extents.push(SwarmExtent { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
     }
 
     /// The ticks between these times, s.
-    pub fn spreads(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Percentiles> {
-        self.spreads.iter().filter(move |spread| (from_s..=to_s).contains(&spread.t_s))
+    pub fn extents(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &SwarmExtent> {
+        self.extents.iter().filter(move |extent| (from_s..=to_s).contains(&extent.t_s))
     }
 
     /// The groups in which drones fly at the moment of this place, in order.
@@ -339,8 +339,8 @@ mod tests {
         let found = Snapshots::read(&folder, &[0.0, 0.5, 9.0]).unwrap();
         assert_eq!(found.moments.iter().map(|moment| moment.0).collect::<Vec<_>>(), [0.02, 1.0, 2.0]);
         assert_eq!((found.groups(0), found.groups(1)), (vec!["N"], vec!["N", "N1"]));
-        let spread = |t_s, m| Percentiles { t_s, width_m: m, distance_m: m };
-        assert_eq!(found.spreads(0.5, 9.0).copied().collect::<Vec<_>>(), [spread(1.0, 40.0), spread(2.0, 20.0)]);
+        let extent = |t_s, m| SwarmExtent { t_s, width_m: m, distance_m: m };
+        assert_eq!(found.extents(0.5, 9.0).copied().collect::<Vec<_>>(), [extent(1.0, 40.0), extent(2.0, 20.0)]);
         let svg = found.draw(&facts(2), "a < b");
         assert_eq!(svg.matches("<g ").count(), 3);
         assert!(svg.contains("a &lt; b") && svg.contains("t = 2 s: N, N1"), "{svg}");

@@ -2,10 +2,10 @@
 
 use super::curves::Band;
 use crate::close::Sweep;
+use crate::deviation::DeviationSampler;
 use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::formation;
-use crate::morph::Morphing;
 use crate::trace::{self, TraceRow};
 use skein_protocol::Vec2;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub(super) struct Samples {
     /// Of the distances of all pairs, m.
     pub distance: Vec<Band>,
     /// How far the swarm was from its shape.
-    pub morphing: Morphing,
+    pub deviations: DeviationSampler,
     /// Of what the drones have used, J.
     pub energy: Vec<Band>,
     /// Time, and the largest slot error, m.
@@ -71,7 +71,7 @@ impl Samples {
         let t_s = rows[0].t_s;
         self.end_s = t_s;
         let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
-        self.morphing.take(facts, t_s, &positions);
+        self.deviations.take(facts, t_s, &positions);
         match (sweep.least_distance(&positions), self.separation.last_mut()) {
             (Some(least), Some(last)) if !sampled => last.1 = last.1.min(least),
             (Some(least), _) => self.separation.push((t_s, least)),

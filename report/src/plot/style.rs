@@ -1,5 +1,6 @@
 //! What all plots have in common.
 
+use crate::error::DrawError;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -60,13 +61,13 @@ pub(super) struct Axes<'a> {
 pub(super) fn plot(
     heading: &Heading,
     axes: Axes<'_>,
-    content: impl FnOnce(&Canvas, &mut Chart) -> Result<(), String>,
-) -> Result<String, String> {
+    content: impl FnOnce(&Canvas, &mut Chart) -> Result<(), DrawError>,
+) -> Result<String, DrawError> {
     let size = (WIDTH, heading.height + axes.height + BOTTOM);
     let mut svg = String::new();
     {
         let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        canvas.fill(&WHITE).map_err(words)?;
+        canvas.fill(&WHITE).map_err(DrawError::new)?;
         heading.draw(&canvas)?;
         let mut chart = ChartBuilder::on(&canvas)
             .margin_top(heading.height)
@@ -75,7 +76,7 @@ pub(super) fn plot(
             .x_label_area_size(BOTTOM)
             .y_label_area_size(LEFT)
             .build_cartesian_2d(axes.x.1, axes.y.1)
-            .map_err(words)?;
+            .map_err(DrawError::new)?;
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(axes.x.0).y_desc(axes.y.0).label_style(text(13)).axis_desc_style(text(14));
         mesh.x_labels(12).y_labels((axes.height / px(50)).max(4) as usize);
@@ -84,9 +85,9 @@ pub(super) fn plot(
         }
         mesh.x_label_formatter(&number).y_label_formatter(&number).set_all_tick_mark_size(px(5));
         let (grid, axis) = (GRID.stroke_width(px(1)), INK.stroke_width(px(1)));
-        mesh.bold_line_style(grid).light_line_style(TRANSPARENT).axis_style(axis).draw().map_err(words)?;
+        mesh.bold_line_style(grid).light_line_style(TRANSPARENT).axis_style(axis).draw().map_err(DrawError::new)?;
         content(&canvas, &mut chart)?;
-        canvas.present().map_err(words)?;
+        canvas.present().map_err(DrawError::new)?;
     }
     // The view box keeps the drawing's units; shown, it has its size in pixels.
     let sized = |by: u32| format!("width=\"{}\" height=\"{}\"", size.0 / by, size.1 / by);
@@ -97,11 +98,6 @@ pub(super) fn plot(
 fn number(value: &f64) -> String {
     // Adding zero turns -0 into 0.
     ((value * 1e6).round() / 1e6 + 0.0).to_string()
-}
-
-/// What the SVG backend fails with, in words.
-pub(super) fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }
 
 /// A sign of the legend.
@@ -153,18 +149,18 @@ impl Heading {
         Self { title: title.to_owned(), entries, height: y + LINE }
     }
 
-    fn draw(&self, canvas: &Canvas) -> Result<(), String> {
+    fn draw(&self, canvas: &Canvas) -> Result<(), DrawError> {
         let at = ((LEFT + EDGE) as i32, px(26) as i32);
-        canvas.draw(&Text::new(self.title.as_str(), at, text(18))).map_err(words)?;
+        canvas.draw(&Text::new(self.title.as_str(), at, text(18))).map_err(DrawError::new)?;
         for (x, y, sign, label) in &self.entries {
             draw_sign(canvas, *sign, (*x, *y))?;
-            canvas.draw(&Text::new(label.as_str(), (x + px(30) as i32, *y), text(14))).map_err(words)?;
+            canvas.draw(&Text::new(label.as_str(), (x + px(30) as i32, *y), text(14))).map_err(DrawError::new)?;
         }
         Ok(())
     }
 }
 
-fn draw_sign(canvas: &Canvas, sign: Sign, (x, y): (i32, i32)) -> Result<(), String> {
+fn draw_sign(canvas: &Canvas, sign: Sign, (x, y): (i32, i32)) -> Result<(), DrawError> {
     let (width, half) = (px(24) as i32, px(7) as i32);
     let middle = (x + width / 2, y);
     let block = [(x, y - half), (x + width, y + half)];
@@ -177,7 +173,7 @@ fn draw_sign(canvas: &Canvas, sign: Sign, (x, y): (i32, i32)) -> Result<(), Stri
         Sign::Lost => canvas.draw(&lost(middle, INK)),
         Sign::Goal => canvas.draw(&goal(middle)),
     }
-    .map_err(words)
+    .map_err(DrawError::new)
 }
 
 /// The diamond that marks a start.

@@ -1,6 +1,7 @@
 //! What came of a sweep: lines with their intervals over one key, a heat map over two.
 
-use super::style::{Axes, Heading, PALETTE, Sign, plot, px, words};
+use super::style::{Axes, Heading, PALETTE, Sign, plot, px};
+use crate::error::DrawError;
 use plotters::prelude::*;
 use std::fmt::Write as _;
 
@@ -46,8 +47,8 @@ impl Lines {
     /// The SVG: each line in its interval.
     ///
     /// # Errors
-    /// What cannot be drawn.
-    pub fn draw(&self) -> Result<String, String> {
+    /// [`DrawError`] if the SVG backend fails.
+    pub fn draw(&self) -> Result<String, DrawError> {
         let signs = self.coloured().map(|(colour, series)| (Sign::Line(colour), series.label.clone()));
         let axes = Axes { x: (&self.x_label, self.x_range()), y: (&self.y_label, self.y_range()), height: HEIGHT };
         plot(&Heading::new(&self.title, signs.collect()), axes, |_, chart| {
@@ -55,15 +56,15 @@ impl Lines {
                 let upper = points.iter().map(|point| (point.x, point.high));
                 let lower = points.iter().rev().map(|point| (point.x, point.low));
                 let outline: Vec<(f64, f64)> = upper.chain(lower).collect();
-                chart.draw_series([Polygon::new(outline, colour.mix(0.15))]).map_err(words)?;
+                chart.draw_series([Polygon::new(outline, colour.mix(0.15))]).map_err(DrawError::new)?;
             }
             for (colour, Series { points, .. }) in self.coloured() {
                 let line = points.iter().map(|point| (point.x, point.mean));
-                chart.draw_series(LineSeries::new(line.clone(), colour.stroke_width(px(2)))).map_err(words)?;
-                chart.draw_series(line.map(|at| Circle::new(at, px(4), colour.filled()))).map_err(words)?;
+                chart.draw_series(LineSeries::new(line.clone(), colour.stroke_width(px(2)))).map_err(DrawError::new)?;
+                chart.draw_series(line.map(|at| Circle::new(at, px(4), colour.filled()))).map_err(DrawError::new)?;
                 // Of a point that stands alone the shaded interval has no width.
                 let whisker = |p: &Point| PathElement::new([(p.x, p.low), (p.x, p.high)], colour.stroke_width(px(1)));
-                chart.draw_series(points.iter().map(whisker)).map_err(words)?;
+                chart.draw_series(points.iter().map(whisker)).map_err(DrawError::new)?;
             }
             Ok(())
         })

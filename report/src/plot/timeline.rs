@@ -1,6 +1,7 @@
 //! Who led which group when: a row a group, a bar a term.
 
-use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, text, words};
+use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, text};
+use crate::error::DrawError;
 use crate::facts::RunFacts;
 use plotters::prelude::*;
 use skein_protocol::record::{EventKind, RunEvent};
@@ -55,7 +56,7 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
 }
 
 /// The SVG; there is at least one term.
-pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s: f64) -> Result<String, String> {
+pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s: f64) -> Result<String, DrawError> {
     let mut groups: Vec<&str> = terms.iter().map(|term| term.group.as_str()).collect();
     groups.sort_unstable();
     groups.dedup();
@@ -69,22 +70,22 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
     plot(&Heading::new(&title, signs), axes, |canvas, chart| {
         for at in &faults {
             let line = [(*at, 0.0), (*at, rows)];
-            chart.draw_series([PathElement::new(line, RED.stroke_width(px(2)))]).map_err(words)?;
+            chart.draw_series([PathElement::new(line, RED.stroke_width(px(2)))]).map_err(DrawError::new)?;
         }
         for term in terms {
             let row = rows - 1.0 - groups.iter().position(|group| *group == term.group).unwrap_or(0) as f64;
             let (low, high) = (row + (1.0 - BAR) / 2.0, row + (1.0 + BAR) / 2.0);
             let colour = PALETTE[term.leader as usize % PALETTE.len()];
             let bar = Rectangle::new([(term.from_s, low), (term.to_s, high)], colour.filled());
-            chart.draw_series([bar]).map_err(words)?;
+            chart.draw_series([bar]).map_err(DrawError::new)?;
             let (x, y) = chart.backend_coord(&(term.from_s, row + 0.5));
             let label = Text::new(term.leader.to_string(), (x + px(4) as i32, y), text(13).color(&WHITE));
-            canvas.draw(&label).map_err(words)?;
+            canvas.draw(&label).map_err(DrawError::new)?;
         }
         for (row, group) in groups.iter().rev().enumerate() {
             let (x, y) = chart.backend_coord(&(0.0, row as f64 + 0.5));
             let label = Text::new((*group).to_owned(), (x - px(50) as i32, y), text(13));
-            canvas.draw(&label).map_err(words)?;
+            canvas.draw(&label).map_err(DrawError::new)?;
         }
         Ok(())
     })

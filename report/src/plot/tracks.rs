@@ -2,8 +2,9 @@
 
 use super::samples::{Samples, Track};
 use super::style::{
-    Axes, Canvas, Chart, EDGE, GREY, Heading, INK, LEFT, PALETTE, Sign, WIDTH, end, goal, lost, plot, px, start, words,
+    Axes, Canvas, Chart, EDGE, GREY, Heading, INK, LEFT, PALETTE, Sign, WIDTH, end, goal, lost, plot, px, start,
 };
+use crate::error::DrawError;
 use crate::facts::{MissionEnd, RunFacts};
 use plotters::prelude::*;
 use skein_protocol::Vec2;
@@ -20,7 +21,7 @@ const SEGMENTS: f64 = 72.0;
 const OBSTACLE: RGBColor = RGBColor(190, 190, 190);
 
 /// The SVG.
-pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<String, String> {
+pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<String, DrawError> {
     let colours = colours(samples);
     let heading = Heading::new(title, signs(samples, facts, &colours));
     let (low, high, height) = frame(samples, facts, f64::from(WIDTH - LEFT - 2 * EDGE));
@@ -32,13 +33,15 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<S
     plot(&heading, axes, |canvas, chart| {
         let course = [(low.x, facts.course_y_m), (high.x, facts.course_y_m)];
         let (dash, gap) = (px(6), px(6));
-        chart.draw_series(DashedLineSeries::new(course, dash, gap, GREY.stroke_width(px(1)))).map_err(words)?;
+        chart
+            .draw_series(DashedLineSeries::new(course, dash, gap, GREY.stroke_width(px(1))))
+            .map_err(DrawError::new)?;
         for shape in &facts.obstacles {
-            chart.draw_series([Polygon::new(outline(shape), OBSTACLE.filled())]).map_err(words)?;
+            chart.draw_series([Polygon::new(outline(shape), OBSTACLE.filled())]).map_err(DrawError::new)?;
         }
         draw_tracks(chart, canvas, samples, &colours)?;
         for slot in goal_slots(samples, facts) {
-            canvas.draw(&goal(chart.backend_coord(&(slot.x, slot.y)))).map_err(words)?;
+            canvas.draw(&goal(chart.backend_coord(&(slot.x, slot.y)))).map_err(DrawError::new)?;
         }
         Ok(())
     })
@@ -95,11 +98,11 @@ fn draw_tracks(
     canvas: &Canvas,
     samples: &Samples,
     colours: &BTreeMap<&str, RGBColor>,
-) -> Result<(), String> {
+) -> Result<(), DrawError> {
     let colour = |track: &Track| colours.get(track.group.as_str()).copied().unwrap_or(INK);
     for track in samples.tracks.values() {
         let line = track.points.iter().map(|point| (point.x, point.y));
-        chart.draw_series(LineSeries::new(line, colour(track).stroke_width(px(2)))).map_err(words)?;
+        chart.draw_series(LineSeries::new(line, colour(track).stroke_width(px(2)))).map_err(DrawError::new)?;
     }
     for track in samples.tracks.values() {
         let ends = track.points.first().zip(track.points.last());
@@ -108,11 +111,11 @@ fn draw_tracks(
         else {
             continue;
         };
-        canvas.draw(&start(first, colour(track))).map_err(words)?;
+        canvas.draw(&start(first, colour(track))).map_err(DrawError::new)?;
         if samples.lost(track) {
-            canvas.draw(&lost(last, colour(track))).map_err(words)?;
+            canvas.draw(&lost(last, colour(track))).map_err(DrawError::new)?;
         } else {
-            canvas.draw(&end(last, colour(track))).map_err(words)?;
+            canvas.draw(&end(last, colour(track))).map_err(DrawError::new)?;
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use crate::accumulate::seconds;
 use crate::facts::RunFacts;
-use crate::scene::air;
+use crate::scene::frames;
 use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State};
 use crate::scene::slots::Slots;
 use skein_protocol::payload::NO_ROUTE;
@@ -11,8 +11,8 @@ use skein_protocol::record::{DroneRow, ROW_LATE, ROW_LEADS, RecordView};
 use skein_protocol::{DroneId, SimTime};
 use std::collections::BTreeMap;
 
-/// Up to this many drones every frame is listed, with its fate at every receiver.
-pub const MAX_DELIVERIES: usize = 64;
+/// Up to this many drones every frame is listed, with its delivery to every receiver.
+pub const MAX_LISTED_DRONES: usize = 64;
 /// Most frames in a sample: beyond, the oldest are left out.
 const FRAMES_MAX: usize = 4096;
 
@@ -34,9 +34,9 @@ impl Observer {
         Self { facts, dt_ns, slots: Slots::default(), radio: RadioSample::default(), receiver: None, last_tick: None }
     }
 
-    /// In a swarm of more than [`MAX_DELIVERIES`] drones, lists what this one hears from now on, or nothing.
+    /// In a swarm of more than [`MAX_LISTED_DRONES`] drones, lists what this one hears from now on, or nothing.
     pub fn listen(&mut self, receiver: Option<DroneId>) {
-        self.receiver = receiver.filter(|_| self.facts.drones as usize > MAX_DELIVERIES);
+        self.receiver = receiver.filter(|_| self.facts.drones as usize > MAX_LISTED_DRONES);
         self.radio.frames.clear();
     }
 
@@ -72,31 +72,31 @@ impl Observer {
         for (drone, row) in record.rows.iter().enumerate() {
             radio.heard[drone] += row.heard;
             for (reason, &count) in DropReason::ALL.into_iter().zip(&row.dropped).filter(|(_, count)| **count > 0) {
-                add(&mut radio.dropped, air::reason(reason), count);
+                add(&mut radio.dropped, frames::reason(reason), count);
                 radio.dropped_by[drone] += count;
             }
         }
-        let listed = self.facts.drones as usize <= MAX_DELIVERIES || self.receiver.is_some();
+        let listed = self.facts.drones as usize <= MAX_LISTED_DRONES || self.receiver.is_some();
         for frame in record.frames {
-            let kind = air::kind(frame);
+            let topic = frames::topic(frame);
             if listed {
-                let fate = self.fates(frame, record.rows);
+                let deliveries = self.deliveries(frame, record.rows);
                 let (source, sequence) = (frame.source.0, frame.sequence);
                 let t_s = seconds(SimTime(frame.tick as i64 * self.dt_ns));
-                let says = air::says(frame);
-                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: kind.into(), says, fate });
+                let content = frames::content(frame);
+                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: topic.into(), content, deliveries });
             }
-            add(&mut self.radio.sent, kind, 1);
+            add(&mut self.radio.sent, topic, 1);
         }
         let surplus = self.radio.frames.len().saturating_sub(FRAMES_MAX);
         self.radio.frames.drain(..surplus);
     }
 
-    fn fates(&self, frame: &skein_protocol::frame::AirFrame, rows: &[DroneRow]) -> String {
-        let fate = |drone| air::fate(&self.facts.scene, frame, drone, rows, self.dt_ns);
+    fn deliveries(&self, frame: &skein_protocol::frame::AirFrame, rows: &[DroneRow]) -> String {
+        let delivery = |drone| frames::delivery(&self.facts.scene, frame, drone, rows, self.dt_ns);
         match self.receiver {
-            Some(receiver) => fate(receiver).to_string(),
-            None => (0..rows.len() as u32).map(|drone| fate(DroneId(drone))).collect(),
+            Some(receiver) => delivery(receiver).to_string(),
+            None => (0..rows.len() as u32).map(|drone| delivery(DroneId(drone))).collect(),
         }
     }
 
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!((sample.state.tick, sample.state.t_s, sample.state.x_m[2]), (1, 0.04, 1.0));
         assert_eq!((sample.radio.sent["passed"], sample.radio.dropped["range"]), (2, 6));
         assert_eq!((sample.radio.heard, sample.radio.dropped_by), (vec![4; 3], vec![2; 3]));
-        assert_eq!((sample.radio.frames.len(), sample.radio.frames[1].fate.as_str()), (2, "h-h"));
+        assert_eq!((sample.radio.frames.len(), sample.radio.frames[1].deliveries.as_str()), (2, "h-h"));
         assert_eq!(sample.radio.frames[1].t_s, 0.02);
         assert!(take(&mut observer, 1, 3, true).is_none(), "the last record repeats a tick");
         assert_eq!(take(&mut observer, 2, 3, true).unwrap().radio.frames.len(), 1);
@@ -194,6 +194,6 @@ mod tests {
         assert!(take(&mut observer, 0, 65, true).unwrap().radio.frames.is_empty());
         observer.listen(Some(DroneId(4)));
         let sample = take(&mut observer, 1, 65, true).unwrap();
-        assert_eq!((sample.radio.receiver, sample.radio.frames[0].fate.as_str()), (Some(4), "h"));
+        assert_eq!((sample.radio.receiver, sample.radio.frames[0].deliveries.as_str()), (Some(4), "h"));
     }
 }

@@ -92,8 +92,10 @@ pub struct SentFrame {
     /// A topic's name; `unknown` if it is none.
     pub kind: Cow<'static, str>,
     /// What it says, shortly; empty for beacons.
-    pub says: String,
+    #[serde(rename = "says")]
+    pub content: String,
     /// A letter for each receiver: `h` heard, `-` not for it (its sender, a dead drone), or why not: `l`oss, `b`urst,
     /// `r`ange, `p`artition, `d`eaf, `m`alformed, `?` another reason.
-    pub fate: String,
+    #[serde(rename = "fate")]
+    pub deliveries: String,
 }

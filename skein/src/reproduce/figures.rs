@@ -87,7 +87,7 @@ fn time_against_split(results: &Results, geometry: &str) -> Result<Option<Figure
     Ok(Some(Figure {
         file: format!("f1-{geometry}.svg"),
         caption: format!("F1. Time against split for the three placements, {name}; left is seen along the flight."),
-        svg: lines.draw()?,
+        svg: lines.draw().map_err(|error| error.to_string())?,
     }))
 }
 

@@ -3,14 +3,14 @@
 use super::flight::Flight;
 use super::flights::PAPER;
 use crate::exit::Failure;
-use crate::facts::facts;
 use crate::interrupt::Interrupt;
 use crate::run::write_manifest;
 use skein_protocol::record::Outcome;
-use skein_report::morph::{self, Morph};
+use skein_report::deviation::{self, ShapeDeviation};
 use skein_report::plot::reproduce::Snapshots;
-use skein_report::{Ending, Recorder, RunFacts, RunFolder, Summary, plot};
+use skein_report::{Recorder, RunCompletion, RunFacts, RunFolder, Summary, plot};
 use skein_runtime::inline;
+use skein_runtime::run_facts::run_facts;
 use std::path::Path;
 
 /// Moments of the paper's snapshots, s; the last is the mission's end.
@@ -27,7 +27,7 @@ pub struct Forest {
     /// Moments of it.
     pub snapshots: Snapshots,
     /// How far the swarm was from its shape, over time.
-    pub morphs: Vec<Morph>,
+    pub deviations: Vec<ShapeDeviation>,
     /// File names and SVGs of a run's plots.
     pub plots: Vec<(String, String)>,
 }
@@ -36,14 +36,14 @@ impl Forest {
     /// Flies it with the paper's rule and records it in this folder, which may hold an earlier recording.
     pub fn record(path: &Path, interrupt: &Interrupt) -> Result<Self, Failure> {
         let scenario = Flight::new("forest", PAPER).resolve().map_err(Failure::environment)?;
-        let facts = facts(&scenario, "inline", "lockstep")?;
+        let facts = run_facts(&scenario, "inline", "lockstep").map_err(Failure::usage)?;
         let folder = RunFolder::at(path, true).map_err(Failure::usage)?;
         let manifest = write_manifest(&folder, &facts, &scenario)?;
         let mut recorder =
             Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?;
         let end = inline::run(&scenario, &mut recorder, || interrupt.signal()).map_err(Failure::environment)?;
-        let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-        let (summary, recorded) = recorder.finish(&ending);
+        let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+        let (summary, recorded) = recorder.finish(&completion);
         recorded.map_err(Failure::environment)?;
         if let Some(error) = end.sink_error {
             return Err(Failure::environment(error));
@@ -56,13 +56,13 @@ impl Forest {
             plots.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), svg));
         }
         let snapshots = Snapshots::read(&folder, &MOMENTS_S).map_err(Failure::environment)?;
-        let morphs = morph::read(folder.path()).map_err(Failure::environment)?;
-        Ok(Self { facts, summary, snapshots, morphs, plots })
+        let deviations = deviation::read(folder.path()).map_err(Failure::environment)?;
+        Ok(Self { facts, summary, snapshots, deviations, plots })
     }
 
     /// The moment of the greatest disturbance between these times, s.
-    pub fn disturbance(&self, from_s: f64, to_s: f64) -> Option<&Morph> {
-        let then = self.morphs.iter().filter(|morph| (from_s..=to_s).contains(&morph.t_s));
+    pub fn disturbance(&self, from_s: f64, to_s: f64) -> Option<&ShapeDeviation> {
+        let then = self.deviations.iter().filter(|deviation| (from_s..=to_s).contains(&deviation.t_s));
         then.max_by(|a, b| a.disturbance_m.total_cmp(&b.disturbance_m))
     }
 }

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 use skein_protocol::energy::power_w;
 use skein_protocol::record::Outcome;
 use skein_report::Summary;
-use skein_report::morph::Morph;
-use skein_report::plot::reproduce::Percentiles;
+use skein_report::deviation::ShapeDeviation;
+use skein_report::plot::reproduce::SwarmExtent;
 
 /// A row of reproduction.json.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -163,11 +163,11 @@ impl Rows<'_> {
         let detected = |stage: &Option<skein_report::Stage>| stage.as_ref().and_then(|stage| stage.detected_s);
         let passed = |stage: &Option<skein_report::Stage>| stage.as_ref().and_then(|stage| stage.passed_s);
         let between = detected(&first).zip(detected(&second));
-        let peak = |of: fn(&Percentiles) -> f64| {
+        let peak = |of: fn(&SwarmExtent) -> f64| {
             let (from_s, to_s) = between?;
-            forest.snapshots.spreads(from_s, to_s).max_by(|a, b| of(a).total_cmp(&of(b))).map(|spread| spread.t_s)
+            forest.snapshots.extents(from_s, to_s).max_by(|a, b| of(a).total_cmp(&of(b))).map(|extent| extent.t_s)
         };
-        let (farthest, widest) = (peak(|spread| spread.distance_m), peak(|spread| spread.width_m));
+        let (farthest, widest) = (peak(|extent| extent.distance_m), peak(|extent| extent.width_m));
         add("R5.detection.1", "first obstacles detected", "s", json!(25.0), detected(&first));
         add("R5.peak", "greatest mean inter-drone distance", "s", json!(43.0), farthest);
         add("R5.widest", "widest across the flight", "s", json!(50.0), widest);
@@ -205,10 +205,16 @@ impl Rows<'_> {
         let detected = |set: usize| forest.summary.stages.get(set).and_then(|stage| stage.detected_s);
         let most = |from_s: Option<f64>, to_s: Option<f64>| forest.disturbance(from_s?, to_s?);
         let (first, second) = (most(detected(0), detected(1)), most(detected(1), Some(f64::INFINITY)));
-        let how_much = |morph: Option<&Morph>| morph.map(|morph| morph.disturbance_m);
-        let bending = forest.morphs.iter().map(|morph| morph.bending).reduce(f64::max);
+        let how_much = |deviation: Option<&ShapeDeviation>| deviation.map(|deviation| deviation.disturbance_m);
+        let bending = forest.deviations.iter().map(|deviation| deviation.bending).reduce(f64::max);
         let rows = [
-            ("R5.disturbance", "formation disturbance at maximum", "s", json!(50.0), first.map(|morph| morph.t_s)),
+            (
+                "R5.disturbance",
+                "formation disturbance at maximum",
+                "s",
+                json!(50.0),
+                first.map(|deviation| deviation.t_s),
+            ),
             ("E6.disturbance.1", "greatest disturbance, first obstacle", "m", Value::Null, how_much(first)),
             ("E6.disturbance.2", "greatest disturbance, second set", "m", Value::Null, how_much(second)),
             ("E6.bending", "greatest bending energy (λ = 0)", "", Value::Null, bending),

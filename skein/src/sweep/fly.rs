@@ -2,12 +2,12 @@
 
 use super::grid::Grid;
 use super::row::Row;
-use crate::facts::facts;
 use crate::interrupt::Interrupt;
 use rustix::process::{Pid, Signal, kill_process};
 use skein_protocol::record::Outcome;
-use skein_report::{Ending, Recorder, Summary};
+use skein_report::{Recorder, RunCompletion, Summary};
 use skein_runtime::inline;
+use skein_runtime::run_facts::run_facts;
 use skein_scenario::Scenario;
 use std::io::Read;
 use std::os::unix::process::CommandExt;
@@ -56,13 +56,13 @@ pub fn fly(grid: &Grid<'_>, job: usize, runtime: &Runtime, interrupt: &Interrupt
 
 /// The summary of a flight in this thread; the error is why there is none.
 pub fn fly_inline(scenario: &Scenario, interrupt: &Interrupt) -> Result<Summary, String> {
-    let facts = facts(scenario, "inline", "lockstep").map_err(|_| "a scenario without facts")?;
+    let facts = run_facts(scenario, "inline", "lockstep").map_err(|_| "a scenario without facts")?;
     let mut recorder = Recorder::in_memory(facts);
     let end = inline::run(scenario, &mut recorder, || interrupt.signal()).map_err(|error| error.to_string())?;
-    let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+    let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
     match end.sink_error {
         Some(error) => Err(error),
-        None => Ok(recorder.finish(&ending).0),
+        None => Ok(recorder.finish(&completion).0),
     }
 }
 

@@ -110,7 +110,8 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     };
     let title = title(experiment, &cells[0].scenario, metric);
     let lines = Lines { title, x_label, y_label: label(metric).to_owned(), series };
-    Some(lines.draw().map(|svg| (file(experiment, metric, &cells[0].scenario, None), svg)))
+    let drawn = lines.draw().map_err(|error| error.to_string());
+    Some(drawn.map(|svg| (file(experiment, metric, &cells[0].scenario, None), svg)))
 }
 
 fn maps(experiment: &Experiment, cells: &[Cell], columns: &Side, rows: &Side, metric: &str) -> Vec<Plot> {

@@ -142,7 +142,7 @@ pub fn figure(name: &str, all: &[Ratios]) -> Result<Option<String>, String> {
         y_label: format!("energy / energy of {REFERENCE}"),
         series: all.iter().map(series).collect(),
     };
-    lines.draw().map(Some)
+    lines.draw().map(Some).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Looking on at running swarms: what `view`, `top` and `topic` share. An observer never holds up a swarm.
 
 use crate::exit::Failure;
-use crate::facts::facts;
 use skein_bus::{BusError, Domain, DownlinkSubscriber, RecordSubscriber, Services, living};
 use skein_report::RunFacts;
 use skein_runtime::drone_process::scenario_path;
 use skein_runtime::mission;
+use skein_runtime::run_facts::run_facts;
 use skein_scenario::Scenario;
 use std::path::{Path, PathBuf};
 
@@ -60,7 +60,7 @@ impl Tap {
         // All places may be taken by observers that died.
         let opened = open(&domain).or_else(|_| skein_bus::clean_dead_nodes(&domain).and_then(|_| open(&domain)));
         let (services, records) = opened.map_err(Failure::environment)?;
-        let facts = facts(&scenario, "processes", "")?;
+        let facts = run_facts(&scenario, "processes", "").map_err(Failure::usage)?;
         Ok(Self { facts, records, services, domain })
     }
 

@@ -4,11 +4,11 @@ use super::ClockChoice;
 use super::outcome::Row;
 use super::witness::Witness;
 use crate::exit::Failure;
-use crate::facts::facts;
 use crate::interrupt::Interrupt;
 use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::Outcome;
-use skein_report::{Ending, Recorder};
+use skein_report::{Recorder, RunCompletion};
+use skein_runtime::run_facts::run_facts;
 use skein_runtime::supervisor::{self, Launch};
 use skein_runtime::{Clock, PilotKind, RunEnd, RuntimeError, inline};
 use skein_scenario::{Scenario, ScenarioSource};
@@ -87,7 +87,7 @@ pub fn fly(air: &ChannelSetting, interrupt: &Interrupt) -> Result<Row, Failure> 
         ClockChoice::Lockstep => ("inline", Clock::Lockstep),
         ClockChoice::Realtime => ("processes", Clock::Realtime { speed: 1.0 }),
     };
-    let recorder = Recorder::in_memory(facts(&scenario, runtime, &clock.to_string())?);
+    let recorder = Recorder::in_memory(run_facts(&scenario, runtime, &clock.to_string()).map_err(Failure::usage)?);
     let mut witness = Witness::new(recorder, DT_S, air.clock == ClockChoice::Realtime);
     let flown = match air.clock {
         ClockChoice::Lockstep => inline::run(&scenario, &mut witness, || interrupt.signal()),
@@ -98,8 +98,8 @@ pub fn fly(air: &ChannelSetting, interrupt: &Interrupt) -> Result<Row, Failure> 
         return Err(Failure::environment(trouble));
     }
     let (recorder, found) = witness.finish();
-    let ending = Ending { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-    Ok(Row::new(air, &found, &recorder.finish(&ending).0))
+    let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
+    Ok(Row::new(air, &found, &recorder.finish(&completion).0))
 }
 
 fn in_processes(

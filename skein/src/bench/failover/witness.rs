@@ -184,7 +184,7 @@ mod tests {
             skein_scenario::ScenarioSource { name: "t", stem: "t" },
             &[],
         );
-        let facts = crate::facts::facts(&scenario.unwrap(), "inline", "lockstep").ok().unwrap();
+        let facts = skein_runtime::run_facts::run_facts(&scenario.unwrap(), "inline", "lockstep").ok().unwrap();
         let mut witness = Witness::new(Recorder::in_memory(facts), 0.01, false);
         let (first, second, third) = (term(1, 0), term(2, 1), term(3, 2));
         let courses = [

@@ -1,17 +1,49 @@
-//! From a scenario to what the report needs to know of it.
+//! From a scenario to the facts of a run that its report needs and its record does not carry.
 
-use crate::exit::Failure;
-use crate::outlook;
+use crate::mission;
+use skein_leader::obstacles::Obstacles;
 use skein_leader::routes::{Route, Routes, Side};
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::shape::ShapeError;
+use skein_protocol::{DroneId, ObstacleId, SimTime};
 use skein_report::scene::{SceneFacts, SetOutline};
 use skein_report::{MissionEnd, RunFacts};
-use skein_runtime::mission;
 use skein_scenario::{End, Failsafe, Scenario};
 use skein_world::params::landing_s;
 
-/// What the record of this run does not tell.
-pub fn facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunFacts, Failure> {
+/// An obstacle set, and the routes past it that a leader finds which knows all obstacles of the scenario.
+#[derive(Clone, Debug)]
+pub struct SetPlan {
+    /// The obstacles of the set.
+    pub obstacles: Vec<ObstacleId>,
+    /// The routes past the set, from right to left.
+    pub routes: Routes,
+}
+
+/// The obstacle sets of a scenario, in flight order.
+///
+/// # Errors
+/// [`ShapeError`] if an obstacle of the scenario is not a convex shape; never for a scenario that was checked.
+pub fn obstacle_sets(scenario: &Scenario) -> Result<Vec<SetPlan>, ShapeError> {
+    let shapes = scenario.shapes()?;
+    let planner = mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO).planner;
+    let reach_m = 2.0 * planner.routes.planning_distance_m;
+    let mut obstacles = Obstacles::new(scenario.formation.drones, reach_m);
+    for (shape, id) in shapes.iter().zip(0..) {
+        obstacles.learn(SimTime::ZERO, ObstacleId(id), *shape, DroneId(0));
+    }
+    let plan = |ids: Vec<ObstacleId>| {
+        let routes = Routes::new(&obstacles.shapes(&ids).unwrap_or_default(), &planner.routes);
+        SetPlan { obstacles: ids, routes }
+    };
+    Ok(obstacles.sets().iter().cloned().map(plan).collect())
+}
+
+/// The facts of a run of this scenario. `runtime` is `processes` or `inline`, `clock` is `lockstep`, `realtime` or
+/// `realtime:SPEED`: both go into the summary as they are.
+///
+/// # Errors
+/// [`ShapeError`] if an obstacle of the scenario is not a convex shape; never for a scenario that was checked.
+pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunFacts, ShapeError> {
     Ok(RunFacts {
         scenario: scenario.name.clone(),
         strategy: scenario.strategy.to_string(),
@@ -33,24 +65,24 @@ pub fn facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunFacts
         arrival_error_m: scenario.mission.arrival_error_m,
         radio_range_m: scenario.radio.range_m,
         landing_s: (scenario.faults.failsafe == Failsafe::Land).then(landing_s),
-        obstacles: scenario.shapes().map_err(Failure::usage)?,
+        obstacles: scenario.shapes()?,
         scene: scene(scenario)?,
     })
 }
 
-/// What a picture shows beside the drones.
-fn scene(scenario: &Scenario) -> Result<SceneFacts, Failure> {
+/// What the recording and the page draw beside the drones.
+fn scene(scenario: &Scenario) -> Result<SceneFacts, ShapeError> {
     let pilot = mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO);
-    let sets = outlook::sets(scenario)?.into_iter().map(|set| SetOutline {
+    let sets = obstacle_sets(scenario)?.into_iter().map(|set| SetOutline {
         obstacles: set.obstacles.iter().map(|id| id.0).collect(),
         gate_x_m: set.routes.gate_x_m(),
         hulls_m: hulls(&set.routes),
-        routes_m: (0..set.routes.count()).map(|route| way(set.routes.route(route))).collect(),
+        routes_m: (0..set.routes.count()).map(|route| centre_line(set.routes.route(route))).collect(),
     });
     Ok(SceneFacts {
         radio: scenario.radio(),
         detection_range_m: scenario.sensors.detection_range_m,
-        // Twice the stopping distance, and the clearance: what the pilot's own rule comes to.
+        // The pilot's own danger zone: the clearance and twice the stopping distance.
         danger_m: [
             scenario.avoidance.clearance_m,
             2.0 * pilot.braking.reaction_m(1.0),
@@ -60,7 +92,8 @@ fn scene(scenario: &Scenario) -> Result<SceneFacts, Failure> {
     })
 }
 
-/// Inflated obstacles, each once: the rightmost route has all of them on its left, the others one more to the right each.
+/// The outlines of the inflated obstacles, each once. Every route lists the obstacles beside it, so that the same one
+/// occurs in several routes.
 fn hulls(routes: &Routes) -> Vec<Vec<[f64; 2]>> {
     let mut hulls: Vec<Vec<[f64; 2]>> = Vec::new();
     for wall in (0..routes.count()).flat_map(|route| routes.route(route).walls()) {
@@ -72,14 +105,15 @@ fn hulls(routes: &Routes) -> Vec<Vec<[f64; 2]>> {
     hulls
 }
 
-/// The corners that a route passes: of a way around everything, the taut ones; of a way between two obstacles, the middle.
-fn way(route: &Route) -> Vec<[f64; 2]> {
+/// The polyline that stands for a route in a picture, m. Around all obstacles it is the taut line over their corners;
+/// between two obstacles it is the middle of the gap.
+fn centre_line(route: &Route) -> Vec<[f64; 2]> {
     let corners = route.constraints();
     let side = |side| corners.iter().filter(move |corner| corner.side == side).map(|corner| [corner.x_m, corner.y_m]);
     let (above, below): (Vec<_>, Vec<_>) = (side(Side::Above).collect(), side(Side::Below).collect());
     if above.is_empty() || below.is_empty() {
         let outward = if below.is_empty() { 1.0 } else { -1.0 };
-        return taut(corners.iter().map(|corner| [corner.x_m, corner.y_m]), outward);
+        return convex_chain(corners.iter().map(|corner| [corner.x_m, corner.y_m]), outward);
     }
     let middle_m = (above.iter().map(|corner| corner[1]).fold(f64::NEG_INFINITY, f64::max)
         + below.iter().map(|corner| corner[1]).fold(f64::INFINITY, f64::min))
@@ -87,8 +121,8 @@ fn way(route: &Route) -> Vec<[f64; 2]> {
     [corners.first(), corners.last()].into_iter().flatten().map(|corner| [corner.x_m, middle_m]).collect()
 }
 
-/// The upper convex chain of points that come by x, with `outward` = 1; with −1 the lower one.
-fn taut(points: impl Iterator<Item = [f64; 2]>, outward: f64) -> Vec<[f64; 2]> {
+/// The upper convex chain (`outward` = 1) or the lower one (`outward` = −1) of points that are sorted by x.
+fn convex_chain(points: impl Iterator<Item = [f64; 2]>, outward: f64) -> Vec<[f64; 2]> {
     let mut chain: Vec<[f64; 2]> = Vec::new();
     for point in points {
         while let [.., a, b] = chain[..] {
@@ -108,9 +142,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_taut_way_passes_outside_of_every_corner() {
+    fn a_convex_chain_passes_outside_of_every_corner() {
         let corners = [[0.0, 0.0], [1.0, 3.0], [2.0, 1.0], [3.0, 4.0], [4.0, 0.0]];
-        assert_eq!(taut(corners.into_iter(), 1.0), [[0.0, 0.0], [1.0, 3.0], [3.0, 4.0], [4.0, 0.0]]);
-        assert_eq!(taut(corners.into_iter(), -1.0), [[0.0, 0.0], [4.0, 0.0]]);
+        assert_eq!(convex_chain(corners.into_iter(), 1.0), [[0.0, 0.0], [1.0, 3.0], [3.0, 4.0], [4.0, 0.0]]);
+        assert_eq!(convex_chain(corners.into_iter(), -1.0), [[0.0, 0.0], [4.0, 0.0]]);
     }
 }

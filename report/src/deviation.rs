@@ -21,7 +21,7 @@ const DRONES_MAX: usize = 200;
 
 /// The swarm against its target shape at a moment, after the best translation and assignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Morph {
+pub struct ShapeDeviation {
     /// When, s.
     pub t_s: f64,
     /// Root of the mean square distance of drones to their slots, m.
@@ -35,15 +35,15 @@ pub struct Morph {
 
 /// Samples a mission.
 #[derive(Default)]
-pub(crate) struct Morphing {
+pub(crate) struct DeviationSampler {
     /// For this number of drones: the slots about their mean, and splines over them.
     plate: Option<(Vec<Vec2>, ThinPlate)>,
     bin: Option<i64>,
     /// So far.
-    pub samples: Vec<Morph>,
+    pub samples: Vec<ShapeDeviation>,
 }
 
-impl Morphing {
+impl DeviationSampler {
     /// Takes the living drones' positions of a tick; not every tick becomes a sample.
     pub fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
         if positions.len() < 2 || positions.len() > DRONES_MAX {
@@ -57,7 +57,7 @@ impl Morphing {
         }
     }
 
-    fn measure(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> Option<Morph> {
+    fn measure(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> Option<ShapeDeviation> {
         if self.plate.as_ref().is_none_or(|(slots, _)| slots.len() != positions.len()) {
             let slots = slots(facts, positions.len())?;
             let plate = ThinPlate::new(&slots, 0.0)?;
@@ -69,14 +69,14 @@ impl Morphing {
         let mut images = vec![Vec2::zeros(); slots.len()];
         positions.iter().zip(&found.slot_of).for_each(|(position, &slot)| images[slot] = *position);
         let bending = plate.fit(&images)?.energy(&images).bending;
-        Some(Morph { t_s, disturbance_m: found.rmse_m, largest_m: found.largest_m, bending })
+        Some(ShapeDeviation { t_s, disturbance_m: found.rmse_m, largest_m: found.largest_m, bending })
     }
 }
 
 /// Writes formation.csv: a line a sample.
-pub(crate) fn write(folder: &Path, samples: &[Morph]) -> Result<(), ReportError> {
+pub(crate) fn write(folder: &Path, samples: &[ShapeDeviation]) -> Result<(), ReportError> {
     let mut csv = format!("{HEADER}\n");
-    for Morph { t_s, disturbance_m, largest_m, bending } in samples {
+    for ShapeDeviation { t_s, disturbance_m, largest_m, bending } in samples {
         // Writing to a string cannot fail.
         let _ = writeln!(csv, "{t_s},{disturbance_m:.6},{largest_m:.6},{bending:.6}");
     }
@@ -88,7 +88,7 @@ pub(crate) fn write(folder: &Path, samples: &[Morph]) -> Result<(), ReportError>
 ///
 /// # Errors
 /// [`ReportError::Io`], [`ReportError::Content`] if it is none.
-pub fn read(folder: &Path) -> Result<Vec<Morph>, ReportError> {
+pub fn read(folder: &Path) -> Result<Vec<ShapeDeviation>, ReportError> {
     let path = folder.join(FILE);
     let text = std::fs::read_to_string(&path).map_err(ReportError::io(&path))?;
     let content = |found: String| ReportError::Content { path: path.clone(), expected: HEADER, found };
@@ -100,7 +100,7 @@ pub fn read(folder: &Path) -> Result<Vec<Morph>, ReportError> {
     let parse = |line: &str| {
         let fields: Option<Vec<f64>> = line.split(',').map(|field| field.parse().ok()).collect();
         let [t_s, disturbance_m, largest_m, bending] = fields?.try_into().ok()?;
-        Some(Morph { t_s, disturbance_m, largest_m, bending })
+        Some(ShapeDeviation { t_s, disturbance_m, largest_m, bending })
     };
     let row = |(number, line)| parse(line).ok_or_else(|| content(format!("line {} is \"{line}\"", number + 2)));
     lines.enumerate().map(row).collect()
@@ -115,10 +115,10 @@ mod tests {
         facts(8).shape.slots(count, 35.0).into_iter().map(image).collect()
     }
 
-    fn measured(positions: &[Vec2]) -> Morph {
-        let mut morphing = Morphing::default();
-        morphing.take(&facts(8), 1.0, positions);
-        morphing.samples[0]
+    fn measured(positions: &[Vec2]) -> ShapeDeviation {
+        let mut deviations = DeviationSampler::default();
+        deviations.take(&facts(8), 1.0, positions);
+        deviations.samples[0]
     }
 
     #[test]
@@ -140,16 +140,16 @@ mod tests {
     #[test]
     fn samples_are_as_far_apart_as_the_swarm_is_large_and_survive_the_file() {
         for (count, expected) in [(8, 10), (65, 2), (201, 0), (1, 0)] {
-            let mut morphing = Morphing::default();
+            let mut deviations = DeviationSampler::default();
             (0..50).for_each(|tick| {
-                morphing.take(&facts(count as u32), 0.51 + f64::from(tick) * 0.02, &flown(count, |slot| slot * 1.5));
+                deviations.take(&facts(count as u32), 0.51 + f64::from(tick) * 0.02, &flown(count, |slot| slot * 1.5));
             });
-            assert!(morphing.samples.len().abs_diff(expected) <= 1, "{count}: {}", morphing.samples.len());
+            assert!(deviations.samples.len().abs_diff(expected) <= 1, "{count}: {}", deviations.samples.len());
             let folder = tempfile::tempdir().unwrap();
-            write(folder.path(), &morphing.samples).unwrap();
+            write(folder.path(), &deviations.samples).unwrap();
             let read = read(folder.path()).unwrap();
-            let times = |samples: &[Morph]| samples.iter().map(|sample| sample.t_s).collect::<Vec<_>>();
-            assert_eq!(times(&read), times(&morphing.samples));
+            let times = |samples: &[ShapeDeviation]| samples.iter().map(|sample| sample.t_s).collect::<Vec<_>>();
+            assert_eq!(times(&read), times(&deviations.samples));
         }
     }
 }

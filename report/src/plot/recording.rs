@@ -19,22 +19,22 @@ struct Count {
 
 /// Events and messages of a run.
 #[derive(Default)]
-pub(super) struct Told {
+pub(super) struct Recording {
     pub events: Vec<RunEvent>,
     counts: Vec<Count>,
     end_s: f64,
 }
 
-impl Told {
+impl Recording {
     /// Reads run.mcap.
     pub fn read(folder: &RunFolder) -> Result<Self, ReportError> {
-        let (mut told, mut events) = (Self::default(), Vec::new());
+        let (mut recording, mut events) = (Self::default(), Vec::new());
         mcap::read(
             folder.path(),
             |sample| {
                 let sum = |counts: &mut dyn Iterator<Item = &u32>| counts.map(|&count| f64::from(count)).sum::<f64>();
                 let radio = &sample.radio;
-                told.count(
+                recording.count(
                     sample.state.t_s,
                     sum(&mut radio.sent.values()),
                     sum(&mut radio.heard.iter()),
@@ -43,8 +43,8 @@ impl Told {
             },
             |event| events.push(event),
         )?;
-        told.events = events;
-        Ok(told)
+        recording.events = events;
+        Ok(recording)
     }
 
     fn count(&mut self, t_s: f64, sent: f64, heard: f64, dropped: f64) {
@@ -88,13 +88,13 @@ mod tests {
 
     #[test]
     fn messages_are_counted_by_the_second() {
-        let mut told = Told::default();
+        let mut recording = Recording::default();
         for tenth in 1..=25 {
-            told.count(f64::from(tenth) * 0.1, 2.0, 6.0, 1.0);
+            recording.count(f64::from(tenth) * 0.1, 2.0, 6.0, 1.0);
         }
-        let lines = told.lines();
+        let lines = recording.lines();
         assert_eq!(lines[0].points, [(0.5, 20.0), (1.5, 20.0)]);
         assert_eq!((lines[1].points[1].1, lines[2].points[1].1), (60.0, 10.0));
-        assert!(told.any() && !Told::default().any());
+        assert!(recording.any() && !Recording::default().any());
     }
 }

@@ -5,7 +5,7 @@ use skein_protocol::record::{EventKind, RunEvent};
 
 /// How much an event matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Weight {
+pub enum Severity {
     /// It is as it should be.
     Info,
     /// A fault: meant, or coped with.
@@ -16,11 +16,11 @@ pub enum Weight {
 
 /// How much an event matters.
 #[must_use]
-pub fn weight(event: &RunEvent) -> Weight {
+pub fn severity(event: &RunEvent) -> Severity {
     match event.what {
-        EventKind::Fault { .. } => Weight::Warning,
-        EventKind::Violation { .. } => Weight::Error,
-        _ => Weight::Info,
+        EventKind::Fault { .. } => Severity::Warning,
+        EventKind::Violation { .. } => Severity::Error,
+        _ => Severity::Info,
     }
 }
 
@@ -74,11 +74,11 @@ mod tests {
     use skein_protocol::record::{FaultKind, ViolationKind};
 
     #[test]
-    fn events_are_told_and_weighed() {
+    fn events_have_a_text_and_a_severity() {
         let kill =
             EventKind::Fault { kind: FaultKind::Kill, target: DroneId(3), scheduled: true, detail: "signal 9".into() };
         let kill = RunEvent { t_s: 1.0, what: kill };
-        assert_eq!((line(&kill).as_str(), weight(&kill)), ("kill of drone 3: signal 9", Weight::Warning));
+        assert_eq!((line(&kill).as_str(), severity(&kill)), ("kill of drone 3: signal 9", Severity::Warning));
         let broken = EventKind::Violation {
             kind: ViolationKind::Separation,
             drones: vec![DroneId(1), DroneId(2)],
@@ -86,6 +86,6 @@ mod tests {
         };
         let broken = RunEvent { t_s: 1.0, what: broken };
         assert_eq!(line(&broken), "separation broken by drones 1, 2: 24.50");
-        assert_eq!(weight(&broken), Weight::Error);
+        assert_eq!(severity(&broken), Severity::Error);
     }
 }

@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 const ABSENT: char = '-';
 
 /// What becomes of a frame at one receiver, as a letter.
-pub(super) fn fate(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows: &[DroneRow], dt_ns: i64) -> char {
+pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows: &[DroneRow], dt_ns: i64) -> char {
     let Some(row) = rows.get(receiver.index()).filter(|row| row.alive() && receiver != frame.source) else {
         return ABSENT;
     };
@@ -41,7 +41,7 @@ fn letter(why: DropReason) -> char {
 }
 
 /// The name of a frame's kind.
-pub(super) fn kind(frame: &AirFrame) -> &'static str {
+pub(super) fn topic(frame: &AirFrame) -> &'static str {
     static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| Topic::ALL.iter().map(name).collect());
     let place = Topic::ALL.iter().position(|topic| *topic as u16 == frame.frame.kind);
     place.map_or("unknown", |place| &NAMES[place])
@@ -53,7 +53,7 @@ fn name(value: &impl Serialize) -> String {
 }
 
 /// What a frame says, in a few words.
-pub(super) fn says(frame: &AirFrame) -> String {
+pub(super) fn content(frame: &AirFrame) -> String {
     match Message::decode(&frame.frame) {
         Ok(Message::Pose(_)) => String::new(),
         Ok(Message::Obstacle(obstacle)) => format!("obstacle {}, seen by {}", obstacle.id.0, obstacle.witness),
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_has_a_fate_at_each_receiver() {
+    fn a_frame_has_a_delivery_at_each_receiver() {
         let rows = [row(0.0, 0.0), row(10.0, 0.0), row(50.0, 0.0), DroneRow::default()];
         let near = scene(Radio {
             air: ChannelModel {
@@ -115,23 +115,23 @@ mod tests {
             },
             ..Radio::default()
         });
-        let fates = |scene: &SceneFacts, frame: &AirFrame| -> String {
-            (0..4).map(|drone| fate(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
+        let deliveries = |scene: &SceneFacts, frame: &AirFrame| -> String {
+            (0..4).map(|drone| delivery(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
         };
-        assert_eq!(fates(&near, &frame(0)), "-hr-");
+        assert_eq!(deliveries(&near, &frame(0)), "-hr-");
         let lossy = scene(Radio { air: ChannelModel { loss: 1.0, ..ChannelModel::default() }, ..Radio::default() });
-        assert_eq!(fates(&lossy, &frame(0)), "-ll-");
+        assert_eq!(deliveries(&lossy, &frame(0)), "-ll-");
         let mut broken = frame(0);
         broken.frame.len = 1;
-        assert_eq!(fates(&near, &broken), "-mm-");
+        assert_eq!(deliveries(&near, &broken), "-mm-");
     }
 
     #[test]
-    fn frames_are_named_and_told() {
-        assert_eq!((kind(&frame(0)), says(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
+    fn frames_have_a_topic_and_a_content() {
+        assert_eq!((topic(&frame(0)), content(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
         let mut strange = frame(0);
         strange.frame.kind = 99;
-        assert_eq!(kind(&strange), "unknown");
-        assert!(says(&strange).contains("99"));
+        assert_eq!(topic(&strange), "unknown");
+        assert!(content(&strange).contains("99"));
     }
 }
