@@ -13,6 +13,10 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "skein/uplink/<shard>",
     "skein/record",
     "skein/watch",
+    // Columns of a table.
+    "bytes/s",
+    "false/h",
+    "frames/s",
     // Folders and files that a command writes.
     "runs/",
     "plots/",
@@ -112,13 +116,19 @@ impl Page {
         let headings = self.text.lines().filter(|line| line.starts_with('#'));
         let anchor = |line: &str| {
             let kept = |c: &char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
-            line.trim_start_matches('#').trim().to_lowercase().chars().filter(kept).collect::<String>().replace(' ', "-")
+            line.trim_start_matches('#')
+                .trim()
+                .to_lowercase()
+                .chars()
+                .filter(kept)
+                .collect::<String>()
+                .replace(' ', "-")
         };
         headings.map(anchor).collect()
     }
 }
 
-/// The types of the sources, each with its functions, constants, fields and variants.
+/// The types of the sources, each with its functions, constants, fields and variants; and the modules with their functions.
 struct Sources {
     members: BTreeMap<String, BTreeSet<String>>,
     /// Names of all files, without folders.
@@ -136,18 +146,29 @@ impl Sources {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-            let skipped = name.starts_with('.') || ["target", "runs", "sweeps", "reproduction"].contains(&name.as_str());
+            let skipped =
+                name.starts_with('.') || ["target", "runs", "sweeps", "reproduction"].contains(&name.as_str());
             if path.is_dir() {
                 if !skipped {
                     self.walk(&path);
                 }
                 continue;
             }
-            if name.ends_with(".rs") {
-                self.index(&fs::read_to_string(&path).unwrap());
+            if let Some(module) = name.strip_suffix(".rs") {
+                let text = fs::read_to_string(&path).unwrap();
+                let folder = folder.file_name().unwrap().to_str().unwrap();
+                self.index_module(if module == "mod" { folder } else { module }, &text);
+                self.index(&text);
             }
             self.files.insert(name);
         }
+    }
+
+    /// Takes in the functions of a module that belong to no type.
+    fn index_module(&mut self, module: &str, text: &str) {
+        let heads = text.lines().filter(|line| !line.starts_with([' ', '/']) && line.contains("fn "));
+        let names = heads.map(|line| identifier(bare(line)).to_owned());
+        self.members.entry(module.to_owned()).or_default().extend(names);
     }
 
     /// Takes in the items of one formatted file: an item's block ends at the first `}` that is indented as far as its head.
@@ -239,11 +260,11 @@ fn member(line: &str) -> Option<&str> {
     (!name.is_empty()).then_some(name)
 }
 
-/// Whether a span is `Type::member`, perhaps with arguments; the two names.
-fn type_and_member(span: &str) -> Option<(&str, &str)> {
+/// Whether a span is `Type::member` or `module::function`, perhaps with arguments; the two names.
+fn owner_and_member(span: &str) -> Option<(&str, &str)> {
     let (of, rest) = span.split_once("::")?;
     let (member, rest) = rest.split_at(identifier(rest).len());
-    let named = of.starts_with(char::is_uppercase) && identifier(of) == of && !member.is_empty();
+    let named = !of.is_empty() && identifier(of) == of && !member.is_empty();
     (named && (rest.is_empty() || rest.starts_with('('))).then_some((of, member))
 }
 
@@ -266,7 +287,7 @@ fn path_exists(span: &str, sources: &Sources) -> bool {
 fn stale_names(page: &Page, sources: &Sources) -> Vec<String> {
     let mut stale = Vec::new();
     for span in page.spans() {
-        let missing = match type_and_member(&span) {
+        let missing = match owner_and_member(&span) {
             Some((of, member)) => !sources.has(of, member),
             None => is_path(&span) && !path_exists(&span, sources),
         };
