@@ -3,7 +3,7 @@
 use crate::safety::{Neighbour, RANGING};
 use crate::swarm_pilot::SwarmPilot;
 use skein_leader::membership::extrapolated;
-use skein_protocol::downlink::{BROKEN_RANGING, Senses};
+use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, QueuePlace};
 use skein_protocol::{DroneId, SimTime, Vec2};
 
@@ -29,7 +29,7 @@ impl SwarmPilot {
             });
         }
         let reach_m = BEACON_REACH * self.params.safety.safe_distance_m;
-        let ranges = self.params.ranging && senses.broken & BROKEN_RANGING == 0;
+        let ranges = self.params.ranging && !senses.broken.ranging;
         let least_m = if ranges { RANGING * self.params.safety.safe_distance_m } else { 0.0 };
         for (id, pose) in self.leading.peers().living(now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;

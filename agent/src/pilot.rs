@@ -3,7 +3,7 @@
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, Phase, PlanStamp, SimTime, Vec2, flag};
 
 /// A message that came in by the radio, read where it lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +29,8 @@ pub struct Command {
     pub leads: Option<GroupId>,
     /// The term it obeys, or leads in.
     pub term: Ballot,
-    /// A `PHASE_…`.
-    pub phase: u32,
+    /// Phase of the plan it obeys.
+    pub phase: Phase,
     /// Route and place in its queue while it passes an obstacle set.
     pub place: Option<(u16, u16)>,
 }
@@ -44,7 +44,7 @@ impl Default for Command {
             group: GroupId::ALL,
             leads: None,
             term: Ballot::NONE,
-            phase: 0,
+            phase: Phase::Cruise,
             place: None,
         }
     }
@@ -58,10 +58,9 @@ impl Command {
         slot.part_hash = self.part_hash;
         slot.group = self.group;
         slot.term = self.term;
-        slot.phase = self.phase;
+        slot.phase = self.phase.to_wire();
         slot.led = self.leads.unwrap_or_default();
-        slot.flags =
-            if self.leads.is_some() { SLOT_LEADS } else { 0 } | if self.place.is_some() { SLOT_QUEUED } else { 0 };
+        slot.flags = flag(self.leads.is_some(), SLOT_LEADS) | flag(self.place.is_some(), SLOT_QUEUED);
         (slot.route, slot.rank) = self.place.unwrap_or((NO_ROUTE, 0));
     }
 }

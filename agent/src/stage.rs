@@ -12,8 +12,7 @@ use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
-use skein_protocol::payload::PHASE_AVOID;
-use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2};
 
 /// A rehearsal that takes longer has failed, s.
 const HORIZON_S: f64 = 200.0;
@@ -213,7 +212,7 @@ impl Stage {
 
     /// Once all are in their slots, how long the formation still cruises to where the mission ends, s.
     fn closed(&self) -> Option<f64> {
-        let bundle = self.pilots.first()?.leading.obeyed().filter(|bundle| bundle.plan.phase != PHASE_AVOID)?;
+        let bundle = self.pilots.first()?.leading.obeyed().filter(|bundle| bundle.plan.phase() != Phase::Avoid)?;
         let (place, velocity) = anchor(&bundle.plan, self.now);
         let error_m = self.params.planner.arrival_error_m;
         let holds = matches!(self.params.planner.destination, Destination::Hold { .. });

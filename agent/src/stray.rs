@@ -2,8 +2,8 @@
 
 use crate::guidance::anchor;
 use skein_protocol::formation::Shape;
-use skein_protocol::payload::{PHASE_REFORM, Plan};
-use skein_protocol::{GroupId, MessageRef, SimTime, Vec2};
+use skein_protocol::payload::Plan;
+use skein_protocol::{GroupId, MessageRef, Phase, SimTime, Vec2};
 
 /// Who is followed by nobody for so long is heard by nobody, s.
 const UNHEARD_S: f64 = 5.0;
@@ -21,7 +21,7 @@ impl Stray {
     pub fn hear(&mut self, message: MessageRef<'_>) {
         let MessageRef::Plan(plan) = message else { return };
         let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
-        if later && plan.phase == PHASE_REFORM && plan.group == GroupId::ALL {
+        if later && plan.phase() == Phase::Reform && plan.group == GroupId::ALL {
             self.formation = Some(*plan);
         }
     }
@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn who_is_not_heard_takes_the_next_slot_until_it_is_followed() {
-        let plan = Plan { phase: PHASE_REFORM, members: 2, anchor_m: [50.0, 7.0], ..Plan::zeroed() };
+        let plan = Plan { phase: Phase::Reform.to_wire(), members: 2, anchor_m: [50.0, 7.0], ..Plan::zeroed() };
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0], [-20.0, 5.0]]);
         let mut stray = Stray::default();
         let slot =

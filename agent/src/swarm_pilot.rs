@@ -18,8 +18,8 @@ use skein_leader::params::Strategy;
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::downlink::Senses;
-use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, PHASE_REFORM, QueuePlace, set_tag};
-use skein_protocol::{Message, SimTime, Vec2};
+use skein_protocol::payload::{MAX_PLACES, QueuePlace, set_tag};
+use skein_protocol::{Message, Phase, SimTime, Vec2};
 
 /// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
 const DEAD_BERTH: f64 = 1.1;
@@ -183,7 +183,7 @@ impl SwarmPilot {
         }
         let over = self.is_formation_over(senses.now);
         match (self.leading.obeyed(), self.leading.part()) {
-            (Some(bundle), Some(part)) if bundle.plan.phase != PHASE_AVOID && !over => {
+            (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !over => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
                 self.on_sight(wanted, senses.now)
@@ -197,7 +197,7 @@ impl SwarmPilot {
     fn is_formation_over(&mut self, now: SimTime) -> bool {
         let term = self.leading.term();
         let bundle = self.leading.obeyed();
-        let old = bundle.is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM && bundle.plan.id.ballot != term);
+        let old = bundle.is_some_and(|bundle| bundle.plan.phase() == Phase::Reform && bundle.plan.id.ballot != term);
         self.old_formation = old.then(|| self.old_formation.unwrap_or(now));
         self.old_formation.is_some_and(|since| now.since(since) >= OLD_FORMATION_S)
     }
@@ -267,7 +267,7 @@ impl SwarmPilot {
             group: self.leading.group(),
             leads: self.leading.is_leader().then(|| self.leading.scope()),
             term: self.leading.term(),
-            phase: self.leading.obeyed().map_or(0, |bundle| bundle.plan.phase),
+            phase: self.leading.obeyed().map_or(Phase::Cruise, |bundle| bundle.plan.phase()),
             place: open.map(|place| (place.route, place.rank)),
         }
     }
@@ -282,7 +282,7 @@ impl Pilot for SwarmPilot {
             self.leading.hear(senses.now, source, message, say);
             self.stray.hear(message);
         }
-        self.leading.set_impaired(senses.broken != 0);
+        self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
         self.find_silent(senses);
         self.lead(senses, &own, say);

@@ -1,7 +1,8 @@
 //! Ticks per second of the bare barrier: `cargo run --example barrier -- [DRONES] [TICKS] [block|yield] [auto|off]`.
 
 use skein_bus::{
-    Control, ControlSpec, DroneEnd, Patience, PinMode, TickOutcome, TickSignal, WaitMode, allowed_cores, pin_to_core,
+    Control, ControlSpec, DroneEndpoint, Patience, PinMode, TickOutcome, TickSignal, WaitMode, allowed_cores,
+    pin_to_core,
 };
 use skein_protocol::slot::Slot;
 use std::error::Error;
@@ -50,7 +51,7 @@ fn start(world: &Control, id: usize, pin: PinMode) -> Result<Child, Box<dyn Erro
 fn drone(fd: i32, id: usize, pin: PinMode) -> Result<(), Box<dyn Error>> {
     let control = Arc::new(Control::attach(fd)?);
     pin_to_core(control.core_of(id), pin)?;
-    let mut end = DroneEnd::new(control, id)?;
+    let mut end = DroneEndpoint::new(control, id)?;
     end.announce(1);
     let parent = std::os::unix::process::parent_id();
     while let TickSignal::Tick(k) = end.wait_tick(|| std::os::unix::process::parent_id() == parent) {

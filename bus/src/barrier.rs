@@ -172,7 +172,7 @@ fn word_of(k: Tick) -> Result<u32, BusError> {
 
 /// A drone's end of the barrier. What it needs in every tick it holds itself: on waking, everything else is far away.
 #[derive(Debug)]
-pub struct DroneEnd {
+pub struct DroneEndpoint {
     /// Of its core, in the segment.
     tick_word: NonNull<AtomicU32>,
     /// Its own, in the segment.
@@ -187,9 +187,9 @@ pub struct DroneEnd {
 }
 
 // SAFETY: the pointers are into the mapping that `control` keeps, which any thread may touch.
-unsafe impl Send for DroneEnd {}
+unsafe impl Send for DroneEndpoint {}
 
-impl DroneEnd {
+impl DroneEndpoint {
     /// The end of this drone; there must be no other one for it.
     ///
     /// # Errors
@@ -227,7 +227,7 @@ impl DroneEnd {
     }
 
     /// Waits for a tick that this drone has not seen yet, and gives the newest. `alive` is asked every 100 ms or so
-    /// whether the world is still there, unless the process is [`DroneEnd::bound`].
+    /// whether the world is still there, unless the process is [`DroneEndpoint::bound`].
     pub fn wait_tick(&mut self, mut alive: impl FnMut() -> bool) -> TickSignal {
         let mut spins = self.spin;
         loop {
@@ -314,7 +314,7 @@ impl DroneEnd {
         true
     }
 
-    /// What this drone's radio counts. To be left alone between [`DroneEnd::finish`] and the next tick.
+    /// What this drone's radio counts. To be left alone between [`DroneEndpoint::finish`] and the next tick.
     pub fn stats_mut(&mut self) -> &mut LinkStats {
         // SAFETY: in the mapping, aligned, any bits are valid; only this end, borrowed mutably, writes it, and others
         // copy it while this drone waits or is dead.

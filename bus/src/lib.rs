@@ -12,10 +12,10 @@
 #![deny(unsafe_code)]
 
 pub mod barrier;
+pub mod baseline;
 pub mod control;
 pub mod domain;
 pub mod error;
-pub mod floor;
 mod futex;
 pub mod host;
 pub mod mission;
@@ -25,11 +25,11 @@ pub mod process_request;
 pub mod services;
 pub mod stopwatch;
 
-pub use barrier::{DroneEnd, Patience, TickOutcome, TickSignal};
+pub use barrier::{DroneEndpoint, Patience, TickOutcome, TickSignal};
+pub use baseline::Baseline;
 pub use control::{Control, ControlSpec, WaitMode};
 pub use domain::{Cleaned, Domain, clean, living};
 pub use error::BusError;
-pub use floor::Floor;
 pub use host::{PinMode, allowed_cores, pin_to_core, raise_file_limit};
 pub use mission::WorldState;
 pub use payload::UplinkHeader;

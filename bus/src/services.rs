@@ -14,8 +14,8 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use skein_protocol::downlink::{DownHead, SenseHead};
-use skein_protocol::record::{DroneRow, RecordHead};
+use skein_protocol::downlink::{DownlinkHeader, SensesHeader};
+use skein_protocol::record::{DroneRow, RecordHeader};
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -119,8 +119,8 @@ impl Services {
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
     pub fn downlink_publisher(&self) -> Result<DownlinkPublisher, BusError> {
-        let drone = size_of::<SenseHead>() + DOWNLINK_ROOM;
-        let room = (size_of::<DownHead>() + self.drones * drone) / size_of::<u64>();
+        let drone = size_of::<SensesHeader>() + DOWNLINK_ROOM;
+        let room = (size_of::<DownlinkHeader>() + self.drones * drone) / size_of::<u64>();
         Ok(StreamPublisher(self.sender(DOWNLINK, room, |_| BackpressureAction::DiscardData)?))
     }
 
@@ -190,7 +190,7 @@ impl Services {
 
     /// Words of a record without many frames.
     fn record_room(&self) -> usize {
-        (size_of::<RecordHead>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>()
+        (size_of::<RecordHeader>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>()
     }
 
     /// Opens a service and makes a publisher whose first segment has `room` elements a sample. `on_full` says what

@@ -1,7 +1,7 @@
 //! The barrier, with threads in the place of processes: each maps the segment for itself.
 #![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
 
-use skein_bus::{BusError, Control, ControlSpec, DroneEnd, Patience, TickOutcome, TickSignal, WaitMode};
+use skein_bus::{BusError, Control, ControlSpec, DroneEndpoint, Patience, TickOutcome, TickSignal, WaitMode};
 use skein_protocol::slot::Slot;
 use std::io::Write;
 use std::os::fd::AsRawFd;
@@ -15,9 +15,9 @@ fn segment(drones: usize, cores: usize, wait: WaitMode) -> Control {
     Control::create(ControlSpec { drones, cores, per_process: 1, wait }).unwrap()
 }
 
-fn end_of(launcher: &Control, drone: usize) -> DroneEnd {
+fn end_of(launcher: &Control, drone: usize) -> DroneEndpoint {
     let control = Control::attach(launcher.fd().unwrap()).unwrap();
-    DroneEnd::new(Arc::new(control), drone).unwrap()
+    DroneEndpoint::new(Arc::new(control), drone).unwrap()
 }
 
 fn slot(drone: usize, tick: u64) -> Slot {
@@ -197,7 +197,7 @@ fn what_is_no_control_segment_is_refused() {
     let good = segment(3, 1, WaitMode::Yield);
     let attached = Control::attach(good.fd().unwrap()).unwrap();
     assert_eq!(attached.spec(), good.spec());
-    assert!(DroneEnd::new(Arc::new(attached), 3).is_err());
+    assert!(DroneEndpoint::new(Arc::new(attached), 3).is_err());
     assert!(good.open_tick(u64::from(u32::MAX)).is_err());
     assert!(good.wait_done(0, LONG, &mut [TickOutcome::Pending]).is_err());
 }

@@ -4,7 +4,7 @@
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use skein_bus::{BusError, Domain, RecordPolicy, Services, UplinkHeader, clean_dead_nodes, raise_file_limit, shards};
 use skein_protocol::SimTime;
-use skein_protocol::downlink::{Downlink, DownlinkView, SenseHead};
+use skein_protocol::downlink::{Downlink, DownlinkView, SensesHeader};
 use skein_protocol::frame::{FRAME_PAYLOAD, Frame};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -65,7 +65,7 @@ fn a_downlink_is_written_and_read_in_place() {
     let mut down = Downlink::default();
     for tick in 0..6 {
         // Grows far beyond what the first segment has room for.
-        down.drones.resize(3usize.pow(2 * tick as u32 + 1), SenseHead { incarnation: 9, ..SenseHead::default() });
+        down.drones.resize(3usize.pow(2 * tick as u32 + 1), SensesHeader { incarnation: 9, ..SensesHeader::default() });
         down.seal(tick, SimTime(7));
         assert_eq!(world.send(tick, down.byte_len(), |bytes| down.write_to(bytes)).unwrap(), 1);
         let sample = drone.receive_tick(tick).unwrap().unwrap();

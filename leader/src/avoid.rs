@@ -12,8 +12,8 @@ use crate::planner::Planner;
 use crate::routes::Routes;
 use crate::situation::Situation;
 use crate::split::{ArrivalTable, RouteAssignment};
-use skein_protocol::payload::{Arrivals, Assignment, PHASE_AVOID, Plan, set_tag};
-use skein_protocol::{GroupId, ObstacleId, Vec2};
+use skein_protocol::payload::{Arrivals, Assignment, Plan, set_tag};
+use skein_protocol::{GroupId, ObstacleId, Phase, Vec2};
 use std::collections::BTreeMap;
 
 /// What a plan for a set is made of.
@@ -113,7 +113,7 @@ impl Planner {
         let plan = Plan {
             predicted_s: *predicted_s,
             routes: survey.routes.count() as u32,
-            ..self.plan(s, PHASE_AVOID, set, Vec2::new(f64::INFINITY, 0.0))
+            ..self.plan(s, Phase::Avoid, set, Vec2::new(f64::INFINITY, 0.0))
         };
         let part = |(i, m): (usize, &Member)| {
             let mine = s.ledger.obeyed().and_then(|bundle| bundle.parts.get(m.id));

@@ -6,9 +6,8 @@
 //! start of a process an incarnation of its own.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
-use skein_protocol::payload::{
-    LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, LEADERSHIP_YIELD, Leadership,
-};
+use skein_protocol::LeadershipKind;
+use skein_protocol::payload::Leadership;
 use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
 
 /// No honest swarm claims more often than this, 1/s: a round that is higher than what that gives since the start is
@@ -190,28 +189,32 @@ impl Election {
                 None
             }
             Input::Claim(scope) => self.claim(now, scope),
-            Input::Yield(heir) => self.leads.then(|| self.message(LEADERSHIP_YIELD, now, epoch, heir)),
+            Input::Yield(heir) => {
+                self.leads.then(|| self.message(LeadershipKind::LeadershipTransfer, now, epoch, heir))
+            }
             Input::Tick { closer, delay_s } => self.tick(now, epoch, closer, delay_s),
         }
     }
 
     fn hear(&mut self, now: SimTime, epoch: u32, message: &Leadership) -> Option<Leadership> {
         let ballot = message.ballot;
-        match message.kind {
-            LEADERSHIP_PROBE => {
+        match message.kind() {
+            LeadershipKind::PreVote => {
                 let heard = if self.leads { now } else { self.heard };
                 let news = ballot == self.obeyed && heard.since(message.stamp) >= self.heartbeat_period_s;
-                news.then(|| self.message(LEADERSHIP_OBJECTION, heard, epoch, DroneId::NONE))
+                news.then(|| self.message(LeadershipKind::PreVoteRejection, heard, epoch, DroneId::NONE))
             }
-            LEADERSHIP_OBJECTION => {
+            LeadershipKind::PreVoteRejection => {
                 if ballot == self.obeyed && message.stamp > self.heard && message.stamp <= now {
                     self.heard = message.stamp;
                     self.probed = None;
                 }
                 None
             }
-            LEADERSHIP_YIELD if message.heir == self.me && ballot == self.obeyed => self.claim(now, self.scope),
-            _ => {
+            LeadershipKind::LeadershipTransfer if message.heir == self.me && ballot == self.obeyed => {
+                self.claim(now, self.scope)
+            }
+            LeadershipKind::Claim | LeadershipKind::Heartbeat | LeadershipKind::LeadershipTransfer => {
                 self.sign(now, ballot, message.group, false);
                 None
             }
@@ -257,11 +260,11 @@ impl Election {
         if self.leads {
             self.heard = now;
             self.next_heartbeat = now.after(self.heartbeat_period_s);
-            return Some(self.message(LEADERSHIP_HEARTBEAT, now, epoch, DroneId::NONE));
+            return Some(self.message(LeadershipKind::Heartbeat, now, epoch, DroneId::NONE));
         }
         if self.obeyed.is_some() && self.probed.is_none() {
             self.probed = Some(now);
-            return Some(self.message(LEADERSHIP_PROBE, self.heard, epoch, DroneId::NONE));
+            return Some(self.message(LeadershipKind::PreVote, self.heard, epoch, DroneId::NONE));
         }
         let scope = if self.scope.contains(self.group) { self.scope } else { self.group };
         self.claim(now, scope)
@@ -278,11 +281,11 @@ impl Election {
         self.heard = now;
         self.probed = None;
         self.next_heartbeat = now.after(self.heartbeat_period_s);
-        Some(self.message(LEADERSHIP_CLAIM, now, 0, DroneId::NONE))
+        Some(self.message(LeadershipKind::Claim, now, 0, DroneId::NONE))
     }
 
-    fn message(&self, kind: u32, stamp: SimTime, epoch: u32, heir: DroneId) -> Leadership {
-        Leadership { stamp, ballot: self.obeyed, kind, group: self.scope, epoch, heir }
+    fn message(&self, kind: LeadershipKind, stamp: SimTime, epoch: u32, heir: DroneId) -> Leadership {
+        Leadership { stamp, ballot: self.obeyed, kind: kind.to_wire(), group: self.scope, epoch, heir }
     }
 }
 

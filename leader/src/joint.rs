@@ -10,8 +10,8 @@ use crate::plan_exchange::{self, arrivals_s};
 use crate::planner::Planner;
 use crate::situation::Situation;
 use crate::split::RouteAssignment;
-use skein_protocol::payload::{ARRIVALS_CHOSEN, Arrivals, Assignment, set_tag};
-use skein_protocol::{Ballot, DroneId, ObstacleId, SimTime};
+use skein_protocol::payload::{Arrivals, Assignment, set_tag};
+use skein_protocol::{ArrivalsKind, Ballot, DroneId, ObstacleId, SimTime};
 use std::collections::BTreeMap;
 
 /// While one thinks, all fly their shortest ways, or the rule's if those save this share of the last drone's time: groups
@@ -114,7 +114,7 @@ impl Planner {
             let mut gate_s = vec![f64::INFINITY; plan.routes as usize];
             gate_s.iter_mut().skip(usize::from(part.route)).take(1).for_each(|s| *s = part.arrival_s);
             let row = plan_exchange::row(now, plan.id.ballot, plan.group, part.drone, set_tag(set), &gate_s);
-            Arrivals { flags: ARRIVALS_CHOSEN, ..row }
+            Arrivals { kind: ArrivalsKind::Decision.to_wire(), ..row }
         };
         self.plan_exchange.announce(now, bundle.parts.iter().map(row).collect());
         bundle.parts.retain(own);

@@ -17,11 +17,11 @@ use crate::planned_set::PlannedSet;
 use crate::planner::Planner;
 use crate::situation::Situation;
 use crate::talk::Talk;
-use skein_protocol::payload::{
-    Assignment, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE, Leadership, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace,
-};
+use skein_protocol::payload::{Assignment, Leadership, Pose, QueuePlace};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{
+    Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2,
+};
 
 /// What the machine needs to know before it starts.
 #[derive(Clone, Debug)]
@@ -260,7 +260,7 @@ impl Leading {
         self.peers.hear(now, source, *pose);
         self.ledger.hear_place(source, pose);
         let ballot = self.election.obeyed();
-        if pose.flags & POSE_LEADS != 0 && pose.term == ballot && ballot.claimant == source {
+        if pose.leads() && pose.term == ballot && ballot.claimant == source {
             let scope = self.election.scope();
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
         }
@@ -271,12 +271,13 @@ impl Leading {
 
     /// Claims and heartbeats count from the claimant alone.
     fn hear_leadership(&mut self, now: SimTime, source: DroneId, message: &Leadership, say: &mut Vec<Message>) {
-        let relayed = [LEADERSHIP_PROBE, LEADERSHIP_OBJECTION].contains(&message.kind);
+        let relayed = matches!(message.kind(), LeadershipKind::PreVote | LeadershipKind::PreVoteRejection);
         if message.ballot.claimant.0 >= self.drones || (!relayed && message.ballot.claimant != source) {
             return;
         }
         // A few answers are enough.
-        if message.kind == LEADERSHIP_PROBE && !self.election.leads() && self.answerers(now, source) >= ANSWERS {
+        if message.kind() == LeadershipKind::PreVote && !self.election.leads() && self.answerers(now, source) >= ANSWERS
+        {
             return;
         }
         let answer = self.election.handle(now, self.ledger.stamp().epoch, Input::Heard(*message));
@@ -327,7 +328,7 @@ impl Leading {
 
     /// Whether a peer's last beacon says that it has all its sensors.
     pub(crate) fn is_healthy(&self, peer: DroneId) -> bool {
-        self.peers.last(peer).is_some_and(|pose| pose.flags & POSE_IMPAIRED == 0)
+        self.peers.last(peer).is_some_and(|pose| !pose.is_impaired())
     }
 
     fn settle(&mut self, now: SimTime) {

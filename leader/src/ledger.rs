@@ -8,8 +8,8 @@ use crate::roster::Roster;
 use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, Pose, QueuePlace, set_tag};
-use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp};
+use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
+use skein_protocol::{Ballot, DroneId, GroupId, Phase, PlanStamp};
 
 /// The ledger of one drone. Bounded by the size of the swarm and of an obstacle set.
 #[derive(Clone, Debug)]
@@ -210,7 +210,7 @@ impl Ledger {
         if !self.parts.contains(self.me) {
             return;
         }
-        if plan.phase == PHASE_AVOID {
+        if plan.phase() == Phase::Avoid {
             let ids = set_ids(&plan.set, plan.set_count);
             let Some(shapes) = obstacles.shapes(ids) else { return };
             let routes = Routes::new(&shapes, &self.params);

@@ -4,7 +4,6 @@ use crate::election::Input;
 use crate::leading::{Leading, Own};
 use crate::member::Member;
 use crate::membership::extrapolated;
-use skein_protocol::payload::POSE_LEADS;
 use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, Vec2};
 
 /// A leader that has been behind for so long asks another one to take over, s.
@@ -186,7 +185,7 @@ impl Leading {
     /// Leaders closer to the destination.
     fn rank_of_leaders(&self, now: SimTime, me: &Member) -> usize {
         let mine = self.key(me.position, me.id);
-        let leaders = self.peers.living(now).filter(|(_, pose)| pose.flags & POSE_LEADS != 0);
+        let leaders = self.peers.living(now).filter(|(_, pose)| pose.leads());
         leaders.filter(|(id, pose)| self.key(extrapolated(pose, now), *id) < mine).count()
     }
 

@@ -2,8 +2,8 @@
 //! applies the part about its own members.
 
 use crate::split::NEVER_S;
-use skein_protocol::payload::{ARRIVALS_ASK, ARRIVALS_CHOSEN, Arrivals, MAX_ROUTES};
-use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
+use skein_protocol::payload::{Arrivals, MAX_ROUTES};
+use skein_protocol::{ArrivalsKind, Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
 
 /// A leader that hears nothing of the others for so long plans alone, s; the air's delay comes on top, both ways.
@@ -67,10 +67,14 @@ impl PlanExchange {
         if row.drone.0 >= self.drones || row.stamp > now || !somewhere {
             return;
         }
-        if row.flags & ARRIVALS_ASK != 0 {
-            self.asked = Some(row.set);
-        }
-        let rows = if row.flags & ARRIVALS_CHOSEN != 0 { &mut self.chosen } else { &mut self.heard };
+        let rows = match row.kind() {
+            ArrivalsKind::Report => &mut self.heard,
+            ArrivalsKind::Query => {
+                self.asked = Some(row.set);
+                &mut self.heard
+            }
+            ArrivalsKind::Decision => &mut self.chosen,
+        };
         let known = rows.entry(row.drone).or_insert(*row);
         if row.stamp >= known.stamp {
             *known = *row;
@@ -86,7 +90,7 @@ impl PlanExchange {
         };
         if now >= question.next_said {
             question.next_said = now.after(self.repeat_s);
-            say.extend(question.rows.iter().map(|row| Arrivals { flags: ARRIVALS_ASK, ..*row }));
+            say.extend(question.rows.iter().map(|row| Arrivals { kind: ArrivalsKind::Query.to_wire(), ..*row }));
         }
     }
 
@@ -159,7 +163,7 @@ pub fn row(now: SimTime, ballot: Ballot, group: GroupId, drone: DroneId, set: u3
         group,
         set,
         routes: gate_s.len().min(MAX_ROUTES) as u32,
-        flags: 0,
+        kind: ArrivalsKind::Report.to_wire(),
         gate_s: [f32::INFINITY; MAX_ROUTES],
     };
     row.gate_s.iter_mut().zip(gate_s).for_each(|(to, &from)| *to = from as f32);
@@ -219,17 +223,21 @@ mod tests {
     #[test]
     fn whoever_asks_late_is_answered_but_not_in_every_tick() {
         let mut plan_exchange = PlanExchange::new(4, 0.2);
-        plan_exchange.hear(at(1.0), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.0, 7) });
+        plan_exchange.hear(at(1.0), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.0, 7) });
         assert_eq!(plan_exchange.asked(at(1.0)), Some(7));
-        plan_exchange.hear(at(1.1), &Arrivals { flags: ARRIVALS_ASK, ..row_of(2, 1.1, 7) });
+        plan_exchange.hear(at(1.1), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.1, 7) });
         assert_eq!((plan_exchange.asked(at(1.1)), plan_exchange.asked(at(1.2))), (None, Some(7)));
     }
 
     #[test]
     fn a_choice_counts_from_the_one_who_thinks_for_all_and_not_if_it_is_older() {
         let mut plan_exchange = PlanExchange::new(4, 0.2);
-        let choice =
-            |stamp_s| Arrivals { flags: ARRIVALS_CHOSEN, gate_s: one_of(1), routes: 3, ..row_of(2, stamp_s, 7) };
+        let choice = |stamp_s| Arrivals {
+            kind: ArrivalsKind::Decision.to_wire(),
+            gate_s: one_of(1),
+            routes: 3,
+            ..row_of(2, stamp_s, 7)
+        };
         plan_exchange.hear(at(1.1), &choice(1.0));
         assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
         assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);

@@ -10,8 +10,8 @@ use crate::plan_exchange::PlanExchange;
 use crate::planned_set::PlannedSet;
 use crate::reform::Reform;
 use crate::situation::Situation;
-use skein_protocol::payload::{Arrivals, PHASE_AVOID, Plan};
-use skein_protocol::{DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::payload::{Arrivals, Plan};
+use skein_protocol::{DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
 /// The parts of a plan, said and repeated, are heard within so long, s; the air's delay comes on top, both ways.
 const AWAITED_S: f64 = 1.0;
@@ -135,9 +135,9 @@ impl Planner {
     }
 
     /// The plan's common part. An anchor that is already where it stops does not move.
-    pub(crate) fn plan(&self, s: &Situation<'_>, phase: u32, set: &[ObstacleId], anchor: Vec2) -> Plan {
+    pub(crate) fn plan(&self, s: &Situation<'_>, phase: Phase, set: &[ObstacleId], anchor: Vec2) -> Plan {
         let stop_x_m = self.params.destination.stop_x_m();
-        let moving = phase != PHASE_AVOID && anchor.x < stop_x_m;
+        let moving = phase != Phase::Avoid && anchor.x < stop_x_m;
         let newest = s.ledger.newest();
         let epoch = if newest.ballot == s.ballot { newest.epoch.saturating_add(1) } else { 1 };
         let (set, set_count) = set_array(set);
@@ -145,9 +145,9 @@ impl Planner {
             stamp: s.now,
             id: PlanStamp { ballot: s.ballot, epoch },
             group: s.scope,
-            phase,
+            phase: phase.to_wire(),
             members: s.members.len() as u32,
-            anchor_m: if phase == PHASE_AVOID { [0.0; 2] } else { anchor.into() },
+            anchor_m: if phase == Phase::Avoid { [0.0; 2] } else { anchor.into() },
             anchor_mps: [if moving { self.params.speed_mps } else { 0.0 }, 0.0],
             anchor_stop_x_m: stop_x_m,
             predicted_s: f64::NAN,

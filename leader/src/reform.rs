@@ -7,8 +7,8 @@ use crate::plan_bundle::PlanBundle;
 use crate::planner::Planner;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_CRUISE, PHASE_REFORM};
-use skein_protocol::{GroupId, SimTime, Vec2};
+use skein_protocol::payload::{Assignment, NO_ROUTE};
+use skein_protocol::{GroupId, Phase, SimTime, Vec2};
 
 /// Slots keep this many safe distances from drones that hang dead in the air.
 const DEAD_BERTH: f64 = 1.05;
@@ -49,7 +49,7 @@ impl Planner {
                 let round_one = s.members.iter().any(|m| is_alone(m, s));
                 let open = !round_one && !self.reform.open;
                 self.reform = Reform { open, round_one, ..Reform::default() };
-                self.slots(s, bundle.plan.phase)
+                self.slots(s, bundle.plan.phase())
             });
         }
         let changed = *self.reform.changed.get_or_insert(s.now);
@@ -57,8 +57,8 @@ impl Planner {
             return None;
         }
         self.reform = Reform::default();
-        let avoided = s.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase != PHASE_CRUISE);
-        self.slots(s, if passed || avoided { PHASE_REFORM } else { PHASE_CRUISE })
+        let avoided = s.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase() != Phase::Cruise);
+        self.slots(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
     }
 
     /// Whether nobody has moved for a while although somebody is not in its slot; also once open ranks are taken.
@@ -70,7 +70,8 @@ impl Planner {
         };
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
         let still = s.members.iter().all(|m| m.speed_mps < STALLED_MPS);
-        if !still || bundle.plan.phase != PHASE_REFORM || (worst <= self.params.arrival_error_m && !self.reform.open) {
+        if !still || bundle.plan.phase() != Phase::Reform || (worst <= self.params.arrival_error_m && !self.reform.open)
+        {
             self.reform.stalled = None;
             return false;
         }
@@ -78,7 +79,7 @@ impl Planner {
         s.now.since(since) >= STALLED_S
     }
 
-    fn slots(&self, s: &Situation<'_>, phase: u32) -> Option<PlanBundle> {
+    fn slots(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
         let close = self.params.shape.slots(s.members.len(), self.params.spacing_m);
         let pinned = s.members.iter().position(|m| self.reform.round_one && is_alone(m, s));
         let (anchor, pin) = match pinned {
@@ -109,8 +110,8 @@ impl Planner {
     }
 
     /// Where the front slot goes: the goal, or where the members are on average, clear of obstacles and of the dead.
-    fn anchor(&self, s: &Situation<'_>, shape: &[Vec2], phase: u32) -> Vec2 {
-        if let (Destination::Goal { front_m }, PHASE_REFORM) = (self.params.destination, phase) {
+    fn anchor(&self, s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
+        if let (Destination::Goal { front_m }, Phase::Reform) = (self.params.destination, phase) {
             return front_m;
         }
         let count = s.members.len().max(1) as f64;
@@ -118,7 +119,7 @@ impl Planner {
         let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
         let mut anchor = Vec2::new(x, self.params.course_y_m);
         let (mut steps, is_blocked) = (0, self.blocker(s));
-        while phase == PHASE_REFORM && steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
+        while phase == Phase::Reform && steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
             anchor.x += ANCHOR_STEP_M;
             steps += 1;
         }
@@ -145,7 +146,7 @@ impl Planner {
         &self,
         s: &Situation<'_>,
         shape: &[Vec2],
-        phase: u32,
+        phase: Phase,
         member: usize,
     ) -> (Vec2, Option<(usize, usize)>) {
         let (usual, stands) = (self.anchor(s, shape, phase), s.members[member].position);

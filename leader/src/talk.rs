@@ -3,8 +3,8 @@
 use crate::leading::{Leading, Own};
 use crate::obstacles::{Obstacles, set_array, set_ids};
 use crate::plan_bundle::PlanBundle;
-use skein_protocol::payload::{MAX_PLACES, Obstacle, PHASE_AVOID, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
-use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime};
+use skein_protocol::payload::{MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
+use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag};
 
 /// Periods, and what was said when.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,15 +131,11 @@ impl Leading {
         if !told_already {
             say.push(Message::Plan(bundle.plan));
         }
-        if bundle.plan.phase == PHASE_AVOID {
+        if bundle.plan.phase() == Phase::Avoid {
             let ids = set_ids(&bundle.plan.set, bundle.plan.set_count);
             say.extend(ids.iter().filter_map(|&id| told(&self.obstacles, id)));
         }
     }
-}
-
-fn flag(set: bool, flag: u32) -> u32 {
-    if set { flag } else { 0 }
 }
 
 fn told(obstacles: &Obstacles, id: ObstacleId) -> Option<Message> {

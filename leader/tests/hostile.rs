@@ -120,15 +120,15 @@ fn assignment() -> impl Strategy<Value = Assignment> {
 fn arrivals() -> impl Strategy<Value = Arrivals> {
     let gate = prop_oneof![0.0..30.0f32, Just(f32::INFINITY), Just(f32::MAX), any::<f32>()];
     let set = prop_oneof![(0..3u32).prop_map(|i| payload::set_tag(&[ObstacleId(i)])), any::<u32>()];
-    (instant(), ballot(), drone(), group(), set, any::<u32>(), 0..40u32, gate).prop_map(
-        |(stamp, ballot, drone, group, set, flags, routes, gate)| Arrivals {
+    (instant(), ballot(), drone(), group(), set, 0..4u32, 0..40u32, gate).prop_map(
+        |(stamp, ballot, drone, group, set, kind, routes, gate)| Arrivals {
             stamp,
             ballot,
             drone,
             group,
             set,
             routes,
-            flags,
+            kind,
             gate_s: [gate; payload::MAX_ROUTES],
         },
     )

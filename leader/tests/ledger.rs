@@ -6,9 +6,9 @@ use bytemuck::Zeroable;
 use skein_leader::ledger::Ledger;
 use skein_leader::obstacles::{Obstacles, set_array};
 use skein_leader::routes::RouteParams;
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan, Pose, QueuePlace, set_tag};
+use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
 const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 };
 const STAMP: PlanStamp = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch: 3 };
@@ -20,8 +20,15 @@ fn ledger() -> Ledger {
     obstacles.learn(SimTime::ZERO, ObstacleId(0), shape, DroneId(0));
     let mut ledger = Ledger::new(DroneId(1), 4, PARAMS);
     let (set, set_count) = set_array(&[ObstacleId(0)]);
-    let plan =
-        Plan { id: STAMP, group: GroupId::ALL, phase: PHASE_AVOID, members: 4, set, set_count, ..Plan::zeroed() };
+    let plan = Plan {
+        id: STAMP,
+        group: GroupId::ALL,
+        phase: Phase::Avoid.to_wire(),
+        members: 4,
+        set,
+        set_count,
+        ..Plan::zeroed()
+    };
     ledger.hear_plan(&plan, &obstacles);
     let mine = Assignment { id: STAMP, drone: DroneId(1), rank: 1, ..Assignment::zeroed() };
     ledger.hear_assignment(&mine, &obstacles);

@@ -1,6 +1,6 @@
 //! What the world tells the drones in a tick: senses and the air, in one sample.
 //!
-//! Laid out as a [`DownHead`], then a [`SenseHead`] for each drone, then the flat slices those point into, then the
+//! Laid out as a [`DownlinkHeader`], then a [`SensesHeader`] for each drone, then the flat slices those point into, then the
 //! shapes of the obstacles somebody senses, then every frame sent in the tick before, and where each was sent.
 
 use crate::Vec2;
@@ -11,18 +11,19 @@ use crate::nearby::{FrameCell, FrameIndex, Locality, NearbyFrames};
 use crate::radio::DropReason;
 use crate::shape::ConvexShape;
 use crate::time::{SimTime, Tick};
+use crate::wire::BrokenSensors;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
 
 /// The sample's head.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct DownHead {
+pub struct DownlinkHeader {
     /// The tick that these senses open.
     pub tick: Tick,
     /// Its time.
     pub now: SimTime,
-    /// Number of [`SenseHead`]s: one for each drone, dead or alive.
+    /// Number of [`SensesHeader`]s: one for each drone, dead or alive.
     pub drones: u32,
     /// Number of [`SensedObstacle`]s.
     pub obstacles: u32,
@@ -45,7 +46,7 @@ pub struct DownHead {
 /// One drone's senses: its own state, and where its entries stand in the flat slices.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct SenseHead {
+pub struct SensesHeader {
     /// Own position, world frame, m.
     pub position_m: [f64; 2],
     /// Own velocity, m/s.
@@ -63,25 +64,20 @@ pub struct SenseHead {
     /// Incarnation of its process.
     pub incarnation: u32,
     /// Its radio.
-    pub cuts: LinkFaults,
+    pub link_faults: LinkFaults,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
-    /// What its sensors say of themselves: [`BROKEN_OBSTACLES`], [`BROKEN_RANGING`].
+    /// Which of its sensors report nothing: [`BrokenSensors`].
     pub broken: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
-/// [`SenseHead::broken`]: the sensor of obstacles tells nothing.
-pub const BROKEN_OBSTACLES: u32 = 1;
-/// [`SenseHead::broken`]: the sensor of neighbours tells nothing.
-pub const BROKEN_RANGING: u32 = 2;
-
-impl SenseHead {
+impl SensesHeader {
     /// Why its radio cannot hear a frame at all, if it cannot.
     #[must_use]
-    pub fn cut_off(&self, frame: &AirFrame) -> Option<DropReason> {
-        self.cuts.cut_off(frame.cuts)
+    pub fn drop_reason(&self, frame: &AirFrame) -> Option<DropReason> {
+        self.link_faults.drop_reason(frame.link_faults)
     }
 }
 
@@ -129,9 +125,9 @@ pub struct SensedShape {
 #[derive(Clone, Debug, Default)]
 pub struct Downlink {
     /// Tick, time; the counts are set by [`Downlink::seal`].
-    pub head: DownHead,
+    pub head: DownlinkHeader,
     /// One for each drone.
-    pub drones: Vec<SenseHead>,
+    pub drones: Vec<SensesHeader>,
     /// Flat, in drone order.
     pub obstacles: Vec<SensedObstacle>,
     /// Flat, in drone order.
@@ -155,7 +151,7 @@ pub struct DownlinkError {
 impl Downlink {
     /// Sets the head's counts.
     pub fn seal(&mut self, tick: Tick, now: SimTime) {
-        self.head = DownHead {
+        self.head = DownlinkHeader {
             tick,
             now,
             drones: self.drones.len() as u32,
@@ -217,9 +213,9 @@ impl Downlink {
 #[derive(Clone, Copy, Debug)]
 pub struct DownlinkView<'a> {
     /// Tick, time and counts.
-    pub head: &'a DownHead,
+    pub head: &'a DownlinkHeader,
     /// One for each drone.
-    pub drones: &'a [SenseHead],
+    pub drones: &'a [SensesHeader],
     /// Flat.
     pub obstacles: &'a [SensedObstacle],
     /// Flat.
@@ -239,8 +235,8 @@ impl<'a> DownlinkView<'a> {
     /// [`DownlinkError`] if the sample is too short for its head, or not aligned.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DownlinkError> {
         let error = DownlinkError { bytes: bytes.len() };
-        let (head, mut rest) = bytes.split_at_checked(size_of::<DownHead>()).ok_or(error)?;
-        let head: &DownHead = bytemuck::try_from_bytes(head).map_err(|_| error)?;
+        let (head, mut rest) = bytes.split_at_checked(size_of::<DownlinkHeader>()).ok_or(error)?;
+        let head: &DownlinkHeader = bytemuck::try_from_bytes(head).map_err(|_| error)?;
         Ok(Self {
             drones: take(&mut rest, head.drones, error)?,
             obstacles: take(&mut rest, head.obstacles, error)?,
@@ -266,7 +262,7 @@ impl<'a> DownlinkView<'a> {
             position: Vec2::from(head.position_m),
             velocity: Vec2::from(head.velocity_mps),
             extra_reaction_s: head.extra_reaction_s,
-            broken: head.broken,
+            broken: BrokenSensors::from_wire(head.broken),
             obstacles: range(self.obstacles, head.obstacle_first, head.obstacle_count),
             neighbours: range(self.neighbours, head.neighbour_first, head.neighbour_count),
             shapes: self.shapes,
@@ -287,8 +283,8 @@ pub struct Senses<'a> {
     pub velocity: Vec2,
     /// Added to its reaction time, s.
     pub extra_reaction_s: f64,
-    /// Which of its sensors tell nothing: [`BROKEN_OBSTACLES`], [`BROKEN_RANGING`].
-    pub broken: u32,
+    /// Which of its sensors report nothing.
+    pub broken: BrokenSensors,
     /// Obstacles with a point in detection range.
     pub obstacles: &'a [SensedObstacle],
     /// Neighbours in ranging distance.
@@ -306,7 +302,17 @@ impl<'a> Senses<'a> {
         neighbours: &'a [SensedNeighbour],
         shapes: &'a [SensedShape],
     ) -> Self {
-        Self { now, tick, position, velocity, extra_reaction_s: 0.0, broken: 0, obstacles, neighbours, shapes }
+        Self {
+            now,
+            tick,
+            position,
+            velocity,
+            extra_reaction_s: 0.0,
+            broken: BrokenSensors::default(),
+            obstacles,
+            neighbours,
+            shapes,
+        }
     }
 
     /// The same senses as they will be at another time and place: for looking ahead.
@@ -348,7 +354,7 @@ mod tests {
     #[test]
     fn a_sample_is_read_in_place() {
         let mut down = Downlink::default();
-        down.drones.push(SenseHead { neighbour_count: 1, position_m: [1.0, 2.0], ..SenseHead::default() });
+        down.drones.push(SensesHeader { neighbour_count: 1, position_m: [1.0, 2.0], ..SensesHeader::default() });
         down.neighbours.push(SensedNeighbour { drone: DroneId(5), ..SensedNeighbour::default() });
         down.seal(3, SimTime(60));
         let mut words = vec![0u64; down.byte_len().div_ceil(8)];
@@ -364,7 +370,7 @@ mod tests {
     #[test]
     fn a_short_sample_is_refused() {
         let mut down = Downlink::default();
-        down.drones.push(SenseHead::default());
+        down.drones.push(SensesHeader::default());
         down.seal(0, SimTime::ZERO);
         let mut words = vec![0u64; down.byte_len().div_ceil(8)];
         down.write_to(bytemuck::cast_slice_mut(&mut words));

@@ -35,10 +35,10 @@ pub struct AirFrame {
     pub sequence: u32,
     /// True position of the sender when it sent, m.
     pub position_m: [f64; 2],
-    /// How long it waited for the channel and took it, ns; [`crate::radio::NEVER_AIRED`] if it was not sent at all.
+    /// How long it waited for the channel and took it, ns; [`crate::radio::NEVER_TRANSMITTED`] if it was not sent at all.
     pub queue_ns: u64,
     /// The sender's radio when it sent.
-    pub cuts: LinkFaults,
+    pub link_faults: LinkFaults,
     /// What was sent.
     pub frame: Frame,
 }

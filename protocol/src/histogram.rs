@@ -5,7 +5,7 @@ use crate::record::Percentiles;
 /// Mean, quantiles (nearest ranks) and maximum of a histogram whose bins are `width_s` wide, s. The last bin holds all that is
 /// longer too: it counts as the maximum, `max` bins.
 #[must_use]
-pub fn spread(bins: &[u32], max: u64, width_s: f64) -> Percentiles {
+pub fn percentiles(bins: &[u32], max: u64, width_s: f64) -> Percentiles {
     let count: u64 = bins.iter().map(|&n| u64::from(n)).sum();
     if count == 0 {
         return Percentiles::default();

@@ -33,10 +33,12 @@ pub mod shape;
 pub mod slot;
 pub mod thin_plate;
 pub mod time;
+pub mod wire;
 
 pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 pub use message::{Message, MessageRef};
 pub use time::{SimTime, Tick};
+pub use wire::{ArrivalsKind, LeadershipKind, Phase, flag};
 
 /// A planar vector or point, metres (or m/s, m/s²), world frame.
 pub type Vec2 = nalgebra::Vector2<f64>;

@@ -27,7 +27,7 @@ impl PartitionMask {
 
     /// Whether a partition has both on sides, and on different ones.
     #[must_use]
-    pub fn apart(self, other: Self) -> bool {
+    pub fn separates(self, other: Self) -> bool {
         (0..MAX_PARTITIONS).any(|partition| {
             let side = |sides: Self| sides.0 >> (partition * WIDTH) & ((1 << WIDTH) - 1);
             let (here, there) = (side(self), side(other));
@@ -41,7 +41,7 @@ impl PartitionMask {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct LinkFaults {
     /// Its side in each partition.
-    pub sides: PartitionMask,
+    pub partitions: PartitionMask,
     /// 1 if nobody hears it.
     pub mute: u16,
     /// 1 if it hears nobody.
@@ -51,11 +51,11 @@ pub struct LinkFaults {
 impl LinkFaults {
     /// Why a drone with this radio cannot hear a frame that was sent with `sender`'s, if it cannot.
     #[must_use]
-    pub fn cut_off(self, sender: Self) -> Option<DropReason> {
+    pub fn drop_reason(self, sender: Self) -> Option<DropReason> {
         if self.deaf != 0 || sender.mute != 0 {
             return Some(DropReason::Deaf);
         }
-        self.sides.apart(sender.sides).then_some(DropReason::Partition)
+        self.partitions.separates(sender.partitions).then_some(DropReason::Partition)
     }
 }
 
@@ -71,11 +71,11 @@ mod tests {
 
     #[test]
     fn only_known_and_different_sides_are_apart() {
-        assert!(on(&[(0, 0)]).apart(on(&[(0, 1)])));
-        assert!(!on(&[(0, 1)]).apart(on(&[(0, 1)])));
-        assert!(!on(&[(0, 0)]).apart(on(&[])), "on no side it hears all");
-        assert!(!on(&[(0, 0)]).apart(on(&[(1, 1)])), "two partitions do not mix");
-        assert!(on(&[(0, 0), (7, 14)]).apart(on(&[(0, 0), (7, 13)])));
+        assert!(on(&[(0, 0)]).separates(on(&[(0, 1)])));
+        assert!(!on(&[(0, 1)]).separates(on(&[(0, 1)])));
+        assert!(!on(&[(0, 0)]).separates(on(&[])), "on no side it hears all");
+        assert!(!on(&[(0, 0)]).separates(on(&[(1, 1)])), "two partitions do not mix");
+        assert!(on(&[(0, 0), (7, 14)]).separates(on(&[(0, 0), (7, 13)])));
     }
 
     #[test]

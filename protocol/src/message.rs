@@ -3,6 +3,7 @@
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
 use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use crate::wire::{ArrivalsKind, LeadershipKind, Phase, UnknownCode};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
 use std::mem::offset_of;
@@ -217,7 +218,8 @@ impl<'a> MessageRef<'a> {
                 finite(&[low.x, low.y, high.x, high.y], "shape")
             }
             Self::Leadership(l) => {
-                lineage(l.group).and_then(|()| below(l.kind.wrapping_sub(1), 5, "kind of leadership"))
+                lineage(l.group)?;
+                known(LeadershipKind::from_wire(l.kind))
             }
             Self::Plan(p) => {
                 lineage(p.group)?;
@@ -226,7 +228,7 @@ impl<'a> MessageRef<'a> {
                 if p.anchor_stop_x_m.is_nan() {
                     return Err(DecodeError::Field("anchor stop"));
                 }
-                below(p.phase, 3, "phase")?;
+                known(Phase::from_wire(p.phase))?;
                 below(p.set_count, set_limit, "obstacle count")
             }
             Self::Assignment(a) => {
@@ -237,6 +239,7 @@ impl<'a> MessageRef<'a> {
             }
             Self::Arrivals(a) => {
                 lineage(a.group)?;
+                known(ArrivalsKind::from_wire(a.kind))?;
                 below(a.routes, payload::MAX_ROUTES as u32 + 1, "route count")?;
                 let never = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
                 if a.gate_s.iter().any(never) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
@@ -244,6 +247,10 @@ impl<'a> MessageRef<'a> {
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
         }
     }
+}
+
+fn known<T>(code: Result<T, UnknownCode>) -> Result<(), DecodeError> {
+    code.map(|_| ()).map_err(|unknown| DecodeError::Field(unknown.what))
 }
 
 #[inline]

@@ -5,7 +5,7 @@ use crate::Vec2;
 use crate::frame::AirFrame;
 use crate::link_faults::LinkFaults;
 use crate::message::Topic;
-use crate::radio::NEVER_AIRED;
+use crate::radio::NEVER_TRANSMITTED;
 use bytemuck::{Pod, Zeroable};
 
 /// Up to so many frames it is cheaper to look at all of them.
@@ -77,7 +77,8 @@ impl FrameIndex {
         self.cells.clear();
         self.order.clear();
         self.sorted.clear();
-        let plain = |frame: &AirFrame| frame.cuts == LinkFaults::default() && frame.queue_ns != NEVER_AIRED;
+        let plain =
+            |frame: &AirFrame| frame.link_faults == LinkFaults::default() && frame.queue_ns != NEVER_TRANSMITTED;
         if locality.topics == 0 || frames.len() <= FEW || !frames.iter().all(plain) {
             return;
         }
@@ -180,7 +181,7 @@ mod tests {
         assert_eq!((index.cells.len(), index.order.len()), (1, FEW + 1));
         index.build(locality, &frames[1..]);
         assert_eq!((index.locality, index.order.len()), (Locality::default(), 0));
-        frames[3].cuts.mute = 1;
+        frames[3].link_faults.mute = 1;
         index.build(locality, &frames);
         assert!(index.cells.is_empty());
     }

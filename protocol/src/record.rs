@@ -5,6 +5,7 @@ use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::link_faults::LinkFaults;
 use crate::radio::DROP_REASONS;
 use crate::time::{SimTime, Tick};
+use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -13,7 +14,7 @@ use thiserror::Error;
 /// [`RunEvent`] each.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct RecordHead {
+pub struct RecordHeader {
     /// The tick that just ended.
     pub tick: Tick,
     /// Time at its end: the rows' time.
@@ -61,14 +62,14 @@ pub struct DroneRow {
     pub led: GroupId,
     /// [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`], [`ROW_FROZEN`].
     pub flags: u32,
-    /// A `PHASE_…` of [`crate::payload`].
+    /// A [`Phase`], see [`DroneRow::phase`].
     pub phase: u32,
     /// Messages heard in this tick.
     pub heard: u32,
     /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
     /// What faults do to its radio.
-    pub cuts: LinkFaults,
+    pub link_faults: LinkFaults,
     /// How long its step took, ns of wall time.
     pub step_ns: u32,
     /// Route, [`crate::payload::NO_ROUTE`] if none.
@@ -86,10 +87,40 @@ impl DroneRow {
         self.obeyed.ballot.is_some().then_some(self.obeyed.ballot.claimant)
     }
 
-    /// Whether its process lives.
+    /// Phase of the plan it obeys; an unknown number counts as [`Phase::Cruise`].
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        Phase::from_wire(self.phase).unwrap_or_default()
+    }
+
+    /// Whether its process is alive.
     #[must_use]
     pub fn alive(&self) -> bool {
         self.flags & ROW_ALIVE != 0
+    }
+
+    /// Whether it leads a group.
+    #[must_use]
+    pub fn leads(&self) -> bool {
+        self.flags & ROW_LEADS != 0
+    }
+
+    /// Whether it flies a route past an obstacle set.
+    #[must_use]
+    pub fn is_queued(&self) -> bool {
+        self.flags & ROW_QUEUED != 0
+    }
+
+    /// Whether it missed this tick's deadline (wall clock only).
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.flags & ROW_LATE != 0
+    }
+
+    /// Whether its process is frozen.
+    #[must_use]
+    pub fn is_frozen(&self) -> bool {
+        self.flags & ROW_FROZEN != 0
     }
 }
 
@@ -232,8 +263,8 @@ pub enum EventKind {
         plan: PlanStamp,
         /// The group it splits or keeps.
         group: String,
-        /// `cruise`, `avoid` or `reform`.
-        phase: String,
+        /// What the group is told to do.
+        phase: Phase,
         /// Number of drones planned for.
         members: u32,
         /// Routes past the set.
@@ -314,7 +345,7 @@ pub struct RunEvent {
 #[derive(Clone, Copy, Debug)]
 pub struct RecordView<'a> {
     /// Tick, time, counts, digest.
-    pub head: &'a RecordHead,
+    pub head: &'a RecordHeader,
     /// One for each drone.
     pub rows: &'a [DroneRow],
     /// Frames sent in this tick.
@@ -339,8 +370,8 @@ impl<'a> RecordView<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RecordError> {
         let error = RecordError { bytes: bytes.len() };
         let cut = |bytes: &'a [u8], len: usize| bytes.split_at_checked(len).ok_or(error);
-        let (head, rest) = cut(bytes, size_of::<RecordHead>())?;
-        let head: &RecordHead = bytemuck::try_from_bytes(head).map_err(|_| error)?;
+        let (head, rest) = cut(bytes, size_of::<RecordHeader>())?;
+        let head: &RecordHeader = bytemuck::try_from_bytes(head).map_err(|_| error)?;
         let (rows, rest) = cut(rest, head.rows as usize * size_of::<DroneRow>())?;
         let (frames, rest) = cut(rest, head.frames as usize * size_of::<AirFrame>())?;
         let (events, _) = cut(rest, head.events_len as usize)?;
@@ -355,7 +386,7 @@ impl<'a> RecordView<'a> {
     /// Bytes that [`RecordView::write_to`] needs.
     #[must_use]
     pub fn byte_len(&self) -> usize {
-        size_of::<RecordHead>() + size_of_val(self.rows) + size_of_val(self.frames) + self.events.len()
+        size_of::<RecordHeader>() + size_of_val(self.rows) + size_of_val(self.frames) + self.events.len()
     }
 
     /// Writes the sample; `out` must be at least [`RecordView::byte_len`] long.
@@ -382,13 +413,24 @@ impl<'a> RecordView<'a> {
     }
 }
 
+/// Why a sink could not keep a record, for people.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct SinkError(String);
+
+impl From<String> for SinkError {
+    fn from(reason: String) -> Self {
+        Self(reason)
+    }
+}
+
 /// Whoever wants to see each record of a run, in order: the recorder, a live view, a test.
 pub trait RecordSink: Send {
     /// Takes the record of one tick. An error stops the recording, never the mission.
     ///
     /// # Errors
-    /// Whatever keeps the record from being kept, in words.
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String>;
+    /// [`SinkError`] if the record could not be kept.
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError>;
 
     /// Whether it would take a record now, without waiting for something slow: a disk.
     fn ready(&self) -> bool {

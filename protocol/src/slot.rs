@@ -3,6 +3,7 @@
 
 use crate::ids::{Ballot, GroupId, PlanStamp};
 use crate::radio::DROP_REASONS;
+use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};
 
 /// [`Slot::flags`]: the drone leads a group.
@@ -37,7 +38,7 @@ pub struct Slot {
     pub dropped: [u32; DROP_REASONS],
     /// [`SLOT_LEADS`], [`SLOT_QUEUED`].
     pub flags: u32,
-    /// A `PHASE_…` of [`crate::payload`].
+    /// A [`Phase`], see [`Slot::phase`].
     pub phase: u32,
     /// Route, [`crate::payload::NO_ROUTE`] if none.
     pub route: u16,
@@ -49,6 +50,26 @@ pub struct Slot {
     pub term: Ballot,
     /// Always 0.
     pub reserved: [u32; 14],
+}
+
+impl Slot {
+    /// Phase of the plan it obeys; an unknown number counts as [`Phase::Cruise`].
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        Phase::from_wire(self.phase).unwrap_or_default()
+    }
+
+    /// Whether the drone leads a group.
+    #[must_use]
+    pub fn leads(&self) -> bool {
+        self.flags & SLOT_LEADS != 0
+    }
+
+    /// Whether the drone flies a route past an obstacle set.
+    #[must_use]
+    pub fn is_queued(&self) -> bool {
+        self.flags & SLOT_QUEUED != 0
+    }
 }
 
 /// Bins of [`LinkStats`]' histograms, one tick wide; the last also holds all that is longer.

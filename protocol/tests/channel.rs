@@ -3,7 +3,9 @@
 
 use skein_protocol::frame::{AirFrame, FRAME_PAYLOAD, Frame};
 use skein_protocol::message::Topic;
-use skein_protocol::radio::{ChannelModel, Delay, Delivery, DropReason, NEVER_AIRED, Queue, Radio, SharedChannel};
+use skein_protocol::radio::{
+    ChannelModel, ChannelQueue, Delay, Delivery, DropReason, NEVER_TRANSMITTED, Radio, SharedChannel,
+};
 use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// A frame of 100 bytes on the air.
@@ -15,7 +17,7 @@ fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
         sequence,
         position_m: [0.0; 2],
         queue_ns: 0,
-        cuts: Default::default(),
+        link_faults: Default::default(),
         frame,
     }
 }
@@ -24,10 +26,10 @@ fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
 fn frames_queue_for_the_channel_over_ticks() {
     // 100 bytes take 10 ms; ticks of 20 ms.
     let channel = SharedChannel { seed: 1, rate_bps: 80_000.0, limit_s: 0.05 };
-    let mut queue = Queue::new(channel);
+    let mut queue = ChannelQueue::new(channel);
     let mut pass = |tick: u64, count: u32| {
         let mut frames: Vec<AirFrame> = (0..count).map(|source| sent(tick, source, tick as u32)).collect();
-        queue.pass(SimTime(tick as i64 * 20_000_000), &mut frames);
+        queue.schedule(SimTime(tick as i64 * 20_000_000), &mut frames);
         assert!(frames.is_sorted_by_key(|frame| frame.source), "the frames stay where they are");
         let mut waits: Vec<u64> = frames.iter().map(|frame| frame.queue_ns).collect();
         waits.sort_unstable();
@@ -37,7 +39,7 @@ fn frames_queue_for_the_channel_over_ticks() {
     assert_eq!(pass(0, 3), ms(&[10, 20, 30]));
     assert_eq!(pass(1, 2), ms(&[20, 30]), "behind the 10 ms that tick 0 left");
     // 10 ms are left; those that begin within 50 ms are sent.
-    assert_eq!(pass(2, 7), [ms(&[20, 30, 40, 50, 60]), vec![NEVER_AIRED; 2]].concat());
+    assert_eq!(pass(2, 7), [ms(&[20, 30, 40, 50, 60]), vec![NEVER_TRANSMITTED; 2]].concat());
     assert_eq!(pass(9, 1), ms(&[10]), "an idle channel saves nothing up");
     let lie = AirFrame { frame: Frame { len: u32::MAX, ..sent(0, 0, 0).frame }, ..sent(0, 0, 0) };
     assert_eq!(channel.airtime_ns(&lie), (8 + FRAME_PAYLOAD as u64) * 100_000);
@@ -45,11 +47,11 @@ fn frames_queue_for_the_channel_over_ticks() {
 
 #[test]
 fn nobody_has_the_channel_first_by_number() {
-    let mut queue = Queue::new(SharedChannel { seed: 1, rate_bps: 1e9, limit_s: 1.0 });
+    let mut queue = ChannelQueue::new(SharedChannel { seed: 1, rate_bps: 1e9, limit_s: 1.0 });
     let mut first = [0u32; 8];
     for tick in 0..8000u64 {
         let mut frames: Vec<AirFrame> = (0..8).flat_map(|source| (0..2).map(move |n| sent(tick, source, n))).collect();
-        queue.pass(SimTime(tick as i64 * 20_000_000), &mut frames);
+        queue.schedule(SimTime(tick as i64 * 20_000_000), &mut frames);
         let best = frames.iter().min_by_key(|frame| frame.queue_ns).unwrap();
         first[best.source.index()] += 1;
         assert!(frames.chunks(2).all(|own| own[0].queue_ns < own[1].queue_ns), "a drone's frames keep their order");
@@ -63,9 +65,9 @@ fn nobody_has_the_channel_first_by_number() {
 #[test]
 fn waiting_adds_to_the_delay_and_a_frame_not_sent_has_its_reason() {
     let air = ChannelModel { delay: Delay { mean_s: 0.1, ..Delay::default() }, ..ChannelModel::default() };
-    let radio = Radio { seed: 3, air, ..Radio::default() };
+    let radio = Radio { seed: 3, channel: air, ..Radio::default() };
     let delivery = |frame: AirFrame| radio.delivery(&frame, DroneId(1), Vec2::zeros(), 20_000_000);
     let due = SimTime(5 * 20_000_000 + 3_000_000 + 100_000_000);
     assert_eq!(delivery(AirFrame { queue_ns: 3_000_000, ..sent(5, 0, 0) }), Delivery::Deliver { due, again: None });
-    assert_eq!(delivery(AirFrame { queue_ns: NEVER_AIRED, ..sent(5, 0, 0) }), Delivery::Drop(DropReason::Queue));
+    assert_eq!(delivery(AirFrame { queue_ns: NEVER_TRANSMITTED, ..sent(5, 0, 0) }), Delivery::Drop(DropReason::Queue));
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{
-    BLOCK_BURSTS, Burst, ChannelModel, Delay, DelayModel, Delivery, DropReason, Link, Radio, Range, Rule, Scope,
+    BLOCK_BURSTS, Burst, BurstScope, ChannelModel, Delay, DelayModel, Delivery, DropReason, Link, Radio, Range, Rule,
 };
 use skein_protocol::{DroneId, SimTime, Vec2};
 use std::collections::BTreeSet;
@@ -23,13 +23,13 @@ fn link(source: u32, destination: u32, sequence: u32) -> Link {
 }
 
 fn radio(air: ChannelModel) -> Radio {
-    Radio { seed: 3, air, ..Radio::default() }
+    Radio { seed: 3, channel: air, ..Radio::default() }
 }
 
 /// The verdicts on frames of one link, one every [`PERIOD_S`], over `path_m`.
 fn verdicts(radio: &Radio, (source, destination): (u32, u32), path_m: f64) -> Vec<Delivery> {
     let at = |sequence| SimTime::from_secs(f64::from(sequence) * PERIOD_S);
-    (0..MANY).map(|s| radio.verdict(link(source, destination, s), Vec2::new(path_m, 0.0), at(s))).collect()
+    (0..MANY).map(|s| radio.outcome(link(source, destination, s), Vec2::new(path_m, 0.0), at(s))).collect()
 }
 
 /// Which of them were dropped for this reason.
@@ -84,7 +84,7 @@ fn assert_moments(what: &str, values: &[f64], wanted_mean: f64, wanted_variance:
 
 #[test]
 fn an_ideal_radio_delivers_once_and_at_once() {
-    let verdict = Radio::default().verdict(link(0, 1, 0), Vec2::new(1e6, 0.0), SimTime(5));
+    let verdict = Radio::default().outcome(link(0, 1, 0), Vec2::new(1e6, 0.0), SimTime(5));
     assert_eq!(verdict, Delivery::Deliver { due: SimTime(5), again: None });
 }
 
@@ -93,28 +93,28 @@ fn verdicts_are_keyed_not_drawn_in_turn() {
     let air = ChannelModel {
         delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.05 },
         loss: 0.3,
-        burst: Some(Burst { share: 0.2, length_s: 0.5, loss: 1.0, scope: Scope::Link }),
+        burst: Some(Burst { share: 0.2, length_s: 0.5, loss: 1.0, scope: BurstScope::Link }),
         range: Some(Range { half_m: 100.0, shadowing_db: 6.0, exponent: 2.0 }),
         duplicate: 0.2,
     };
     let radio = Radio { asymmetry: 1.0, ..radio(air) };
-    let ask = |s| radio.verdict(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s)));
+    let ask = |s| radio.outcome(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s)));
     let forward: Vec<_> = (0..200).map(ask).collect();
     let mut backward: Vec<_> = (0..200).rev().map(ask).collect();
     backward.reverse();
     assert_eq!(forward, backward);
     let other = Radio { seed: 4, ..radio.clone() };
     let differ = (0..200)
-        .filter(|&s| other.verdict(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s))) != ask(s));
+        .filter(|&s| other.outcome(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s))) != ask(s));
     assert!(differ.count() > 100, "another seed is another air");
 }
 
 /// What a fixed delay and Bernoulli losses gave before there were other models: digests of such missions rest on it.
 #[test]
 fn a_plain_loss_stays_as_it_was() {
-    let radio = Radio { seed: 9, air: ChannelModel { loss: 0.5, ..ChannelModel::default() }, ..Radio::default() };
+    let radio = Radio { seed: 9, channel: ChannelModel { loss: 0.5, ..ChannelModel::default() }, ..Radio::default() };
     let lost: String = (0..32)
-        .map(|s| match radio.verdict(link(2, 3, s), Vec2::zeros(), SimTime::ZERO) {
+        .map(|s| match radio.outcome(link(2, 3, s), Vec2::zeros(), SimTime::ZERO) {
             Delivery::Drop(DropReason::Loss) => 'x',
             _ => '.',
         })
@@ -135,7 +135,7 @@ fn loss_has_its_rate_on_every_link_and_no_memory() {
 
 #[test]
 fn links_are_independent_of_each_other() {
-    let burst = Burst { share: 0.3, length_s: 0.2, loss: 1.0, scope: Scope::Direction };
+    let burst = Burst { share: 0.3, length_s: 0.2, loss: 1.0, scope: BurstScope::Direction };
     let airs = [
         ChannelModel { loss: 0.3, ..ChannelModel::default() },
         ChannelModel { burst: Some(burst), ..ChannelModel::default() },
@@ -200,7 +200,7 @@ fn a_normal_delay_is_cut_at_zero() {
 /// Looks at bursts in steps of a twentieth of their mean length: the states, and the lengths of the bursts seen, s.
 fn bursts_s(burst: Burst) -> (Vec<bool>, Vec<f64>) {
     let step_s = burst.length_s / 20.0;
-    let at = |step: u32| burst.rages(5, link(0, 1, 0), SimTime::from_secs(f64::from(step) * step_s));
+    let at = |step: u32| burst.is_active(5, link(0, 1, 0), SimTime::from_secs(f64::from(step) * step_s));
     let states: Vec<bool> = (0..400_000).map(at).collect();
     let runs = states.chunk_by(|a, b| a == b).filter(|run| run[0]);
     let lengths = runs.map(|run| run.len() as f64 * step_s).collect();
@@ -210,7 +210,7 @@ fn bursts_s(burst: Burst) -> (Vec<bool>, Vec<f64>) {
 #[test]
 fn bursts_have_their_share_and_their_mean_length() {
     for (share, length_s) in [(0.1, 0.5), (0.5, 2.0), (0.8, 0.1)] {
-        let (states, lengths) = bursts_s(Burst { share, length_s, loss: 1.0, scope: Scope::Direction });
+        let (states, lengths) = bursts_s(Burst { share, length_s, loss: 1.0, scope: BurstScope::Direction });
         let count = lengths.len() as f64;
         // The time shares of n cycles of two exponential stays.
         assert_near("share", rate(&states), share, share * (1.0 - share) * (2.0 / count).sqrt());
@@ -225,10 +225,10 @@ fn bursts_have_their_share_and_their_mean_length() {
 
 #[test]
 fn a_block_begins_with_a_draw_of_its_own() {
-    let burst = Burst { share: 0.3, length_s: 1.0, loss: 1.0, scope: Scope::Direction };
+    let burst = Burst { share: 0.3, length_s: 1.0, loss: 1.0, scope: BurstScope::Direction };
     let block_s = BLOCK_BURSTS * burst.length_s;
     assert_eq!(burst.block_s(), block_s);
-    let at = |seconds| burst.rages(5, link(0, 1, 0), SimTime::from_secs(seconds));
+    let at = |seconds| burst.is_active(5, link(0, 1, 0), SimTime::from_secs(seconds));
     let around = |edge_s: f64| (at(edge_s - 1e-6), at(edge_s));
     let edges: Vec<(bool, bool)> = (1..4000).map(|block| around(f64::from(block) * block_s)).collect();
     let both: Vec<bool> = edges.iter().map(|(before, after)| *before && *after).collect();
@@ -244,19 +244,20 @@ fn bursts_befall_whom_they_should() {
         let air = ChannelModel { burst: Some(burst(scope)), ..ChannelModel::default() };
         dropped(&verdicts(&radio(air), pair, 0.0), DropReason::Burst)
     };
-    assert_ne!(states(Scope::Direction, (0, 1)), states(Scope::Direction, (1, 0)));
-    assert_eq!(states(Scope::Link, (0, 1)), states(Scope::Link, (1, 0)));
-    assert_ne!(states(Scope::Link, (0, 1)), states(Scope::Link, (0, 2)));
-    assert_eq!(states(Scope::Swarm, (0, 1)), states(Scope::Swarm, (7, 3)));
+    assert_ne!(states(BurstScope::Direction, (0, 1)), states(BurstScope::Direction, (1, 0)));
+    assert_eq!(states(BurstScope::Link, (0, 1)), states(BurstScope::Link, (1, 0)));
+    assert_ne!(states(BurstScope::Link, (0, 1)), states(BurstScope::Link, (0, 2)));
+    assert_eq!(states(BurstScope::Swarm, (0, 1)), states(BurstScope::Swarm, (7, 3)));
     // A burst that loses seven in ten, and a quiet time that loses one in ten, each with its reason.
-    let partly = Burst { loss: 0.7, ..burst(Scope::Direction) };
+    let partly = Burst { loss: 0.7, ..burst(BurstScope::Direction) };
     let verdicts =
         verdicts(&radio(ChannelModel { burst: Some(partly), loss: 0.1, ..ChannelModel::default() }), (0, 1), 0.0);
     // A burst of three periods in the mean leaves about a sixth as many independent frames.
     assert_rate("in bursts", rate(&dropped(&verdicts, DropReason::Burst)), 0.28, f64::from(MANY) / 6.0);
     assert_rate("alone", rate(&dropped(&verdicts, DropReason::Loss)), 0.072, f64::from(MANY) / 6.0);
     for (share, wanted) in [(0.0, 0.0), (1.0, 1.0)] {
-        let always = ChannelModel { burst: Some(Burst { share, ..burst(Scope::Link) }), ..ChannelModel::default() };
+        let always =
+            ChannelModel { burst: Some(Burst { share, ..burst(BurstScope::Link) }), ..ChannelModel::default() };
         assert_eq!(rate(&dropped(&self::verdicts(&radio(always), (0, 1), 0.0), DropReason::Burst)), wanted);
     }
 }
@@ -267,7 +268,7 @@ fn a_hard_range_ends_at_its_distance() {
         range: Some(Range { half_m: 100.0, shadowing_db: 0.0, exponent: 2.0 }),
         ..ChannelModel::default()
     });
-    let at = |x| radio.verdict(link(0, 1, 0), Vec2::new(x, 0.0), SimTime::ZERO);
+    let at = |x| radio.outcome(link(0, 1, 0), Vec2::new(x, 0.0), SimTime::ZERO);
     assert_eq!(at(100.0), Delivery::Deliver { due: SimTime::ZERO, again: None });
     assert_eq!(at(100.1), Delivery::Drop(DropReason::Range));
 }
@@ -342,11 +343,11 @@ fn the_last_rule_about_a_frame_counts() {
         topics: (!topics.is_empty()).then(|| topics.iter().copied().collect::<BTreeSet<_>>()),
         from: None,
         to: (!to.is_empty()).then(|| to.iter().copied().map(DroneId).collect::<BTreeSet<_>>()),
-        air: ChannelModel { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..ChannelModel::default() },
+        channel: ChannelModel { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..ChannelModel::default() },
     };
     let rules = vec![rule(&[Topic::Pose, Topic::Plan], &[], 1.0), rule(&[], &[3], 2.0)];
     let radio = Radio { rules, ..Radio::default() };
-    let due_s = |topic: u16, destination| match radio.verdict(
+    let due_s = |topic: u16, destination| match radio.outcome(
         Link { topic, ..link(0, destination, 0) },
         Vec2::zeros(),
         SimTime::ZERO,
@@ -374,13 +375,13 @@ proptest! {
             topics: topics(t),
             from: drones(from),
             to: drones(to),
-            air: delay(i),
+            channel: delay(i),
         };
         let radio = Radio { rules: conditions.iter().enumerate().map(rule).collect(), ..Radio::default() };
         let mut frame: AirFrame = bytemuck::Zeroable::zeroed();
         (frame.source, frame.frame.kind) = (DroneId(source), kind);
         let (receiver, here) = (DroneId(destination), Vec2::zeros());
-        let airs = radio.airs_at(receiver);
+        let airs = radio.channels_at(receiver);
         prop_assert_eq!(radio.delivery_at(&airs, &frame, here, 20), radio.delivery(&frame, receiver, here, 20));
     }
 }

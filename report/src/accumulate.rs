@@ -10,9 +10,8 @@ use crate::stages::Stages;
 use crate::steps::StepTimer;
 use crate::summary::{Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
 use crate::vicinity::Vicinity;
-use skein_protocol::payload::PHASE_REFORM;
-use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, ROW_LATE, RecordView, RunEvent, Totals};
-use skein_protocol::{SimTime, Vec2};
+use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
+use skein_protocol::{Phase, SimTime, Vec2};
 
 /// Time between two samples of the swarm metrics, s.
 const SAMPLE_S: f64 = 0.1;
@@ -159,7 +158,7 @@ impl Accumulator {
         (self.counts.tick, self.counts.t_s) = (Some(tick), t_s);
         for row in rows {
             self.counts.heard += u64::from(row.heard);
-            self.counts.late += u64::from(row.flags & ROW_LATE != 0);
+            self.counts.late += u64::from(row.is_late());
             if row.alive() {
                 self.steps.take(row.step_ns);
             }
@@ -187,7 +186,7 @@ impl Accumulator {
 
     fn reform(&mut self, t_s: f64, rows: &[DroneRow]) {
         let mut living = rows.iter().filter(|row| row.alive());
-        let reforms = |row: &DroneRow| row.phase == PHASE_REFORM && row.obeyed.ballot.is_some();
+        let reforms = |row: &DroneRow| row.phase() == Phase::Reform && row.obeyed.ballot.is_some();
         if self.reform_start_s.is_none() && self.stages.all_passed() && living.clone().any(reforms) {
             self.reform_start_s = Some(t_s);
         }

@@ -1,7 +1,7 @@
 //! Who led, when two led at once, and how long a group was without a leader after its leader's death.
 
 use crate::summary::{LeaderEntry, Term};
-use skein_protocol::record::{DroneRow, ROW_LEADS};
+use skein_protocol::record::DroneRow;
 use skein_protocol::{Ballot, DroneId, GroupId, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -76,14 +76,14 @@ impl Leading {
 }
 
 fn leads(row: &DroneRow) -> bool {
-    row.alive() && row.flags & ROW_LEADS != 0
+    row.alive() && row.leads()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::row;
-    use skein_protocol::record::ROW_ALIVE;
+    use skein_protocol::record::{ROW_ALIVE, ROW_LEADS};
 
     fn leader(x_m: f64, group: GroupId) -> DroneRow {
         DroneRow { flags: ROW_ALIVE | ROW_LEADS, led: group, ..row(x_m, 0.0) }

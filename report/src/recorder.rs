@@ -9,7 +9,7 @@ use crate::mcap::McapWriter;
 use crate::spool::{self, Spool};
 use crate::summary::Summary;
 use crate::trace::{self, TraceWriter};
-use skein_protocol::record::{RecordSink, RecordView, RunEvent};
+use skein_protocol::record::{RecordSink, RecordView, RunEvent, SinkError};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -58,9 +58,9 @@ impl Recorder {
 }
 
 impl RecordSink for Recorder {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         let taken = events(record).and_then(|events| self.accumulator.take(record, &events));
-        taken.map_err(|error| error.to_string())?;
+        taken.map_err(|error| SinkError::from(error.to_string()))?;
         if let Some(kept) = self.kept.as_mut().filter(|kept| !kept.refused) {
             kept.refused = !kept.spool.take(record);
         }

@@ -148,7 +148,7 @@ impl<R: Read> Records<R> {
 mod tests {
     use super::*;
     use crate::testing::row;
-    use skein_protocol::record::{DroneRow, RecordHead};
+    use skein_protocol::record::{DroneRow, RecordHeader};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
@@ -187,7 +187,7 @@ mod tests {
     fn give(spool: &mut Spool, tick: u64) -> bool {
         let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick as f64, f64::from(drone))).collect();
         let events = vec![b'x'; tick as usize % 11];
-        let head = RecordHead { tick, rows: 4, events_len: events.len() as u32, ..RecordHead::default() };
+        let head = RecordHeader { tick, rows: 4, events_len: events.len() as u32, ..RecordHeader::default() };
         spool.take(RecordView { head: &head, rows: &rows, frames: &[], events: &events })
     }
 

@@ -4,9 +4,9 @@ use crate::facts::{ObstacleSet, RunFacts};
 use crate::summary::{Stage, StageGroup};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
-use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, PHASE_AVOID, Plan};
-use skein_protocol::record::{DroneRow, ROW_QUEUED};
-use skein_protocol::{DroneId, GroupId, Message, PlanStamp};
+use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
+use skein_protocol::record::DroneRow;
+use skein_protocol::{DroneId, GroupId, Message, Phase, PlanStamp};
 use std::collections::BTreeMap;
 
 /// All stages of a mission.
@@ -86,7 +86,7 @@ impl Stages {
         let planned = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
         for frame in frames.iter().filter(planned) {
             match Message::decode(&frame.frame) {
-                Ok(Message::Plan(plan)) if plan.phase == PHASE_AVOID => {
+                Ok(Message::Plan(plan)) if plan.phase() == Phase::Avoid => {
                     self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
                 }
                 Ok(Message::Assignment(Assignment { id, drone, leader, .. })) => {
@@ -101,7 +101,7 @@ impl Stages {
     /// Takes the rows of a tick: until a drone is past the gate, what it obeys may change.
     pub fn take(&mut self, rows: &[DroneRow]) {
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
-            let queued = row.flags & ROW_QUEUED != 0 && row.route != NO_ROUTE;
+            let queued = row.is_queued() && row.route != NO_ROUTE;
             let plan = self.plans.get(&row.obeyed).filter(|_| queued);
             let ahead = self.stages.iter_mut().filter(|stage| stage.beyond.get(drone) == Some(&false));
             for stage in ahead {

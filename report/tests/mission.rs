@@ -3,10 +3,10 @@
 
 use skein_protocol::formation::Shape;
 use skein_protocol::frame::AirFrame;
-use skein_protocol::payload::{Assignment, MAX_SET, PHASE_AVOID, PHASE_REFORM, Plan};
+use skein_protocol::payload::{Assignment, MAX_SET, Plan};
 use skein_protocol::record::*;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 use skein_report::{Manifest, MissionEnd, Recorder, RunCompletion, RunFacts, RunFolder, Summary};
 
 /// Last tick; a tick is 0.1 s.
@@ -50,7 +50,7 @@ fn row(tick: u64, drone: usize) -> DroneRow {
     let dead = drone == 3 && tick >= DEATH;
     let t_s = (if dead { DEATH } else { tick + 1 }) as f64 * 0.1;
     let leads = if tick < DEATH { drone == 3 } else { drone == 0 && tick >= LED };
-    let phase = if tick < 50 { PHASE_AVOID } else { PHASE_REFORM };
+    let phase = if tick < 50 { Phase::Avoid } else { Phase::Reform };
     let (group, route) = if drone == 2 { (GroupId::ALL.child(2), 0) } else { (GroupId::ALL.child(1), 1) };
     let queued = (10..50).contains(&tick);
     let flags = [(!dead, ROW_ALIVE), (leads && !dead, ROW_LEADS), (queued, ROW_QUEUED)];
@@ -61,7 +61,7 @@ fn row(tick: u64, drone: usize) -> DroneRow {
         obeyed: if tick < 10 { PlanStamp::default() } else { STAMP },
         group,
         flags: flags.into_iter().filter(|flag| flag.0).map(|flag| flag.1).sum(),
-        phase: if tick < 10 { 0 } else { phase },
+        phase: if tick < 10 { Phase::Cruise } else { phase }.to_wire(),
         heard: 3,
         step_ns: 20_000,
         route,
@@ -77,7 +77,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         stamp: SimTime::from_secs(tick as f64 * 0.1),
         id: STAMP,
         group: GroupId::ALL,
-        phase: PHASE_AVOID,
+        phase: Phase::Avoid.to_wire(),
         members: 4,
         anchor_m: [0.0; 2],
         anchor_mps: [10.0, 0.0],
@@ -108,7 +108,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         sequence: sequence as u32,
         position_m: [0.0; 2],
         queue_ns: 0,
-        cuts: Default::default(),
+        link_faults: Default::default(),
         frame: message.encode(),
     };
     // Said when it is made, and repeated with another time stamp.
@@ -168,10 +168,10 @@ fn end() -> RunEvent {
     }
 }
 
-fn give(recorder: &mut Recorder, tick: u64, frames: &[AirFrame], events: &[RunEvent]) -> Result<(), String> {
+fn give(recorder: &mut Recorder, tick: u64, frames: &[AirFrame], events: &[RunEvent]) -> Result<(), SinkError> {
     let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick, drone)).collect();
     let lines: Vec<String> = events.iter().map(|event| serde_json::to_string(event).unwrap() + "\n").collect();
-    let head = RecordHead {
+    let head = RecordHeader {
         tick,
         now: SimTime((tick as i64 + 1) * 100_000_000),
         rows: 4,
@@ -290,11 +290,11 @@ fn a_run_that_never_began_is_a_summary_too() {
 fn a_broken_record_is_refused_with_its_tick() {
     let mut recorder = Recorder::in_memory(RunFacts { drones: 5, ..facts() });
     let error = give(&mut recorder, 3, &[], &[]).unwrap_err();
-    assert_eq!(error, "tick 3: expected a record of 5 rows, one per drone, found 4");
-    let head = RecordHead { tick: 7, ..RecordHead::default() };
+    assert_eq!(error.to_string(), "tick 3: expected a record of 5 rows, one per drone, found 4");
+    let head = RecordHeader { tick: 7, ..RecordHeader::default() };
     let record = RecordView { head: &head, rows: &[], frames: &[], events: b"{\"t_s\": 1}\n" };
     let error = recorder.take(record).unwrap_err();
-    assert!(error.starts_with("tick 7: expected an event"), "{error}");
+    assert!(error.to_string().starts_with("tick 7: expected an event"), "{error}");
 }
 
 /// Every key that the summary promises, `a.b` for a key of an object, `a[].b` for one of its entries.

@@ -85,7 +85,7 @@ impl Lateness {
     /// Mean, median, 99th percentile and maximum, s.
     #[must_use]
     pub fn spread(&self) -> Percentiles {
-        histogram::spread(&self.bins, self.max_us, 1e-6)
+        histogram::percentiles(&self.bins, self.max_us, 1e-6)
     }
 }
 

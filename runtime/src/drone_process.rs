@@ -3,8 +3,8 @@
 use crate::pilot_host::{PilotHost, StepScratch};
 use crate::{PilotKind, RuntimeError, mission};
 use skein_bus::{
-    BusError, Control, Domain, DownlinkSubscriber, DroneEnd, PinMode, SHARD_DRONES, Services, TickSignal, UplinkHeader,
-    UplinkPublisher, pin_to_core, raise_file_limit,
+    BusError, Control, Domain, DownlinkSubscriber, DroneEndpoint, PinMode, SHARD_DRONES, Services, TickSignal,
+    UplinkHeader, UplinkPublisher, pin_to_core, raise_file_limit,
 };
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
@@ -110,7 +110,7 @@ pub fn fly(
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", range.first))?;
     let seat = |id: DroneId| -> Result<DroneHandle, RuntimeError> {
-        let barrier = DroneEnd::new(Arc::clone(&control), id.index())?.bound();
+        let barrier = DroneEndpoint::new(Arc::clone(&control), id.index())?.bound();
         Ok(DroneHandle { id, pilot_host: make(&scenario, id), barrier, slot: Slot::default() })
     };
     let handles: Vec<DroneHandle> = range.ids().map(seat).collect::<Result<_, _>>()?;
@@ -132,7 +132,7 @@ pub fn fly(
 struct DroneHandle {
     id: DroneId,
     pilot_host: PilotHost,
-    barrier: DroneEnd,
+    barrier: DroneEndpoint,
     slot: Slot,
 }
 

@@ -115,6 +115,6 @@ fn carry_out(order: ProcessCommand, handles: &mut [DroneHandle], make: impl Fn(D
 /// An error stops the recording, never the mission.
 fn keep(sink: &mut dyn RecordSink, world: &skein_world::World, error: &mut Option<String>) {
     if error.is_none() {
-        *error = sink.take(world.record()).err();
+        *error = sink.take(world.record()).err().map(|error| error.to_string());
     }
 }

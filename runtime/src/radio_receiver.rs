@@ -2,12 +2,12 @@
 
 use skein_agent::Heard;
 use skein_protocol::digest::Digest;
-use skein_protocol::downlink::{DownlinkView, SenseHead};
+use skein_protocol::downlink::{DownlinkView, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::message::Topic;
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio, TransmitTimes};
+use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio, ReceiverChannels};
 use skein_protocol::slot::LinkStats;
 use skein_protocol::{DroneId, MessageRef, SimTime};
 use std::cmp::Reverse;
@@ -39,7 +39,7 @@ pub(crate) struct RadioReceiver {
     me: DroneId,
     dt_ns: i64,
     radio: Arc<Radio>,
-    airs: TransmitTimes,
+    airs: ReceiverChannels,
     /// How far it hears each topic, m.
     reach_m: [f64; Topic::ALL.len()],
     /// Due in a later tick than they come in: the one due first is the first.
@@ -67,7 +67,7 @@ impl RadioReceiver {
             me,
             dt_ns,
             reach_m: Topic::ALL.map(|topic| radio.reach_m(topic, me)),
-            airs: radio.airs_at(me),
+            airs: radio.channels_at(me),
             radio,
             pending: BinaryHeap::new(),
             kept: Vec::new(),
@@ -90,7 +90,7 @@ impl RadioReceiver {
         stats: &mut LinkStats,
     ) {
         let Some(own) = down.drones.get(self.me.index()) else { return };
-        if own.cuts != LinkFaults::default() || !self.hears_nearby(&down.nearby.locality) {
+        if own.link_faults != LinkFaults::default() || !self.hears_nearby(&down.nearby.locality) {
             let frames = 0..down.frames.len();
             frames.for_each(|place| _ = self.take_up((own, now), down.frames, place, arrived, stats));
             return;
@@ -112,14 +112,14 @@ impl RadioReceiver {
     /// Takes up one frame of somebody else; the number of those that there were, 1 or 0.
     fn take_up(
         &mut self,
-        (own, now): (&SenseHead, SimTime),
+        (own, now): (&SensesHeader, SimTime),
         frames: &[AirFrame],
         place: usize,
         arrived: &mut Vec<Pending>,
         stats: &mut LinkStats,
     ) -> usize {
         let Some(frame) = frames.get(place).filter(|frame| frame.source != self.me) else { return 0 };
-        if let Some(reason) = own.cut_off(frame) {
+        if let Some(reason) = own.drop_reason(frame) {
             self.drop_frames(reason, 1, stats);
             return 1;
         }

@@ -194,7 +194,8 @@ impl Supervisor<'_, '_, '_> {
             };
             if self.end.sink_error.is_none() {
                 let taken = RecordView::parse(sample.bytes()).map_err(|error| error.to_string());
-                self.end.sink_error = taken.and_then(|view| self.sink.take(view)).err();
+                self.end.sink_error =
+                    taken.and_then(|view| self.sink.take(view).map_err(|error| error.to_string())).err();
             }
         }
     }

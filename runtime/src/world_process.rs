@@ -8,7 +8,7 @@ use skein_bus::{
     shards,
 };
 use skein_protocol::DroneId;
-use skein_protocol::record::{FaultKind, RecordHead, RecordView};
+use skein_protocol::record::{FaultKind, RecordHeader, RecordView};
 use skein_protocol::slot::LinkStats;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
@@ -261,7 +261,7 @@ impl WorldServer {
     /// Whether it was delivered.
     fn send_record(&self) -> Result<bool, RuntimeError> {
         let record = self.world.record();
-        let head = RecordHead { events_len: self.untold.len() as u32, lost: self.lost, ..*record.head };
+        let head = RecordHeader { events_len: self.untold.len() as u32, lost: self.lost, ..*record.head };
         let record = RecordView { head: &head, events: &self.untold, ..record };
         // Not what the handler of a full buffer counted: a sample that it gave up may still be delivered.
         let receivers = self.record.send(head.tick, record.byte_len(), |bytes| record.write_to(bytes))?;

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use skein_agent::{Command, Heard, Pilot};
-use skein_protocol::downlink::{Downlink, SenseHead, Senses};
+use skein_protocol::downlink::{Downlink, Senses, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::Leadership;
@@ -32,7 +32,7 @@ fn said(leads: bool) -> Message {
 }
 
 fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
-    let sense = |&(position_m, _): &([f64; 2], bool)| SenseHead { position_m, alive: 1, ..SenseHead::default() };
+    let sense = |&(position_m, _): &([f64; 2], bool)| SensesHeader { position_m, alive: 1, ..SensesHeader::default() };
     let frame = |(&(position_m, leads), id): (&([f64; 2], bool), u32)| AirFrame {
         source: DroneId(id),
         position_m,
@@ -62,9 +62,9 @@ proptest! {
     ) {
         let short = Range { half_m: 80.0, shadowing_db: 0.0, exponent: 2.0 };
         let air = ChannelModel { loss, range: Some(short), ..ChannelModel::default() };
-        let leading = Rule { topics: Some([Topic::Leadership].into()), air: ChannelModel { range: None, ..air }, ..Rule::default() };
-        let base = Rule { to: Some([DroneId(far)].into()), air: ChannelModel { range: None, ..air }, ..Rule::default() };
-        let radio = Radio { seed: 7, air, rules: vec![leading, base], ..Radio::default() };
+        let leading = Rule { topics: Some([Topic::Leadership].into()), channel: ChannelModel { range: None, ..air }, ..Rule::default() };
+        let base = Rule { to: Some([DroneId(far)].into()), channel: ChannelModel { range: None, ..air }, ..Rule::default() };
+        let radio = Radio { seed: 7, channel: air, rules: vec![leading, base], ..Radio::default() };
         let plain = downlink(&points);
         let mut sorted = plain.clone();
         sorted.index.build(radio.locality(), &sorted.frames);

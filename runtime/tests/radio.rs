@@ -3,7 +3,7 @@
 
 use skein_protocol::SimTime;
 use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio};
-use skein_protocol::record::{EventKind, RecordSink, RecordView, RunEvent, Totals};
+use skein_protocol::record::{EventKind, RecordSink, RecordView, RunEvent, SinkError, Totals};
 use skein_runtime::{inline, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 
@@ -27,7 +27,7 @@ struct Lookup {
 }
 
 impl RecordSink for Lookup {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line);
         for event in record.parse_events(parse).map_err(|error| error.to_string())? {
             if let EventKind::End { totals, .. } = event.what {

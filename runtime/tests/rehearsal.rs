@@ -1,7 +1,7 @@
 //! A leader that rehearses: what it foresees is what happens, and what it chooses is no worse than what it left.
 #![allow(clippy::unwrap_used)]
 
-use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, RunEvent};
+use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, RunEvent, SinkError};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, ScenarioSource};
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ struct Watch {
 }
 
 impl RecordSink for Watch {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         self.digest = record.head.digest;
         if !record.rows.is_empty() {
             self.energy_j = record.rows.iter().map(|row| row.energy_j).sum();

@@ -1,7 +1,7 @@
 //! Whatever goes wrong, those who still fly keep their distances and get there.
 #![allow(clippy::unwrap_used)]
 
-use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView};
+use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, ScenarioSource};
 
@@ -10,7 +10,7 @@ use skein_scenario::{Scenario, ScenarioSource};
 struct Ending(Option<(Outcome, String)>, usize);
 
 impl RecordSink for Ending {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         self.1 += 1;
         for event in record
             .parse_events(|line| serde_json::from_slice(line))

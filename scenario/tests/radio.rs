@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_protocol::message::Topic;
-use skein_protocol::radio::{Burst, ChannelModel, Delay, DelayModel, Link, Radio, Range, Scope, SharedChannel};
+use skein_protocol::radio::{Burst, BurstScope, ChannelModel, Delay, DelayModel, Link, Radio, Range, SharedChannel};
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Preset, Scenario, ScenarioSource};
 
@@ -33,11 +33,11 @@ fn every_key_gets_to_the_radio() {
     let air = ChannelModel {
         delay: Delay { model: DelayModel::Gamma, mean_s: 0.1, jitter_s: 0.02 },
         loss: 0.1,
-        burst: Some(Burst { share: 0.2, length_s: 0.3, loss: 0.9, scope: Scope::Link }),
+        burst: Some(Burst { share: 0.2, length_s: 0.3, loss: 0.9, scope: BurstScope::Link }),
         range: Some(Range { half_m: 300.0, shadowing_db: 4.0, exponent: 2.5 }),
         duplicate: 0.05,
     };
-    assert_eq!(s.radio(), Radio { seed: 7, air, asymmetry: 0.5, rules: Vec::new() });
+    assert_eq!(s.radio(), Radio { seed: 7, channel: air, asymmetry: 0.5, rules: Vec::new() });
     assert_eq!(s.channel(), Some(SharedChannel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
 }
 
@@ -72,15 +72,15 @@ fn the_last_rule_about_a_frame_counts_and_keeps_the_rest() {
     assert!(radio.rules[0].covers(link(0, 1, Topic::Pose)) && !radio.rules[0].covers(link(0, 1, Topic::Plan)));
     assert!(radio.rules[1].covers(link(1, 2, Topic::Plan)));
     assert!(!radio.rules[1].covers(link(2, 1, Topic::Plan)) && !radio.rules[1].covers(link(1, 3, Topic::Plan)));
-    let of = |rule: usize| (radio.rules[rule].air.loss, radio.rules[rule].air.delay.mean_s);
+    let of = |rule: usize| (radio.rules[rule].channel.loss, radio.rules[rule].channel.delay.mean_s);
     assert_eq!((of(0), of(1)), ((0.5, 0.2), (0.1, 1.0)));
-    assert_eq!(radio.rules[0].air.burst.map(|burst| burst.share), Some(0.0));
-    assert_eq!(radio.rules[1].air.burst, radio.air.burst);
+    assert_eq!(radio.rules[0].channel.burst.map(|burst| burst.share), Some(0.0));
+    assert_eq!(radio.rules[1].channel.burst, radio.channel.burst);
     assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
     // Heard at once, if at all, where no rule adds a delay: both rules are about this frame.
-    let due = radio.verdict(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO);
-    let last_rule = Radio { air: radio.rules[1].air, rules: Vec::new(), ..radio };
-    assert_eq!(due, last_rule.verdict(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO));
+    let due = radio.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO);
+    let last_rule = Radio { channel: radio.rules[1].channel, rules: Vec::new(), ..radio };
+    assert_eq!(due, last_rule.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO));
 }
 
 #[test]

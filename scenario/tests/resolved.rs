@@ -41,7 +41,7 @@ fn overrides_are_toml_or_else_words() {
     let s = parse(text, &sets);
     assert_eq!(s.strategy, Strategy::Fixed { left: 5, right: 3 });
     assert_eq!(s.shapes().unwrap()[0].centre(), Vec2::new(300.0, 21.0));
-    let Radio { seed, air, .. } = s.radio();
+    let Radio { seed, channel: air, .. } = s.radio();
     assert_eq!((air.delay.mean_s, air.range.map(|range| range.half_m), seed), (0.2, Some(500.0), i64::MAX as u64));
     assert_eq!(s.faults.failsafe, Failsafe::Land);
     assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);

@@ -1,7 +1,7 @@
 //! A progress bar on a terminal, in front of the recorder.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use skein_protocol::record::{RecordSink, RecordView};
+use skein_protocol::record::{RecordSink, RecordView, SinkError};
 use std::io::IsTerminal;
 
 /// Ticks between two looks at the bar.
@@ -33,7 +33,7 @@ impl<S: RecordSink> Progress<S> {
 }
 
 impl<S: RecordSink> RecordSink for Progress<S> {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         if record.head.tick.is_multiple_of(STRIDE) {
             self.bar.set_position(record.head.tick);
             self.bar.set_message(format!("t = {:.1} s", record.head.now.secs()));

@@ -2,9 +2,9 @@
 
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
-use skein_protocol::payload::{Assignment, NO_ROUTE, PHASE_AVOID, PHASE_CRUISE, Plan};
+use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
 use skein_protocol::record::EventKind;
-use skein_protocol::slot::{SLOT_LEADS, Slot};
+use skein_protocol::slot::Slot;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
 use std::collections::BTreeSet;
 
@@ -49,7 +49,7 @@ impl Decisions {
 
     /// Tells that a drone takes up or lays down leading.
     pub fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut Log) {
-        let leads = (slot.flags & SLOT_LEADS != 0).then_some((slot.led, slot.term));
+        let leads = (slot.leads()).then_some((slot.led, slot.term));
         let before = std::mem::replace(&mut self.0[drone.index()].leading, leads);
         if before == leads {
             return;
@@ -90,15 +90,10 @@ impl Decisions {
 }
 
 fn grouping(plan: &Plan) -> EventKind {
-    let phase = match plan.phase {
-        PHASE_CRUISE => "cruise",
-        PHASE_AVOID => "avoid",
-        _ => "reform",
-    };
     EventKind::Grouping {
         plan: plan.id,
         group: plan.group.to_string(),
-        phase: phase.to_owned(),
+        phase: plan.phase(),
         members: plan.members,
         routes: plan.routes,
         obstacles: plan.set.iter().take(plan.set_count as usize).copied().collect(),
@@ -123,8 +118,9 @@ mod tests {
     use super::*;
     use crate::log::tests::read;
     use crate::testing::happenings;
-    use skein_protocol::ObstacleId;
-    use skein_protocol::payload::{MAX_SET, PHASE_REFORM};
+    use skein_protocol::payload::MAX_SET;
+    use skein_protocol::slot::SLOT_LEADS;
+    use skein_protocol::{ObstacleId, Phase};
 
     fn stamp(round: u32, epoch: u32) -> PlanStamp {
         PlanStamp { ballot: Ballot { round, incarnation: 1, claimant: DroneId(2) }, epoch }
@@ -137,24 +133,24 @@ mod tests {
             sequence: 0,
             position_m: [0.0; 2],
             queue_ns: 0,
-            cuts: Default::default(),
+            link_faults: Default::default(),
             frame: message.encode(),
         }
     }
 
-    fn plan(id: PlanStamp, phase: u32) -> AirFrame {
+    fn plan(id: PlanStamp, phase: Phase) -> AirFrame {
         let mut set = [ObstacleId(0); MAX_SET];
         set[0] = ObstacleId(4);
         on_air(Message::Plan(Plan {
             stamp: SimTime::ZERO,
             id,
             group: GroupId::ALL,
-            phase,
+            phase: phase.to_wire(),
             members: 8,
             anchor_m: [0.0; 2],
             anchor_mps: [10.0, 0.0],
             anchor_stop_x_m: f64::INFINITY,
-            predicted_s: if phase == PHASE_AVOID { 28.5 } else { f64::NAN },
+            predicted_s: if phase == Phase::Avoid { 28.5 } else { f64::NAN },
             candidates: 0,
             routes: 2,
             set_count: 1,
@@ -189,28 +185,28 @@ mod tests {
         let (first, second) = (stamp(1, 1), stamp(1, 2));
         let events = told(&[
             assignment(first, 5, 1),
-            plan(first, PHASE_AVOID),
-            plan(first, PHASE_AVOID),
+            plan(first, Phase::Avoid),
+            plan(first, Phase::Avoid),
             assignment(first, 5, 1),
-            plan(second, PHASE_REFORM),
-            plan(first, PHASE_AVOID),
+            plan(second, Phase::Reform),
+            plan(first, Phase::Avoid),
             assignment(second, 5, NO_ROUTE),
         ]);
         assert_eq!(events.len(), 4);
         let EventKind::Assigned { route: Some(1), rank: 3, group, .. } = &events[0] else { panic!("{:?}", events[0]) };
         assert_eq!(group, "N1");
         let EventKind::Grouping { phase, obstacles, predicted_s, .. } = &events[1] else { panic!("{:?}", events[1]) };
-        assert_eq!((phase.as_str(), &obstacles[..], *predicted_s), ("avoid", &[ObstacleId(4)][..], Some(28.5)));
-        assert!(matches!(&events[2], EventKind::Grouping { phase, predicted_s: None, .. } if phase == "reform"));
+        assert_eq!((*phase, &obstacles[..], *predicted_s), (Phase::Avoid, &[ObstacleId(4)][..], Some(28.5)));
+        assert!(matches!(&events[2], EventKind::Grouping { phase, predicted_s: None, .. } if *phase == Phase::Reform));
         assert!(matches!(events[3], EventKind::Assigned { route: None, .. }));
     }
 
     #[test]
     fn rubbish_is_no_decision() {
-        let mut cut = plan(stamp(1, 1), PHASE_AVOID);
+        let mut cut = plan(stamp(1, 1), Phase::Avoid);
         cut.frame.len = 3;
         let stranger = PlanStamp { ballot: Ballot { claimant: DroneId(99), ..stamp(1, 1).ballot }, epoch: 1 };
-        assert_eq!(told(&[cut, plan(stranger, PHASE_AVOID), assignment(stamp(1, 1), 99, 0)]), []);
+        assert_eq!(told(&[cut, plan(stranger, Phase::Avoid), assignment(stamp(1, 1), 99, 0)]), []);
     }
 
     #[test]

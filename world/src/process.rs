@@ -2,9 +2,10 @@
 
 use crate::body::Body;
 use crate::invariants::Obedience;
+use skein_protocol::flag;
 use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED};
-use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
+use skein_protocol::slot::Slot;
 
 /// How a drone has answered in the current tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,11 +69,10 @@ impl Process {
     }
 
     /// The drone at the end of a tick. Of a dead one's answers only what it obeyed is left.
-    pub fn row(&self, body: &Body, cuts: LinkFaults) -> DroneRow {
+    pub fn row(&self, body: &Body, link_faults: LinkFaults) -> DroneRow {
         let (slot, alive) = (&self.slot, u32::from(body.alive));
-        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-        let flags = flag(slot.flags & SLOT_LEADS != 0, ROW_LEADS)
-            | flag(slot.flags & SLOT_QUEUED != 0, ROW_QUEUED)
+        let flags = flag(slot.leads(), ROW_LEADS)
+            | flag(slot.is_queued(), ROW_QUEUED)
             | flag(self.answer == Answer::Late, ROW_LATE)
             | flag(self.frozen, ROW_FROZEN)
             | ROW_ALIVE;
@@ -88,7 +88,7 @@ impl Process {
             phase: slot.phase,
             heard: alive * slot.heard,
             dropped: slot.dropped.map(|count| alive * count),
-            cuts,
+            link_faults,
             step_ns: alive * slot.step_ns,
             route: slot.route,
             rank: slot.rank,

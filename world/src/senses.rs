@@ -3,11 +3,10 @@
 use crate::body::Body;
 use crate::geometry::{Nearest, Outline};
 use crate::grid::Neighbours;
-use skein_protocol::downlink::{
-    BROKEN_OBSTACLES, BROKEN_RANGING, Downlink, SenseHead, SensedNeighbour, SensedObstacle, SensedShape,
-};
+use skein_protocol::downlink::{Downlink, SensedNeighbour, SensedObstacle, SensedShape, SensesHeader};
 use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::wire::BrokenSensors;
 use skein_protocol::{DroneId, ObstacleId, Vec2};
 
 /// An obstacle that a living drone senses.
@@ -89,9 +88,8 @@ pub(crate) struct SensorFault {
 
 impl SensorFault {
     /// What the drone's sensors say of themselves. One that it does not have is not broken.
-    fn broken(&self, ranging: bool) -> u32 {
-        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-        flag(self.no_obstacles, BROKEN_OBSTACLES) | flag(self.no_ranging && ranging, BROKEN_RANGING)
+    fn broken(&self, ranging: bool) -> BrokenSensors {
+        BrokenSensors { obstacles: self.no_obstacles, ranging: self.no_ranging && ranging }
     }
 }
 
@@ -132,7 +130,7 @@ impl SenseWriter {
             if let (true, Some(range)) = (body.alive && !sensor_fault.no_ranging, ranging_m) {
                 tell_neighbours(body, bodies, around.neighbours.of(drone), range, down);
             }
-            down.drones.push(SenseHead {
+            down.drones.push(SensesHeader {
                 position_m: (body.position + sensor_fault.position_error_m).into(),
                 velocity_mps: (body.velocity + sensor_fault.velocity_error_mps).into(),
                 obstacle_first,
@@ -141,9 +139,9 @@ impl SenseWriter {
                 neighbour_count: down.neighbours.len() as u32 - neighbour_first,
                 alive: u32::from(body.alive),
                 incarnation,
-                cuts: sensor_fault.cuts,
+                link_faults: sensor_fault.cuts,
                 extra_reaction_s: sensor_fault.extra_reaction_s,
-                broken: sensor_fault.broken(ranging_m.is_some()),
+                broken: sensor_fault.broken(ranging_m.is_some()).to_wire(),
                 reserved: 0,
             });
         }
@@ -243,7 +241,7 @@ mod tests {
         let blind = SensorFault { no_ranging: true, ..SensorFault::default() };
         let down = told_to(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), blind);
         assert!(down.neighbours.is_empty());
-        assert_eq!(down.view().senses(DroneId(1)).unwrap().broken, BROKEN_RANGING);
+        assert_eq!(down.view().senses(DroneId(1)).unwrap().broken, BrokenSensors { ranging: true, obstacles: false });
         assert_eq!(told_to(&bodies(&[[0.0, 0.0]]), &[], None, blind).drones[0].broken, 0, "it has none");
         assert!(told(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], None).neighbours.is_empty());
     }

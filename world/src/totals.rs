@@ -7,8 +7,8 @@ use skein_protocol::slot::{LinkStats, Slot};
 /// The totals of the world's own counters; `stats` are those of all radios together, `dt_s` is the width of a bin.
 pub(crate) fn close(counted: &Totals, stats: &LinkStats, dt_s: f64, wall_s: f64) -> Totals {
     Totals {
-        delay_s: histogram::spread(&stats.delay_bins, stats.delay_max, dt_s),
-        age_s: histogram::spread(&stats.age_bins, stats.age_max, dt_s),
+        delay_s: histogram::percentiles(&stats.delay_bins, stats.delay_max, dt_s),
+        age_s: histogram::percentiles(&stats.age_bins, stats.age_max, dt_s),
         wall_s,
         ..counted.clone()
     }

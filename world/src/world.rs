@@ -21,8 +21,8 @@ use skein_protocol::digest::Digest;
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::{DropReason, Queue};
-use skein_protocol::record::{DroneRow, EventKind, FaultKind, Outcome, Percentiles, RecordHead, RecordView, Totals};
+use skein_protocol::radio::{ChannelQueue, DropReason};
+use skein_protocol::record::{DroneRow, EventKind, FaultKind, Outcome, Percentiles, RecordHeader, RecordView, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
@@ -58,9 +58,9 @@ pub struct World {
     /// Frames sent in this tick.
     sent: Vec<AirFrame>,
     /// What they wait in for the channel.
-    queue: Option<Queue>,
+    queue: Option<ChannelQueue>,
     down: Downlink,
-    head: RecordHead,
+    head: RecordHeader,
     rows: Vec<DroneRow>,
     end: Option<(Outcome, String)>,
 }
@@ -93,9 +93,9 @@ impl World {
             digest: Digest::default(),
             folded: Vec::new(),
             sent: Vec::new(),
-            queue: params.channel.map(Queue::new),
+            queue: params.channel.map(ChannelQueue::new),
             down: Downlink::default(),
-            head: RecordHead::default(),
+            head: RecordHeader::default(),
             rows: Vec::new(),
             end: None,
             params,
@@ -151,7 +151,7 @@ impl World {
             sequence: process.next_sequence(),
             position_m,
             queue_ns: 0,
-            cuts,
+            link_faults: cuts,
             frame,
         };
         self.sent.extend(frames.iter().map(stamp));
@@ -199,7 +199,7 @@ impl World {
         self.sent.sort_unstable_by_key(|sent| (sent.source, sent.sequence));
         let (opening, end) = (self.now(), self.time_of(self.tick + 1));
         if let Some(queue) = &mut self.queue {
-            queue.pass(opening, &mut self.sent);
+            queue.schedule(opening, &mut self.sent);
         }
         self.follow_processes(opening);
         self.move_bodies();
@@ -240,7 +240,7 @@ impl World {
         self.log.turn();
         self.rows.clear();
         let events_len = self.log.told().len() as u32;
-        self.head = RecordHead { rows: 0, frames: 0, events_len, digest: self.digest(), ..self.head };
+        self.head = RecordHeader { rows: 0, frames: 0, events_len, digest: self.digest(), ..self.head };
     }
 
     /// How late ticks opened by the wall clock: for [`World::finish`].
@@ -347,7 +347,7 @@ impl World {
         std::mem::swap(&mut self.down.frames, &mut self.sent);
         self.sent.clear();
         self.log.turn();
-        self.head = RecordHead {
+        self.head = RecordHeader {
             tick: self.tick,
             now: end,
             rows: self.rows.len() as u32,

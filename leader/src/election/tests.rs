@@ -1,4 +1,5 @@
 use super::*;
+use skein_protocol::LeadershipKind;
 
 const PARAMS: ElectionParams = ElectionParams { heartbeat_period_s: 0.2, leader_timeout_s: 1.0, wait_s: 0.2 };
 const N: GroupId = GroupId::ALL;
@@ -28,15 +29,15 @@ fn sign(drone: &mut Election, now_s: f64, ballot: Ballot, scope: GroupId, named:
 }
 
 /// Ticks a drone every 20 ms until it says something of this kind.
-fn until_said(drone: &mut Election, from_s: f64, closer: usize, kind: u32) -> (f64, Leadership) {
+fn until_said(drone: &mut Election, from_s: f64, closer: usize, kind: LeadershipKind) -> (f64, Leadership) {
     (0..500)
         .map(|i| from_s + f64::from(i) * 0.02)
-        .find_map(|t| tick(drone, t, closer).filter(|said| said.kind == kind).map(|said| (t, said)))
+        .find_map(|t| tick(drone, t, closer).filter(|said| said.kind() == kind).map(|said| (t, said)))
         .expect("says something within ten seconds")
 }
 
 fn claim(drone: &mut Election, from_s: f64, closer: usize) -> (f64, Leadership) {
-    until_said(drone, from_s, closer, LEADERSHIP_CLAIM)
+    until_said(drone, from_s, closer, LeadershipKind::Claim)
 }
 
 #[test]
@@ -84,7 +85,7 @@ fn a_silent_leader_is_asked_for_and_replaced_and_steps_down_when_it_wakes() {
     let (mut old, mut heir) = (machine(1), machine(2));
     let (t, said) = claim(&mut old, 0.0, 0);
     heir.handle(at(t), 0, Input::Heard(said));
-    let (asked, probe) = until_said(&mut heir, t, 0, LEADERSHIP_PROBE);
+    let (asked, probe) = until_said(&mut heir, t, 0, LeadershipKind::PreVote);
     assert!(asked >= t + PARAMS.leader_timeout_s - PARAMS.wait_s - 1e-9);
     assert_eq!((probe.ballot, probe.stamp), (said.ballot, at(t)));
     let (later, next) = claim(&mut heir, asked + 0.02, 0);
@@ -100,9 +101,9 @@ fn whoever_heard_of_the_leader_objects_to_a_claim() {
     let (t, said) = claim(&mut leader, 0.0, 0);
     deaf.handle(at(t), 0, Input::Heard(said));
     sign(&mut other, t + 0.7, said.ballot, N, false);
-    let (asked, probe) = until_said(&mut deaf, t, 0, LEADERSHIP_PROBE);
+    let (asked, probe) = until_said(&mut deaf, t, 0, LeadershipKind::PreVote);
     let objection = other.handle(at(asked), 0, Input::Heard(probe)).expect("it heard of the leader since");
-    assert_eq!((objection.kind, objection.stamp), (LEADERSHIP_OBJECTION, at(t + 0.7)));
+    assert_eq!((objection.kind(), objection.stamp), (LeadershipKind::PreVoteRejection, at(t + 0.7)));
     let (mut told, mut untold) = (deaf.clone(), deaf);
     told.handle(at(asked + 0.02), 0, Input::Heard(objection));
     assert!((1..60).all(|i| tick(&mut told, asked + 0.02 + 0.01 * f64::from(i), 0).is_none()));
@@ -119,7 +120,7 @@ fn an_objection_counts_for_what_it_knows_and_not_for_the_future() {
     let mut drone = machine(2);
     sign(&mut drone, 0.0, ballot(1, 1), N, false);
     let objection = |stamp| {
-        let kind = LEADERSHIP_OBJECTION;
+        let kind = LeadershipKind::PreVoteRejection.to_wire();
         Input::Heard(Leadership { stamp, ballot: ballot(1, 1), kind, group: N, epoch: 0, heir: DroneId::NONE })
     };
     drone.handle(at(1.0), 0, objection(at(60.0)));
@@ -134,7 +135,7 @@ fn heartbeats_and_plans_keep_a_leader_in_office() {
     let (mut t, mut said) = claim(&mut leader, 0.0, 3);
     for _ in 0..20 {
         member.handle(at(t), 0, Input::Heard(said));
-        (t, said) = until_said(&mut leader, t + 0.02, 3, LEADERSHIP_HEARTBEAT);
+        (t, said) = until_said(&mut leader, t + 0.02, 3, LeadershipKind::Heartbeat);
         assert!(tick(&mut member, t, 0).is_none() && member.has_leader(at(t)));
     }
     for step in 1..10 {
@@ -186,7 +187,7 @@ fn whoever_missed_the_split_waits_to_be_taken_in_and_leads_no_more() {
         let times_s = (0..100).map(|i| from_s + 0.2 * f64::from(i));
         times_s.into_iter().find(|&now_s| {
             sign(leader, now_s, ballot(4, 2), N.child(1), false);
-            tick(leader, now_s, 0).is_some_and(|said| said.kind == LEADERSHIP_CLAIM)
+            tick(leader, now_s, 0).is_some_and(|said| said.kind() == LeadershipKind::Claim)
         })
     };
     let mut alone = leader.clone();
@@ -217,7 +218,7 @@ fn a_slow_air_is_given_time_to_answer() {
     sign(&mut drone, 0.0, ballot(1, 2), N, false);
     let slow = |now_s: f64, drone: &mut Election| drone.handle(at(now_s), 0, Input::Tick { closer: 1, delay_s: 1.0 });
     assert!(slow(0.4, &mut drone).is_none(), "half of the patience at least");
-    assert_eq!(slow(0.5, &mut drone).map(|said| said.kind), Some(LEADERSHIP_PROBE));
+    assert_eq!(slow(0.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::PreVote));
     assert!(slow(3.4, &mut drone).is_none(), "two ways for the answer, one for a claim of the other");
-    assert_eq!(slow(3.5, &mut drone).map(|said| said.kind), Some(LEADERSHIP_CLAIM));
+    assert_eq!(slow(3.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::Claim));
 }

@@ -9,8 +9,7 @@
 
 use crate::swarm::{Breach, Periods, Watch, discord, disunion, hash, params, step, wall};
 use skein_leader::leading::{Leading, Own};
-use skein_protocol::payload::PHASE_REFORM;
-use skein_protocol::{DroneId, GroupId, Message, SimTime, Vec2};
+use skein_protocol::{DroneId, GroupId, Message, Phase, SimTime, Vec2};
 use stateright::{Model, Property};
 use std::fmt::Write;
 use std::hash::{Hash, Hasher};
@@ -335,7 +334,7 @@ impl Model for Mission {
                 (1..=2).all(|number| led.contains(&GroupId::ALL.child(number)))
             }),
             Property::sometimes("all fly in formation again", |_, s: &State| {
-                let part = |l: &Leading| l.obeyed().is_some_and(|bundle| bundle.plan.phase == PHASE_REFORM);
+                let part = |l: &Leading| l.obeyed().is_some_and(|bundle| bundle.plan.phase() == Phase::Reform);
                 let all = s.processes.iter().all(|p| p.machine.as_ref().is_some_and(|l| part(l)));
                 all && s.sides().iter().all(|side| discord(side).is_none())
             }),

@@ -12,7 +12,7 @@ pub const BLOCK_BURSTS: f64 = 64.0;
 
 /// Whom a burst befalls together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Scope {
+pub enum BurstScope {
     /// One direction of one link.
     #[default]
     Direction,
@@ -32,7 +32,7 @@ pub struct Burst {
     /// Probability that a frame is lost in a burst, 0 to 1.
     pub loss: f64,
     /// Whom a burst befalls.
-    pub scope: Scope,
+    pub scope: BurstScope,
 }
 
 impl Burst {
@@ -42,9 +42,9 @@ impl Burst {
         BLOCK_BURSTS * self.length_s
     }
 
-    /// Whether a burst rages on a link.
+    /// Whether a burst is_active on a link.
     #[must_use]
-    pub fn rages(&self, seed: u64, link: Link, at: SimTime) -> bool {
+    pub fn is_active(&self, seed: u64, link: Link, at: SimTime) -> bool {
         if self.share <= 0.0 || self.share >= 1.0 {
             return self.share > 0.0;
         }
@@ -52,13 +52,13 @@ impl Burst {
         let (block, mut left_s) = (at.0.div_euclid(block_ns), SimTime(at.0.rem_euclid(block_ns)).secs());
         let mut draws = KeyedRng::of_pair(seed, self.pair(link), block, b"brst");
         let (burst_s, quiet_s) = self.means_s();
-        let mut rages = draws.unit() < self.share;
+        let mut active = draws.unit() < self.share;
         loop {
-            left_s -= draws.exponential(if rages { burst_s } else { quiet_s });
+            left_s -= draws.exponential(if active { burst_s } else { quiet_s });
             if left_s < 0.0 {
-                return rages;
+                return active;
             }
-            rages = !rages;
+            active = !active;
         }
     }
 
@@ -71,9 +71,9 @@ impl Burst {
 
     fn pair(&self, Link { source, destination, .. }: Link) -> [DroneId; 2] {
         match self.scope {
-            Scope::Direction => [source, destination],
-            Scope::Link => [source.min(destination), source.max(destination)],
-            Scope::Swarm => [DroneId::NONE; 2],
+            BurstScope::Direction => [source, destination],
+            BurstScope::Link => [source.min(destination), source.max(destination)],
+            BurstScope::Swarm => [DroneId::NONE; 2],
         }
     }
 }

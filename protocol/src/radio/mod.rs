@@ -8,10 +8,10 @@ mod key;
 mod rule;
 mod shared_channel;
 
-pub use burst::{BLOCK_BURSTS, Burst, Scope};
+pub use burst::{BLOCK_BURSTS, Burst, BurstScope};
 pub use channel_model::{ChannelModel, Delay, DelayModel, Range};
 pub use rule::Rule;
-pub use shared_channel::{NEVER_AIRED, Queue, SharedChannel};
+pub use shared_channel::{ChannelQueue, NEVER_TRANSMITTED, SharedChannel};
 
 use crate::Vec2;
 use crate::frame::AirFrame;
@@ -59,7 +59,8 @@ pub struct Radio {
     /// Key of all verdicts.
     pub seed: u64,
     /// What the air does where no rule says otherwise.
-    pub air: ChannelModel,
+    #[serde(rename = "air")]
+    pub channel: ChannelModel,
     /// How different the directions of a link are, from 0: one has its delay and its loss multiplied, the other
     /// divided, by a factor drawn for each pair of drones, log-uniformly from 1 to 1 + this.
     pub asymmetry: f64,
@@ -67,12 +68,12 @@ pub struct Radio {
     pub rules: Vec<Rule>,
 }
 
-/// In [`TransmitTimes::places`]: the air where no rule says otherwise.
+/// In [`ReceiverChannels::places`]: the air where no rule says otherwise.
 const GENERAL: u16 = u16::MAX;
 
 /// What air each topic goes through to one receiver: rules are looked up once, not for every frame.
 #[derive(Clone, Copy, Debug)]
-pub struct TransmitTimes {
+pub struct ReceiverChannels {
     receiver: DroneId,
     /// A rule's place; `None`: it depends on who sends.
     places: [Option<u16>; Topic::ALL.len()],
@@ -122,11 +123,11 @@ pub enum Delivery {
 impl Radio {
     /// What becomes of a frame that went on the air at `aired` and flew over `path` (from sender to receiver, m).
     #[must_use]
-    pub fn verdict(&self, link: Link, path: Vec2, aired: SimTime) -> Delivery {
-        self.verdict_in(self.air_of(link), link, path, aired)
+    pub fn outcome(&self, link: Link, path: Vec2, aired: SimTime) -> Delivery {
+        self.outcome_in(self.air_of(link), link, path, aired)
     }
 
-    fn verdict_in(&self, air: &ChannelModel, link: Link, path: Vec2, aired: SimTime) -> Delivery {
+    fn outcome_in(&self, air: &ChannelModel, link: Link, path: Vec2, aired: SimTime) -> Delivery {
         let chance = |purpose| KeyedRng::of_frame(self.seed, link, purpose).unit();
         if let Some(range) = air.range {
             let heard = range.heard(path.norm_squared());
@@ -135,7 +136,7 @@ impl Radio {
             }
         }
         if let Some(burst) = air.burst
-            && burst.rages(self.seed, link, aired)
+            && burst.is_active(self.seed, link, aired)
             && chance(b"lstb") < burst.loss
         {
             return Delivery::Drop(DropReason::Burst);
@@ -157,39 +158,39 @@ impl Radio {
     #[must_use]
     pub fn delivery(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, receiver);
-        self.fate_in(self.air_of(link), frame, (link, here), dt_ns)
+        self.delivery_in(self.air_of(link), frame, (link, here), dt_ns)
     }
 
     /// The same for a receiver whose airs were looked up beforehand.
     #[must_use]
-    pub fn delivery_at(&self, airs: &TransmitTimes, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Delivery {
+    pub fn delivery_at(&self, airs: &ReceiverChannels, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, airs.receiver);
         let place = airs.places.get(usize::from(link.topic).wrapping_sub(1)).copied().flatten();
         let known = place.and_then(|place| match place {
-            GENERAL => Some(&self.air),
-            rule => self.rules.get(usize::from(rule)).map(|rule| &rule.air),
+            GENERAL => Some(&self.channel),
+            rule => self.rules.get(usize::from(rule)).map(|rule| &rule.channel),
         });
-        self.fate_in(known.unwrap_or_else(|| self.air_of(link)), frame, (link, here), dt_ns)
+        self.delivery_in(known.unwrap_or_else(|| self.air_of(link)), frame, (link, here), dt_ns)
     }
 
-    fn fate_in(&self, air: &ChannelModel, frame: &AirFrame, (link, here): (Link, Vec2), dt_ns: i64) -> Delivery {
-        if frame.queue_ns == NEVER_AIRED {
+    fn delivery_in(&self, air: &ChannelModel, frame: &AirFrame, (link, here): (Link, Vec2), dt_ns: i64) -> Delivery {
+        if frame.queue_ns == NEVER_TRANSMITTED {
             return Delivery::Drop(DropReason::Queue);
         }
         let sent = SimTime((frame.tick as i64).saturating_mul(dt_ns));
         let aired = sent + i64::try_from(frame.queue_ns).unwrap_or(i64::MAX);
-        self.verdict_in(air, link, here - frame.position(), aired)
+        self.outcome_in(air, link, here - frame.position(), aired)
     }
 
     /// What air each topic goes through to a receiver, where that is the same for all senders.
     #[must_use]
-    pub fn airs_at(&self, receiver: DroneId) -> TransmitTimes {
+    pub fn channels_at(&self, receiver: DroneId) -> ReceiverChannels {
         let at = |rule: &Rule, topic| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
         let place = |topic| {
             let Some(last) = self.rules.iter().rposition(|rule| at(rule, topic)) else { return Some(GENERAL) };
             u16::try_from(last).ok().filter(|&place| place != GENERAL && self.rules[last].from.is_none())
         };
-        TransmitTimes { receiver, places: Topic::ALL.map(place) }
+        ReceiverChannels { receiver, places: Topic::ALL.map(place) }
     }
 
     /// Looks up what became of every frame in a tick's record, at every other drone that was alive at the tick's end.
@@ -212,7 +213,7 @@ impl Radio {
     pub fn locality(&self) -> Locality {
         let reach_m = |topic| {
             let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(topic);
-            self.rules.iter().rev().find(general).map_or(&self.air, |rule| &rule.air).reach_m()
+            self.rules.iter().rev().find(general).map_or(&self.channel, |rule| &rule.channel).reach_m()
         };
         let cell_m = reach_m(Topic::Pose);
         let local = |topic: &Topic| cell_m.is_finite() && reach_m(*topic) <= cell_m;
@@ -225,16 +226,16 @@ impl Radio {
         let mut reach_m = 0f64;
         let at = |rule: &&Rule| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
         for rule in self.rules.iter().rev().filter(at) {
-            reach_m = reach_m.max(rule.air.reach_m());
+            reach_m = reach_m.max(rule.channel.reach_m());
             if rule.from.is_none() {
                 return reach_m;
             }
         }
-        reach_m.max(self.air.reach_m())
+        reach_m.max(self.channel.reach_m())
     }
 
     fn air_of(&self, link: Link) -> &ChannelModel {
-        self.rules.iter().rev().find(|rule| rule.covers(link)).map_or(&self.air, |rule| &rule.air)
+        self.rules.iter().rev().find(|rule| rule.covers(link)).map_or(&self.channel, |rule| &rule.channel)
     }
 
     /// By what delay and loss of this direction are multiplied; the other direction's factor is its inverse.

@@ -16,7 +16,8 @@ pub struct Rule {
     /// At these receivers; `None`: at all.
     pub to: Option<BTreeSet<DroneId>>,
     /// What the air does to them.
-    pub air: ChannelModel,
+    #[serde(rename = "air")]
+    pub channel: ChannelModel,
 }
 
 impl Rule {

@@ -5,7 +5,7 @@ use crate::time::SimTime;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// [`AirFrame::queue_ns`] of a frame that never was on the air: it would have waited longer than the limit.
-pub const NEVER_AIRED: u64 = u64::MAX;
+pub const NEVER_TRANSMITTED: u64 = u64::MAX;
 
 /// Bytes of a frame before its payload: kind, version, length.
 const HEAD_BYTES: u64 = 8;
@@ -32,14 +32,14 @@ impl SharedChannel {
 
 /// A channel and the frames that wait for it.
 #[derive(Clone, Debug)]
-pub struct Queue {
+pub struct ChannelQueue {
     channel: SharedChannel,
     /// When the channel is free again.
     free: SimTime,
     order: Vec<usize>,
 }
 
-impl Queue {
+impl ChannelQueue {
     /// An empty queue.
     #[must_use]
     pub fn new(channel: SharedChannel) -> Self {
@@ -48,7 +48,7 @@ impl Queue {
 
     /// Queues all frames of one tick, sent at `sent`, behind those of earlier ticks: sets how long each waits and takes
     /// the channel. Who comes first in a tick is drawn, one drone's frames stay in their order.
-    pub fn pass(&mut self, sent: SimTime, frames: &mut [AirFrame]) {
+    pub fn schedule(&mut self, sent: SimTime, frames: &mut [AirFrame]) {
         let seed = self.channel.seed;
         self.order.clear();
         self.order.extend(0..frames.len());
@@ -64,7 +64,7 @@ impl Queue {
             let start = self.free.max(sent);
             let airtime_ns = self.channel.airtime_ns(frame);
             if start - sent > limit_ns {
-                frame.queue_ns = NEVER_AIRED;
+                frame.queue_ns = NEVER_TRANSMITTED;
                 continue;
             }
             self.free = start + i64::try_from(airtime_ns).unwrap_or(i64::MAX);

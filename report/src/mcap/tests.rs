@@ -1,7 +1,7 @@
 use super::*;
 use crate::testing::{facts, row};
 use skein_protocol::DroneId;
-use skein_protocol::record::{DroneRow, FaultKind, Outcome, ROW_LEADS, RecordHead, Totals};
+use skein_protocol::record::{DroneRow, FaultKind, Outcome, ROW_LEADS, RecordHeader, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{GroupId, Vec2};
 
@@ -21,7 +21,7 @@ fn record(folder: &Path, wall: u32) -> PathBuf {
                 DroneRow { step_ns: wall, group: GroupId::ALL.child(1), flags: at.flags | leads, ..at }
             })
             .collect();
-        let head = RecordHead { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHead::default() };
+        let head = RecordHeader { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHeader::default() };
         let events = events(tick, wall);
         writer.take(RecordView { head: &head, rows: &rows, frames: &[], events: &[] }, &events).unwrap();
     }

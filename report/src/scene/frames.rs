@@ -2,9 +2,9 @@
 
 use crate::scene::facts::SceneFacts;
 use serde::Serialize;
+use skein_protocol::LeadershipKind;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
-use skein_protocol::payload::{LEADERSHIP_CLAIM, LEADERSHIP_HEARTBEAT, LEADERSHIP_OBJECTION, LEADERSHIP_PROBE};
 use skein_protocol::radio::{Delivery, DropReason};
 use skein_protocol::record::DroneRow;
 use skein_protocol::{DroneId, Message, Vec2};
@@ -21,7 +21,7 @@ pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, 
     if Message::decode(&frame.frame).is_err() {
         return letter(DropReason::Malformed);
     }
-    if let Some(reason) = row.cuts.cut_off(frame.cuts) {
+    if let Some(reason) = row.link_faults.drop_reason(frame.link_faults) {
         return letter(reason);
     }
     match scene.radio.delivery(frame, receiver, Vec2::from(row.position_m), dt_ns) {
@@ -58,17 +58,17 @@ pub(super) fn content(frame: &AirFrame) -> String {
         Ok(Message::Pose(_)) => String::new(),
         Ok(Message::Obstacle(obstacle)) => format!("obstacle {}, seen by {}", obstacle.id.0, obstacle.witness),
         Ok(Message::Leadership(said)) => {
-            let what = match said.kind {
-                LEADERSHIP_CLAIM => "claims",
-                LEADERSHIP_HEARTBEAT => "leads",
-                LEADERSHIP_PROBE => "misses the leader of",
-                LEADERSHIP_OBJECTION => "heard of the leader of",
-                _ => "hands over",
+            let what = match said.kind() {
+                LeadershipKind::Claim => "claims",
+                LeadershipKind::Heartbeat => "leads",
+                LeadershipKind::PreVote => "misses the leader of",
+                LeadershipKind::PreVoteRejection => "heard of the leader of",
+                LeadershipKind::LeadershipTransfer => "hands over",
             };
             format!("{what} {}, round {}", said.group, said.ballot.round)
         }
         Ok(Message::Plan(plan)) => {
-            let phase = ["cruise", "avoid", "reform"].get(plan.phase as usize).copied().unwrap_or("plan");
+            let phase = plan.phase();
             let set: Vec<String> = plan.set.iter().take(plan.set_count as usize).map(|id| id.0.to_string()).collect();
             let past = if set.is_empty() { String::new() } else { format!(", obstacles {}", set.join(", ")) };
             format!("{phase} {}, round {} epoch {}{past}", plan.group, plan.id.ballot.round, plan.id.epoch)
@@ -96,7 +96,7 @@ mod tests {
             sequence,
             position_m: [0.0; 2],
             queue_ns: 0,
-            cuts: Default::default(),
+            link_faults: Default::default(),
             frame: Message::Passed(said).encode(),
         }
     }
@@ -109,7 +109,7 @@ mod tests {
     fn a_frame_has_a_delivery_at_each_receiver() {
         let rows = [row(0.0, 0.0), row(10.0, 0.0), row(50.0, 0.0), DroneRow::default()];
         let near = scene(Radio {
-            air: ChannelModel {
+            channel: ChannelModel {
                 range: Some(Range { half_m: 20.0, shadowing_db: 0.0, exponent: 2.0 }),
                 ..ChannelModel::default()
             },
@@ -119,7 +119,7 @@ mod tests {
             (0..4).map(|drone| delivery(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
         };
         assert_eq!(deliveries(&near, &frame(0)), "-hr-");
-        let lossy = scene(Radio { air: ChannelModel { loss: 1.0, ..ChannelModel::default() }, ..Radio::default() });
+        let lossy = scene(Radio { channel: ChannelModel { loss: 1.0, ..ChannelModel::default() }, ..Radio::default() });
         assert_eq!(deliveries(&lossy, &frame(0)), "-ll-");
         let mut broken = frame(0);
         broken.frame.len = 1;

@@ -7,7 +7,7 @@ use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State};
 use crate::scene::slots::Slots;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::radio::DropReason;
-use skein_protocol::record::{DroneRow, ROW_LATE, ROW_LEADS, RecordView};
+use skein_protocol::record::{DroneRow, RecordView};
 use skein_protocol::{DroneId, SimTime};
 use std::collections::BTreeMap;
 
@@ -111,14 +111,14 @@ impl Observer {
             state.alive.push(u8::from(row.alive()));
             state.group.push(row.group.to_string());
             state.leader.push(row.leader().map(|leader| leader.0));
-            state.leads.push((row.flags & ROW_LEADS != 0).then(|| row.led.to_string()));
+            state.leads.push((row.leads()).then(|| row.led.to_string()));
             state.phase.push(row.phase);
             state.route.push((row.route != NO_ROUTE && row.obeyed.ballot.is_some()).then_some(row.route));
             state.rank.push(row.rank);
             state.plan.push([row.obeyed.ballot.round, row.obeyed.epoch]);
             let slot = self.slots.of(drone, row, now).filter(|_| row.alive());
             state.slot_m.push(slot.map(|slot| [fine(slot.x), fine(slot.y)]));
-            state.late.push(u8::from(row.flags & ROW_LATE != 0));
+            state.late.push(u8::from(row.is_late()));
         }
         state
     }
@@ -151,7 +151,7 @@ mod tests {
     use skein_protocol::Message;
     use skein_protocol::frame::AirFrame;
     use skein_protocol::payload::Passed;
-    use skein_protocol::record::RecordHead;
+    use skein_protocol::record::RecordHeader;
 
     fn frame(tick: u64) -> AirFrame {
         let said = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), reserved: 0 };
@@ -161,7 +161,7 @@ mod tests {
             sequence: tick as u32,
             position_m: [0.0; 2],
             queue_ns: 0,
-            cuts: Default::default(),
+            link_faults: Default::default(),
             frame: Message::Passed(said).encode(),
         }
     }
@@ -170,7 +170,7 @@ mod tests {
         let rows: Vec<DroneRow> = (0..drones)
             .map(|drone| DroneRow { heard: 2, dropped: [0, 0, 1, 0, 0, 0, 0], ..row(1.00049, drone as f64) })
             .collect();
-        let head = RecordHead { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHead::default() };
+        let head = RecordHeader { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHeader::default() };
         observer.take(RecordView { head: &head, rows: &rows, frames: &[frame(tick)], events: &[] }, wanted)
     }
 

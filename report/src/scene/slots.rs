@@ -2,9 +2,9 @@
 
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
-use skein_protocol::payload::{Assignment, PHASE_AVOID, Plan};
+use skein_protocol::payload::{Assignment, Plan};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{Message, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Message, Phase, PlanStamp, SimTime, Vec2};
 use std::collections::BTreeMap;
 
 /// Plans on the air, and each drone's part in the latest of them.
@@ -42,7 +42,7 @@ impl Slots {
     /// Where a drone's slot is, world frame, m; `None` while it goes around something, or if it is not known.
     pub fn of(&self, drone: usize, row: &DroneRow, now: SimTime) -> Option<Vec2> {
         let part = self.parts.get(drone).copied().flatten().filter(|part| part.id == row.obeyed)?;
-        let plan = self.plans.get(&part.id).filter(|plan| plan.phase != PHASE_AVOID)?;
+        let plan = self.plans.get(&part.id).filter(|plan| plan.phase() != Phase::Avoid)?;
         let since_s = (now.0 - plan.stamp.0) as f64 / 1e9;
         let mut anchor = Vec2::from(plan.anchor_m) + Vec2::from(plan.anchor_mps) * since_s;
         anchor.x = anchor.x.min(plan.anchor_stop_x_m.max(plan.anchor_m[0]));
@@ -54,7 +54,7 @@ impl Slots {
 mod tests {
     use super::*;
     use crate::testing::row;
-    use skein_protocol::payload::{MAX_SET, NO_ROUTE, PHASE_CRUISE};
+    use skein_protocol::payload::{MAX_SET, NO_ROUTE};
     use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId};
 
     fn said(message: Message) -> AirFrame {
@@ -64,7 +64,7 @@ mod tests {
             sequence: 0,
             position_m: [0.0; 2],
             queue_ns: 0,
-            cuts: Default::default(),
+            link_faults: Default::default(),
             frame: message.encode(),
         }
     }
@@ -77,7 +77,7 @@ mod tests {
             stamp: SimTime::ZERO,
             id,
             group: GroupId::ALL,
-            phase: PHASE_CRUISE,
+            phase: Phase::Cruise.to_wire(),
             members: 1,
             anchor_m: [0.0, 5.0],
             anchor_mps: [10.0, 0.0],

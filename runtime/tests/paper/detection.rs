@@ -2,20 +2,22 @@
 
 use super::flown::{Flown, fly_file, scenario, velocity};
 use skein_agent::danger::Braking;
+use skein_protocol::Phase;
 use skein_protocol::record::EventKind;
 use skein_scenario::{Scenario, ScenarioSource};
 
 #[test]
 fn a1_the_routine_is_flown_in_its_order() {
     let flown = fly_file("paper/s2-right", &[]);
-    let phase = |wanted: &'static str| move |what: &EventKind| matches!(what, EventKind::Grouping { phase, .. } if phase == wanted);
+    let phase =
+        |wanted: Phase| move |what: &EventKind| matches!(what, EventKind::Grouping { phase, .. } if *phase == wanted);
     let steps = [
         flown.when(|what| matches!(what, EventKind::Leader { leads: true, .. })),
-        flown.when(phase("cruise")),
+        flown.when(phase(Phase::Cruise)),
         flown.detected_s(0),
-        flown.when(phase("avoid")),
+        flown.when(phase(Phase::Avoid)),
         flown.passed_s(0),
-        flown.when(phase("reform")),
+        flown.when(phase(Phase::Reform)),
         flown.when(|what| matches!(what, EventKind::End { .. })),
     ];
     assert!(steps.is_sorted(), "{steps:?}");

@@ -1,7 +1,7 @@
 //! A mission, flown and remembered.
 
-use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent};
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent, SinkError};
+use skein_protocol::{DroneId, Phase, Vec2};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, ScenarioSource};
 
@@ -14,7 +14,7 @@ pub struct Flown {
 }
 
 impl RecordSink for Flown {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         let parse = |line: &[u8]| serde_json::from_slice::<RunEvent>(line).map_err(|error| error.to_string());
         self.events.extend(record.parse_events(parse)?);
         let t_s = record.head.now.secs();
@@ -85,7 +85,7 @@ impl Flown {
     /// Of the first plan to avoid something: forecast, s, and time, s.
     pub fn grouping(&self) -> (f64, f64) {
         let avoid = |event: &RunEvent| match &event.what {
-            EventKind::Grouping { phase, predicted_s, .. } if phase == "avoid" => {
+            EventKind::Grouping { phase, predicted_s, .. } if *phase == Phase::Avoid => {
                 Some((predicted_s.unwrap(), event.t_s))
             }
             _ => None,
@@ -96,7 +96,7 @@ impl Flown {
     /// Routes of the last plan to avoid something: it knows all obstacles, those that were seen late too.
     pub fn routes(&self) -> u32 {
         let avoid = |event: &RunEvent| match &event.what {
-            EventKind::Grouping { phase, routes, .. } if phase == "avoid" => Some(*routes),
+            EventKind::Grouping { phase, routes, .. } if *phase == Phase::Avoid => Some(*routes),
             _ => None,
         };
         self.events.iter().rev().find_map(avoid).unwrap()

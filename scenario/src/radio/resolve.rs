@@ -40,7 +40,7 @@ impl Scenario {
     pub fn radio(&self) -> Radio {
         let keys = &self.radio;
         let rules = keys.rules.iter().map(|rule| keys.rule(rule)).collect();
-        Radio { seed: self.seed, air: keys.air(), asymmetry: keys.asymmetry, rules }
+        Radio { seed: self.seed, channel: keys.air(), asymmetry: keys.asymmetry, rules }
     }
 
     /// The channel that all drones share; `None` if its bandwidth is no limit.
@@ -88,7 +88,7 @@ impl RadioKeys {
             topics: rule.topics.as_ref().map(|topics| topics.iter().copied().map(Topic::from).collect()),
             from: drones(&rule.from),
             to: drones(&rule.to),
-            air: self.under(rule).air(),
+            channel: self.under(rule).air(),
         }
     }
 }
@@ -107,9 +107,9 @@ impl From<DelayModel> for radio::DelayModel {
 impl From<&BurstKeys> for radio::Burst {
     fn from(keys: &BurstKeys) -> Self {
         let scope = match keys.scope {
-            BurstScope::Direction => radio::Scope::Direction,
-            BurstScope::Link => radio::Scope::Link,
-            BurstScope::Swarm => radio::Scope::Swarm,
+            BurstScope::Direction => radio::BurstScope::Direction,
+            BurstScope::Link => radio::BurstScope::Link,
+            BurstScope::Swarm => radio::BurstScope::Swarm,
         };
         Self { share: keys.share, length_s: keys.length_s, loss: keys.loss, scope }
     }

@@ -94,7 +94,7 @@ fn radio(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Fail
         let link = |sequence| Link { source: DroneId(1), destination: DroneId(0), topic: 1, sequence };
         let (path, aired) = (Vec2::new(40.0, 30.0), |sequence| SimTime(i64::from(sequence) * 20_000_000));
         let us = timed(rounds, f64::from(VERDICTS), || {
-            (0..VERDICTS).for_each(|n| _ = black_box(radio.verdict(link(n), path, aired(n))));
+            (0..VERDICTS).for_each(|n| _ = black_box(radio.outcome(link(n), path, aired(n))));
         });
         figures.push(Figure { drones, what: format!("verdict on a frame, {preset}"), value: us * 1000.0, unit: "ns" });
     }

@@ -8,6 +8,7 @@ use crossterm::terminal::{
     disable_raw_mode, enable_raw_mode, size,
 };
 use crossterm::{cursor, execute, queue};
+use skein_protocol::Phase;
 use std::collections::BTreeMap;
 use std::io::{Stdout, Write, stdout};
 
@@ -113,8 +114,6 @@ fn swarm(watch: &Watch) -> String {
     )
 }
 
-const PHASES: [&str; 3] = ["cruise", "avoid", "reform"];
-
 fn groups(watch: &Watch) -> Vec<Line> {
     let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (drone, row) in watch.rows.iter().enumerate().filter(|(_, row)| row.alive()) {
@@ -124,10 +123,10 @@ fn groups(watch: &Watch) -> Vec<Line> {
         vec![bold(format!("{:<12}{:>7}{:>10}{:>12}{:>12}", "GROUP", "DRONES", "LEADER", "SPEED m/s", "PHASE"))];
     for (group, members) in groups {
         let rows = || members.iter().map(|&drone| &watch.rows[drone]);
-        let leads = |drone: &&usize| watch.rows[**drone].flags & skein_protocol::record::ROW_LEADS != 0;
+        let leads = |drone: &&usize| watch.rows[**drone].leads();
         let leaders: Vec<String> = members.iter().filter(leads).map(usize::to_string).collect();
         let speed = rows().map(|row| row.velocity_mps[0].hypot(row.velocity_mps[1])).sum::<f64>();
-        let phase = rows().map(|row| row.phase as usize).max().and_then(|phase| PHASES.get(phase)).unwrap_or(&"-");
+        let phase = rows().map(|row| row.phase()).max().map_or("-", Phase::name);
         let leader = if leaders.is_empty() { "-".to_owned() } else { leaders.join(",") };
         let (count, speed) = (members.len(), speed / members.len() as f64);
         lines.push(plain(format!("{group:<12}{count:>7}{leader:>10}{speed:>12.2}{phase:>12}")));
@@ -145,7 +144,7 @@ fn drones(watch: &Watch) -> Vec<Line> {
         let [x, y] = row.position_m;
         let speed = row.velocity_mps[0].hypot(row.velocity_mps[1]);
         let leader = row.leader().map_or("-".to_owned(), |leader| leader.to_string());
-        let phase = if row.alive() { PHASES.get(row.phase as usize).unwrap_or(&"-") } else { "dead" };
+        let phase = if row.alive() { row.phase().name() } else { "dead" };
         let (group, energy, step) = (row.group.to_string(), row.energy_j / 1e3, f64::from(row.step_ns) / 1e3);
         lines.push(plain(format!(
             "{drone:>6}{x:>10.1}{y:>10.1}{speed:>9.2}{group:>10}{leader:>8}{energy:>12.3}{phase:>8}{step:>9.0}"

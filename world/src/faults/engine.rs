@@ -185,7 +185,7 @@ impl Engine {
                 let number = self.plan.partition_number(active.fault);
                 for (side, drones) in sides.iter().enumerate() {
                     let known = drones.iter().filter(|drone| active.has(**drone));
-                    known.for_each(|drone| self.standing[drone.index()].cuts.sides.join(number, side));
+                    known.for_each(|drone| self.standing[drone.index()].cuts.partitions.join(number, side));
                 }
                 continue;
             }

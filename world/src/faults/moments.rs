@@ -2,9 +2,8 @@
 
 use super::FaultTrigger;
 use super::targets::Scene;
-use skein_protocol::payload::{PHASE_AVOID, PHASE_REFORM};
-use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime};
+use skein_protocol::slot::Slot;
+use skein_protocol::{Ballot, GroupId, Phase, PlanStamp, SimTime};
 
 /// What was seen of one obstacle set.
 #[derive(Clone, Debug, Default)]
@@ -57,9 +56,8 @@ impl Moments {
     fn observe_leaders(&mut self, now: SimTime, scene: &Scene<'_>) {
         self.leading.resize(scene.bodies.len(), None);
         for (drone, before) in self.leading.iter_mut().enumerate() {
-            let leads = scene
-                .answering(drone)
-                .and_then(|slot| (slot.flags & SLOT_LEADS != 0).then_some((slot.led, slot.obeyed.ballot)));
+            let leads =
+                scene.answering(drone).and_then(|slot| (slot.leads()).then_some((slot.led, slot.obeyed.ballot)));
             if let Some((group, _)) = leads.filter(|_| *before != leads) {
                 self.elected.push(now);
                 self.group_elected.extend((group != GroupId::ALL).then_some(now));
@@ -88,14 +86,14 @@ impl Set {
         let past = |drone: usize| scene.bodies[drone].position.x >= gate_x_m;
         if self.detected.is_some() {
             let avoids = |drone: usize, slot: &Slot| {
-                slot.phase == PHASE_AVOID && slot.obeyed != self.before[drone] && !past(drone)
+                slot.phase() == Phase::Avoid && slot.obeyed != self.before[drone] && !past(drone)
             };
             note(&mut self.grouped, any(&avoids));
-            let queues = |drone: usize, slot: &Slot| slot.flags & SLOT_QUEUED != 0 && avoids(drone, slot);
+            let queues = |drone: usize, slot: &Slot| slot.is_queued() && avoids(drone, slot);
             note(&mut self.queued, any(&queues));
         }
         note(&mut self.gate, scene.bodies.iter().enumerate().any(|(drone, body)| body.alive && past(drone)));
         note(&mut self.passed, stages.is_passed(number));
-        note(&mut self.reforming, any(&|drone, slot| past(drone) && slot.phase == PHASE_REFORM));
+        note(&mut self.reforming, any(&|drone, slot| past(drone) && slot.phase() == Phase::Reform));
     }
 }

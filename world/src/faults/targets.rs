@@ -5,7 +5,7 @@ use super::chance::Chance;
 use crate::body::Body;
 use crate::process::Process;
 use crate::stages::Stages;
-use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
+use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, GroupId};
 use std::cmp::Reverse;
 
@@ -29,11 +29,11 @@ impl Scene<'_> {
     }
 
     fn leaders(&self) -> impl Iterator<Item = (usize, &Slot)> {
-        self.all().filter(|(_, slot)| slot.flags & SLOT_LEADS != 0)
+        self.all().filter(|(_, slot)| slot.leads())
     }
 
     fn queued(&self) -> impl Iterator<Item = (usize, &Slot)> {
-        self.all().filter(|(_, slot)| slot.flags & SLOT_QUEUED != 0)
+        self.all().filter(|(_, slot)| slot.is_queued())
     }
 
     /// The drones that a fault meets now, by number; none if nobody has the role. Those named are not asked whether they
@@ -56,9 +56,7 @@ impl Scene<'_> {
                 let key = |&(drone, slot): &(usize, &Slot)| (Reverse(slot.rank), along(drone), drone);
                 one(self.queued().min_by_key(key).map(|(drone, _)| drone))
             }
-            FaultTargets::Member => {
-                one(self.all().find(|(_, slot)| slot.flags & SLOT_LEADS == 0).map(|(drone, _)| drone))
-            }
+            FaultTargets::Member => one(self.all().find(|(_, slot)| !slot.leads()).map(|(drone, _)| drone)),
             FaultTargets::Random => {
                 let living: Vec<usize> = self.all().map(|(drone, _)| drone).collect();
                 one(living.get(chance.one_of(living.len())).copied())
@@ -98,6 +96,7 @@ impl Ord for OrderedX {
 mod tests {
     use super::*;
     use crate::testing::bodies;
+    use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED};
     use skein_protocol::{Ballot, PlanStamp};
 
     fn process(flags: u32, led: GroupId, round: u32, rank: u16) -> Process {

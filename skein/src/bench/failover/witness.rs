@@ -1,6 +1,6 @@
 //! Looks at the record of a flight: when a leader died, and when everybody followed another one.
 
-use skein_protocol::record::{DroneRow, ROW_FROZEN, ROW_LATE, ROW_LEADS, RecordSink, RecordView};
+use skein_protocol::record::{DroneRow, RecordSink, RecordView, SinkError};
 use skein_protocol::{Ballot, SimTime};
 use skein_report::Recorder;
 use std::collections::BTreeSet;
@@ -92,7 +92,7 @@ impl Witness {
             self.found.deaths += 1;
             self.orphaned = Some(Orphaned { at: now, seen: Instant::now() });
         }
-        if rows.iter().any(|row| row.flags & ROW_LATE != 0) {
+        if rows.iter().any(|row| row.is_late()) {
             self.late = Some(now);
         }
         let new = rows.iter().filter(|row| leads(row)).filter(|row| self.terms.insert(row.term)).count();
@@ -128,7 +128,7 @@ impl Witness {
 }
 
 impl RecordSink for Witness {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         if !record.rows.is_empty() {
             self.look(record.head.now, record.rows);
             if self.begun {
@@ -140,12 +140,12 @@ impl RecordSink for Witness {
 }
 
 fn leads(row: &DroneRow) -> bool {
-    row.alive() && row.flags & ROW_LEADS != 0
+    row.alive() && row.leads()
 }
 
 /// Whether every living drone obeys one term, and that of a living leader.
 fn follow(rows: &[DroneRow]) -> bool {
-    let mut living = rows.iter().filter(|row| row.alive() && row.flags & ROW_FROZEN == 0);
+    let mut living = rows.iter().filter(|row| row.alive() && !row.is_frozen());
     let Some(term) = living.clone().map(|row| row.term).next() else { return false };
     let leader = rows.get(term.claimant.index());
     term.is_some() && living.all(|row| row.term == term) && leader.is_some_and(|row| leads(row) && row.term == term)
@@ -155,7 +155,7 @@ fn follow(rows: &[DroneRow]) -> bool {
 mod tests {
     use super::*;
     use skein_protocol::DroneId;
-    use skein_protocol::record::ROW_ALIVE;
+    use skein_protocol::record::{ROW_ALIVE, ROW_LEADS};
 
     fn term(round: u32, claimant: u32) -> Ballot {
         Ballot { round, incarnation: 1, claimant: DroneId(claimant) }

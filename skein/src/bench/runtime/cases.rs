@@ -8,7 +8,7 @@ use crate::interrupt::Interrupt;
 use clap::ValueEnum;
 use serde::Serialize;
 use skein_bus::WaitMode;
-use skein_protocol::downlink::{DownHead, SenseHead, SensedNeighbour};
+use skein_protocol::downlink::{DownlinkHeader, SensedNeighbour, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_runtime::PilotKind;
 use skein_scenario::{Scenario, ScenarioSource};
@@ -22,7 +22,7 @@ const MANY: u32 = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Case {
-    /// Raw shared memory, one word, one counter: [`skein_bus::Floor`].
+    /// Raw shared memory, one word, one counter: [`skein_bus::Baseline`].
     Floor,
     /// The floor's exchange over Unix datagrams.
     Datagrams,
@@ -111,12 +111,12 @@ impl Size {
         let scenario = scenario(drones, until + 80)?;
         let beacons = drones as f64 * scenario.time.dt_s / scenario.protocol.beacon_period_s;
         let heard = if drones < MANY { beacons } else { beacons.min(8.0 * beacons / f64::from(drones)) };
-        let senses = size_of::<SenseHead>() + 4 * size_of::<SensedNeighbour>();
+        let senses = size_of::<SensesHeader>() + 4 * size_of::<SensedNeighbour>();
         Ok(Self {
             drones,
             from,
             until,
-            down_len: size_of::<DownHead>()
+            down_len: size_of::<DownlinkHeader>()
                 + drones as usize * senses
                 + (beacons * size_of::<AirFrame>() as f64) as usize,
             read_len: senses + (heard * size_of::<AirFrame>() as f64) as usize,

@@ -5,7 +5,7 @@ use super::probe::{Measured, Spent, entries, memory_mib};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use skein_bus::{PinMode, WaitMode};
-use skein_protocol::record::{RecordSink, RecordView};
+use skein_protocol::record::{RecordSink, RecordView, SinkError};
 use skein_runtime::supervisor::{self, Launch, ProcessInfo};
 use skein_runtime::{Clock, PilotKind, RunEnd, inline};
 
@@ -60,7 +60,7 @@ impl Processes {
 }
 
 impl RecordSink for Watch<'_> {
-    fn take(&mut self, record: RecordView<'_>) -> Result<(), String> {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         let tick = record.head.tick;
         if tick == self.size.from {
             self.opened = Some(Instant::now());

@@ -7,7 +7,7 @@ use crate::bench::Scratch;
 use crate::exit::{Exit, Failure};
 use clap::Args;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-use skein_bus::Floor;
+use skein_bus::Baseline;
 use skein_protocol::slot::Slot;
 use skein_runtime::lighten;
 use std::os::unix::net::UnixDatagram;
@@ -51,7 +51,7 @@ pub fn peer(args: &FloorArgs) -> Result<Exit, Failure> {
     let parent = args.parent as i32;
     let alive = || getppid().is_some_and(|pid| pid.as_raw_nonzero().get() == parent);
     match (&args.floor, &args.sockets) {
-        (Some(fd), _) => Floor::attach(*fd).map_err(Failure::environment)?.serve(args.id, alive),
+        (Some(fd), _) => Baseline::attach(*fd).map_err(Failure::environment)?.serve(args.id, alive),
         (None, Some(folder)) => answer(folder, args.id).map_err(Failure::environment)?,
         (None, None) => return Err(Failure::usage("expected --floor or --sockets")),
     }
@@ -115,7 +115,7 @@ pub(super) fn measure(size: &Size, transport: Transport) -> Result<Measured, Fai
     match transport {
         Transport::Memory => {
             let floor =
-                Floor::create(size.drones as usize, size.down_len, size.read_len).map_err(Failure::environment)?;
+                Baseline::create(size.drones as usize, size.down_len, size.read_len).map_err(Failure::environment)?;
             let peers = Peers::start(size, &["--floor".to_owned(), floor.fd().unwrap_or(-1).to_string()])?;
             while floor.here() < size.drones {
                 if started.elapsed() > START_LIMIT {

@@ -9,9 +9,8 @@ use crate::process::Process;
 use crate::senses::Contact;
 use crate::stages::Stages;
 use crate::testing::{bodies, rectangle};
-use skein_protocol::payload::{PHASE_AVOID, PHASE_REFORM};
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED};
-use skein_protocol::{Ballot, GroupId, PlanStamp};
+use skein_protocol::{Ballot, GroupId, Phase, PlanStamp};
 
 /// Three drones and one obstacle set around x = 100 m.
 struct Stage {
@@ -39,10 +38,10 @@ impl Stage {
     }
 
     /// Lets a drone obey the plan of this epoch.
-    fn obey(&mut self, drone: usize, epoch: u32, phase: u32, flags: u32) {
+    fn obey(&mut self, drone: usize, epoch: u32, phase: Phase, flags: u32) {
         let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
         let slot = &mut self.processes[drone].slot;
-        (slot.obeyed, slot.phase, slot.flags) = (PlanStamp { ballot, epoch }, phase, flags);
+        (slot.obeyed, slot.phase, slot.flags) = (PlanStamp { ballot, epoch }, phase.to_wire(), flags);
     }
 }
 
@@ -96,8 +95,8 @@ fn faults_add_up() {
     let (first, second) = (*engine.standing(DroneId(0)), *engine.standing(DroneId(1)));
     assert_eq!((first.extra_reaction_s, second.extra_reaction_s), (0.5, 0.2));
     assert!(first.no_obstacles && !first.no_ranging && !second.no_obstacles);
-    assert!(first.cuts.sides.apart(second.cuts.sides));
-    assert!(!second.cuts.sides.apart(engine.standing(DroneId(2)).cuts.sides));
+    assert!(first.cuts.partitions.separates(second.cuts.partitions));
+    assert!(!second.cuts.partitions.separates(engine.standing(DroneId(2)).cuts.partitions));
     assert_eq!(engine.standing(DroneId(2)).cuts.mute, 1);
     engine.end(at(1.0));
     assert_eq!((engine.standing(DroneId(0)).extra_reaction_s, engine.standing(DroneId(2)).cuts.mute), (0.2, 0));
@@ -116,7 +115,7 @@ fn a_role_is_waited_for_and_the_named_dead_are_left_out() {
     assert_eq!(begun(&mut engine, at(0.0), &stage), [(1, vec![]), (2, vec![2])]);
     assert!(engine.awaits_restart(DroneId(2)) && engine.awaits_restarts());
     assert_eq!(begun(&mut engine, at(0.5), &stage), [(3, vec![])], "it is to be started already");
-    stage.obey(1, 1, 0, SLOT_LEADS);
+    stage.obey(1, 1, Phase::Cruise, SLOT_LEADS);
     assert_eq!(begun(&mut engine, at(0.6), &stage), [(0, vec![1])]);
     assert_eq!(engine.end(at(1.0)).len(), 1);
     assert!(!engine.awaits_restarts());
@@ -145,20 +144,20 @@ fn events_of_an_obstacle_set_are_seen_in_their_order() {
         (FaultTrigger::Detected, 1),
     ]);
     // An old plan to avoid is no plan for a set that is detected later.
-    stage.obey(0, 1, PHASE_AVOID, SLOT_QUEUED);
+    stage.obey(0, 1, Phase::Avoid, SLOT_QUEUED);
     assert_eq!(places(&mut engine, at(0.0), &stage), [0usize; 0]);
     stage.detect();
     assert_eq!(places(&mut engine, at(1.0), &stage), [0]);
-    stage.obey(0, 2, PHASE_AVOID, 0);
+    stage.obey(0, 2, Phase::Avoid, 0);
     assert_eq!(places(&mut engine, at(2.0), &stage), [1]);
-    stage.obey(1, 2, PHASE_AVOID, SLOT_QUEUED);
+    stage.obey(1, 2, Phase::Avoid, SLOT_QUEUED);
     assert_eq!(places(&mut engine, at(3.0), &stage), [2]);
     stage.bodies[0].position.x = 100.0;
     assert_eq!(places(&mut engine, at(4.0), &stage), [3]);
     // Who re-forms before the set does not count.
-    stage.obey(1, 3, PHASE_REFORM, 0);
+    stage.obey(1, 3, Phase::Reform, 0);
     assert_eq!(places(&mut engine, at(5.0), &stage), [0usize; 0]);
-    stage.obey(0, 3, PHASE_REFORM, 0);
+    stage.obey(0, 3, Phase::Reform, 0);
     assert_eq!(places(&mut engine, at(6.0), &stage), [4]);
     stage.bodies.iter_mut().for_each(|body| body.position.x = 200.0);
     stage.stages.pass(&stage.bodies, at(7.0), &mut Log::default());
@@ -174,11 +173,11 @@ fn elections_are_counted() {
         (FaultTrigger::GroupLeaderElected, 0),
     ]);
     assert_eq!(places(&mut engine, at(0.0), &stage), [0usize; 0]);
-    stage.obey(0, 1, 0, SLOT_LEADS);
+    stage.obey(0, 1, Phase::Cruise, SLOT_LEADS);
     assert_eq!(places(&mut engine, at(1.0), &stage), [0]);
-    stage.obey(0, 2, 0, SLOT_LEADS);
+    stage.obey(0, 2, Phase::Cruise, SLOT_LEADS);
     assert_eq!(places(&mut engine, at(2.0), &stage), [0usize; 0], "the same term");
-    stage.obey(1, 1, 0, SLOT_LEADS);
+    stage.obey(1, 1, Phase::Cruise, SLOT_LEADS);
     stage.processes[1].slot.led = GroupId::ALL.child(1);
     assert_eq!(places(&mut engine, at(3.0), &stage), [1, 2]);
 }

@@ -165,7 +165,7 @@ fn frames_carry_their_senders_radio() {
     world.take_frames(DroneId(0), &[frame]);
     world.advance();
     let down = world.downlink();
-    assert_eq!(down.frames.iter().map(|frame| frame.cuts.mute).collect::<Vec<_>>(), [0, 1]);
-    let reasons: Vec<_> = down.frames.iter().map(|frame| down.drones[5].cut_off(frame)).collect();
+    assert_eq!(down.frames.iter().map(|frame| frame.link_faults.mute).collect::<Vec<_>>(), [0, 1]);
+    let reasons: Vec<_> = down.frames.iter().map(|frame| down.drones[5].drop_reason(frame)).collect();
     assert_eq!(reasons, [None, Some(skein_protocol::radio::DropReason::Deaf)]);
 }

@@ -31,7 +31,7 @@ struct Words {
 
 /// A mapped floor.
 #[derive(Debug)]
-pub struct Floor {
+pub struct Baseline {
     base: NonNull<u8>,
     len: usize,
     drones: usize,
@@ -44,7 +44,7 @@ fn len(drones: usize, down_len: usize) -> usize {
     size_of::<Words>() + drones * size_of::<Slot>() + down_len
 }
 
-impl Floor {
+impl Baseline {
     /// Makes it: `down_len` bytes go down in a tick, each drone reads `read_len` of them, a [`Slot`] of each comes up.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl Floor {
     }
 }
 
-impl Drop for Floor {
+impl Drop for Baseline {
     fn drop(&mut self) {
         unmap(self.base, self.len);
     }
@@ -189,11 +189,11 @@ mod tests {
 
     #[test]
     fn every_drone_reads_what_went_down() {
-        let world = Floor::create(3, 16, 16).unwrap();
+        let world = Baseline::create(3, 16, 16).unwrap();
         std::thread::scope(|scope| {
             for drone in 0..3 {
                 let fd = world.fd().unwrap();
-                scope.spawn(move || Floor::attach(fd).unwrap().serve(drone, || true));
+                scope.spawn(move || Baseline::attach(fd).unwrap().serve(drone, || true));
             }
             while world.here() < 3 {
                 std::thread::yield_now();
