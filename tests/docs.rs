@@ -39,6 +39,9 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "trace.csv",
 ];
 
+/// Names that look like a type of the sources and are none.
+const NOT_TYPES: &[&str] = &["Host", "Origin"];
+
 /// What a page may write instead of the beginning of a longer path.
 const SHORT_FORMS: &[(&str, &str)] = &[("paper/", "runtime/tests/paper/")];
 
@@ -268,6 +271,14 @@ fn owner_and_member(span: &str) -> Option<(&str, &str)> {
     (named && (rest.is_empty() || rest.starts_with('('))).then_some((of, member))
 }
 
+/// Whether a span is meant as the name of a type: `CamelCase`.
+fn is_type(span: &str) -> bool {
+    let mut letters = span.chars();
+    letters.next().is_some_and(|c| c.is_ascii_uppercase())
+        && letters.next().is_some_and(|c| c.is_ascii_lowercase())
+        && letters.all(|c| c.is_ascii_alphanumeric())
+}
+
 /// Whether a span is meant as a path of the repository.
 fn is_path(span: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./<>".contains(c);
@@ -289,6 +300,7 @@ fn stale_names(page: &Page, sources: &Sources) -> Vec<String> {
     for span in page.spans() {
         let missing = match owner_and_member(&span) {
             Some((of, member)) => !sources.has(of, member),
+            None if is_type(&span) => !NOT_TYPES.contains(&span.as_str()) && !sources.members.contains_key(&span),
             None => is_path(&span) && !path_exists(&span, sources),
         };
         if missing {
@@ -372,12 +384,15 @@ fn every_command_line_names_a_command_and_options_that_exist() {
 
 #[test]
 fn a_stale_name_is_found() {
-    let text = "See `World::no_such_function`, `world/src/no_such_file.rs`, `World::downlink` and `world/src/world.rs`.\n\n\
+    let text = "See `World::no_such_function`, `NoSuchType`, `world/src/no_such_file.rs`, `World::downlink` and `world/src/world.rs`.\n\n\
                 A [link](docs/no-such-page.md), an [anchor](docs/radio.md#no-such-heading), a [good one](docs/radio.md#rules).\n\n\
                 `skein fly`, `skein run X --no-such-option`, `skein bench nothing`, `skein run X --seed 3`.\n";
     let page = Page { name: "README.md".to_owned(), text: text.to_owned() };
     let names = stale_names(&page, &Sources::read());
-    assert_eq!(names, ["README.md: `World::no_such_function`", "README.md: `world/src/no_such_file.rs`"]);
+    assert_eq!(
+        names,
+        ["README.md: `World::no_such_function`", "README.md: `NoSuchType`", "README.md: `world/src/no_such_file.rs`"]
+    );
     let links = stale_links(&page);
     assert_eq!(links, ["README.md: (docs/no-such-page.md)", "README.md: (docs/radio.md#no-such-heading)"]);
     let mut helps = Helps::default();
