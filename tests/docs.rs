@@ -42,6 +42,9 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
 /// Names that look like a type of the sources and are none.
 const NOT_TYPES: &[&str] = &["Host", "Origin"];
 
+/// Names that look like a constant of the sources and are variables of the environment.
+const ENVIRONMENT: &[&str] = &["PROPTEST_CASES", "XDG_RUNTIME_DIR"];
+
 /// What a page may write instead of the beginning of a longer path.
 const SHORT_FORMS: &[(&str, &str)] = &[("paper/", "runtime/tests/paper/")];
 
@@ -134,13 +137,14 @@ impl Page {
 /// The types of the sources, each with its functions, constants, fields and variants; and the modules with their functions.
 struct Sources {
     members: BTreeMap<String, BTreeSet<String>>,
+    constants: BTreeSet<String>,
     /// Names of all files, without folders.
     files: BTreeSet<String>,
 }
 
 impl Sources {
     fn read() -> Self {
-        let mut sources = Self { members: BTreeMap::new(), files: BTreeSet::new() };
+        let mut sources = Self { members: BTreeMap::new(), constants: BTreeSet::new(), files: BTreeSet::new() };
         sources.walk(&root());
         sources
     }
@@ -162,6 +166,8 @@ impl Sources {
                 let folder = folder.file_name().unwrap().to_str().unwrap();
                 self.index_module(if module == "mod" { folder } else { module }, &text);
                 self.index(&text);
+                let constants = text.lines().filter(|line| line.contains("const ")).map(|line| identifier(bare(line)));
+                self.constants.extend(constants.map(str::to_owned));
             }
             self.files.insert(name);
         }
@@ -279,6 +285,12 @@ fn is_type(span: &str) -> bool {
         && letters.all(|c| c.is_ascii_alphanumeric())
 }
 
+/// Whether a span is meant as the name of a constant: `SEVERAL_WORDS`.
+fn is_constant(span: &str) -> bool {
+    let plain = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_';
+    span.contains('_') && span.starts_with(|c: char| c.is_ascii_uppercase()) && span.chars().all(plain)
+}
+
 /// Whether a span is meant as a path of the repository.
 fn is_path(span: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./<>".contains(c);
@@ -301,6 +313,7 @@ fn stale_names(page: &Page, sources: &Sources) -> Vec<String> {
         let missing = match owner_and_member(&span) {
             Some((of, member)) => !sources.has(of, member),
             None if is_type(&span) => !NOT_TYPES.contains(&span.as_str()) && !sources.members.contains_key(&span),
+            None if is_constant(&span) => !ENVIRONMENT.contains(&span.as_str()) && !sources.constants.contains(&span),
             None => is_path(&span) && !path_exists(&span, sources),
         };
         if missing {
@@ -384,14 +397,19 @@ fn every_command_line_names_a_command_and_options_that_exist() {
 
 #[test]
 fn a_stale_name_is_found() {
-    let text = "See `World::no_such_function`, `NoSuchType`, `world/src/no_such_file.rs`, `World::downlink` and `world/src/world.rs`.\n\n\
+    let text = "See `World::no_such_function`, `NoSuchType`, `NO_SUCH_CONSTANT`, `world/src/no_such_file.rs`, `World::downlink` and `world/src/world.rs`.\n\n\
                 A [link](docs/no-such-page.md), an [anchor](docs/radio.md#no-such-heading), a [good one](docs/radio.md#rules).\n\n\
                 `skein fly`, `skein run X --no-such-option`, `skein bench nothing`, `skein run X --seed 3`.\n";
     let page = Page { name: "README.md".to_owned(), text: text.to_owned() };
     let names = stale_names(&page, &Sources::read());
     assert_eq!(
         names,
-        ["README.md: `World::no_such_function`", "README.md: `NoSuchType`", "README.md: `world/src/no_such_file.rs`"]
+        [
+            "README.md: `World::no_such_function`",
+            "README.md: `NoSuchType`",
+            "README.md: `NO_SUCH_CONSTANT`",
+            "README.md: `world/src/no_such_file.rs`"
+        ]
     );
     let links = stale_links(&page);
     assert_eq!(links, ["README.md: (docs/no-such-page.md)", "README.md: (docs/radio.md#no-such-heading)"]);
