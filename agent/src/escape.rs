@@ -1,18 +1,20 @@
-//! Out of a corner: a drone that wants to move and cannot backs off, then tries the sides.
+//! Escape of a drone that is stuck: it wants to move and cannot, so it backs off and then tries the sides.
 
 use skein_protocol::{SimTime, Vec2};
 
-/// It does not move if it is slower than this, m/s, …
+/// A drone is still below this speed, m/s.
 const STILL_MPS: f64 = 0.3;
-/// … although it wants to fly faster than this, m/s.
+/// A still drone is stuck if it wants to fly faster than this, m/s.
 const EAGER_MPS: f64 = 3.0;
-/// An escape lasts so long, s, and longer with each attempt.
+/// Duration of the first attempt, s.
 const FIRST_S: f64 = 6.0;
+/// By how much each attempt is longer than the one before, s.
 const LONGER_S: f64 = 2.0;
+/// Longest duration of an attempt, s.
 const LONGEST_S: f64 = 16.0;
-/// Without being stuck for so long the attempts are forgotten, s.
+/// After this time without being stuck the attempts are forgotten, s.
 const FREE_S: f64 = 20.0;
-/// Directions of the attempts, from the one that is blocked, rad.
+/// Directions of the attempts, relative to the blocked direction, rad.
 const TURNS: [f64; 5] = [
     std::f64::consts::PI,
     std::f64::consts::FRAC_PI_2,
@@ -21,7 +23,7 @@ const TURNS: [f64; 5] = [
     -std::f64::consts::FRAC_PI_4 * 3.0,
 ];
 
-/// What a drone remembers of being stuck.
+/// The attempts of a drone to escape.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Escape {
     still_since: Option<SimTime>,
@@ -31,8 +33,8 @@ pub struct Escape {
 }
 
 impl Escape {
-    /// The velocity to fly instead of `wanted`, m/s: the same unless the drone has not moved for `patience_s`; then
-    /// away from there at `speed_mps` for some seconds.
+    /// The velocity to fly instead of `wanted`, m/s. It is `wanted` unless the drone has been stuck for `patience_s`; then it
+    /// is a velocity of `speed_mps` in another direction, for some seconds.
     pub fn steer(&mut self, now: SimTime, velocity: Vec2, wanted: Vec2, patience_s: f64, speed_mps: f64) -> Vec2 {
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
@@ -64,7 +66,7 @@ mod tests {
     const WANTED: Vec2 = Vec2::new(10.0, 0.0);
 
     #[test]
-    fn a_drone_that_moves_or_rests_is_left_alone() {
+    fn a_drone_that_moves_or_wants_to_rest_does_not_escape() {
         let mut escape = Escape::default();
         for second in 0..100 {
             let now = SimTime::from_secs(f64::from(second));

@@ -1,5 +1,6 @@
-//! Where a drone wants to fly when nobody is in the way.
+//! Formation flight: the velocity that brings a drone to its slot, without regard to obstacles and neighbours.
 
+use crate::tuning::APPROACH_PER_S;
 use skein_protocol::payload::Plan;
 use skein_protocol::{SimTime, Vec2};
 
@@ -8,19 +9,16 @@ use skein_protocol::{SimTime, Vec2};
 pub struct GuidanceParams {
     /// Nominal speed v, m/s.
     pub speed_mps: f64,
-    /// δ: the speed stays within v ± δ where it can, m/s.
+    /// δ: largest intended deviation from the nominal speed, m/s.
     pub speed_change_mps: f64,
-    /// Greatest speed while taking a slot, m/s.
+    /// Largest speed while a drone approaches its slot, m/s.
     pub reform_speed_max_mps: f64,
-    /// Greatest acceleration, m/s².
+    /// Largest acceleration, m/s².
     pub acceleration_max_mps2: f64,
 }
 
-/// Approach to a slot, 1/s: the closing speed is this times the distance, as long as the drone can still brake.
-const APPROACH_PER_S: f64 = 0.8;
-
-/// The anchor of a plan at `now`: it moves on from its stamp until it reaches the abscissa where it stops. Position, m,
-/// and velocity, m/s.
+/// The anchor of a plan at `now`: position (world frame, m) and velocity (m/s). It moves with the plan's velocity from
+/// the plan's stamp on, until it reaches the abscissa at which it stops.
 #[must_use]
 pub fn anchor(plan: &Plan, now: SimTime) -> (Vec2, Vec2) {
     let (start, velocity) = (Vec2::from(plan.anchor_m), Vec2::from(plan.anchor_mps));
@@ -32,7 +30,8 @@ pub fn anchor(plan: &Plan, now: SimTime) -> (Vec2, Vec2) {
 }
 
 impl GuidanceParams {
-    /// The velocity that takes a drone to a slot which moves along, m/s.
+    /// The velocity that brings a drone to a moving slot, m/s. `offset`: from the drone to the slot, m. The closing speed
+    /// is proportional to the distance, as long as the drone can still brake.
     #[must_use]
     pub fn to_slot(&self, offset: Vec2, slot_velocity: Vec2) -> Vec2 {
         let distance = offset.norm();
@@ -41,7 +40,7 @@ impl GuidanceParams {
         if distance > 1e-9 {
             wanted += offset * (closing / distance);
         }
-        // Nobody turns back while the formation moves on.
+        // While the formation moves, no drone turns back.
         if slot_velocity.x > 0.0 {
             wanted.x = wanted.x.max(self.speed_mps - self.speed_change_mps);
         }
@@ -56,7 +55,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     #[test]
-    fn the_anchor_moves_and_stops() {
+    fn the_anchor_moves_and_then_stops() {
         let plan = Plan {
             anchor_m: [10.0, 1.0],
             anchor_mps: [10.0, 0.0],
@@ -71,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slot_is_approached_no_faster_than_can_be_braked() {
+    fn a_slot_is_approached_no_faster_than_the_drone_can_brake() {
         let guidance = GuidanceParams {
             speed_mps: 10.0,
             speed_change_mps: 5.0,

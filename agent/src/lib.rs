@@ -1,33 +1,66 @@
-//! One drone's mind, the pilot. Pure: senses and messages in, a command and messages out.
+//! The pilot of a drone: senses and messages in, a command and messages out.
 //!
-//! | module | what |
-//! |---|---|
-//! | [`pilot`] | the trait every pilot implements |
-//! | [`swarm_pilot`] | the paper's drone: detect, obey, avoid, queue, re-form |
-//! | [`danger`] | detection distances (equations 1–4) |
-//! | [`way`], [`queue`], [`guidance`] | past obstacles, in a queue, in formation |
-//! | [`escape`] | out of a corner |
-//! | `stray` | into the others' formation, though none of them hears this drone |
-//! | [`rollout`], [`stage`] | a leader flies its alternatives ahead |
-//! | [`safety`], [`program`] | the filter that keeps distances, whoever leads |
-//! | [`talk`] | what is said, and when |
+//! The crate has two parts. [`Pilot`] is the interface of anything that flies a drone: a runtime calls [`Pilot::step`] once
+//! per tick. [`SwarmPilot`] is the pilot of the paper. It is composed of machines that can be used on their own:
+//!
+//! - [`detection`] computes stopping distances and the danger zone (paper, equations 1 to 4);
+//! - [`route_follower`] follows the routes past obstacles, and [`emergency_route`] finds one that no leader has planned;
+//! - [`queue`] keeps a headway on a shared route;
+//! - [`guidance`] brings a drone to its slot in the formation;
+//! - [`safety`] is the filter that keeps the distances to obstacles and neighbours, whatever the others do;
+//! - [`escape`] frees a drone that is stuck;
+//! - [`rollout`] simulates alternative plans with any pilot that implements [`rollout::RolloutPilot`].
+//!
+//! Elections, grouping and planning are not here: they are in `skein-leader`, whose machine `Leading` a [`SwarmPilot`] owns.
+//! The crate is pure. It has no clock, thread, file or random generator, and it does not know whether it runs in a process of
+//! its own. A pilot knows nothing of other drones but what it senses and hears.
+//!
+//! # Example
+//!
+//! A pilot that brakes until it is at rest:
+//!
+//! ```
+//! use skein_agent::{Command, Heard, Pilot};
+//! use skein_protocol::downlink::Senses;
+//! use skein_protocol::{Message, SimTime, Vec2};
+//!
+//! struct Brake;
+//!
+//! impl Pilot for Brake {
+//!     fn step(&mut self, senses: &Senses<'_>, _heard: &[Heard<'_>], _say: &mut Vec<Message>) -> Command {
+//!         Command { acceleration: -senses.velocity, ..Command::default() }
+//!     }
+//!
+//!     fn pose_ages_s(&self, _now: SimTime, ages: &mut Vec<f64>) {
+//!         ages.clear();
+//!     }
+//! }
+//!
+//! let (position, velocity) = (Vec2::zeros(), Vec2::new(2.0, 0.0));
+//! let senses = Senses::new((0, SimTime(0)), (position, velocity), &[], &[], &[]);
+//! let command = Brake.step(&senses, &[], &mut Vec::new());
+//! assert_eq!(command.acceleration, Vec2::new(-2.0, 0.0));
+//! ```
 
-pub mod danger;
+pub mod detection;
+pub mod emergency_route;
 pub mod escape;
-mod foresight;
 pub mod guidance;
-mod neighbours;
-pub mod params;
-pub mod pilot;
+mod neighbour_table;
+mod params;
+mod pilot;
 pub mod program;
 pub mod queue;
 mod reaction;
 pub mod rollout;
+pub mod route_follower;
 pub mod safety;
-pub mod stage;
-mod stray;
-pub mod swarm_pilot;
-pub mod way;
+mod silent_drones;
+mod stale_formation;
+mod state_predictor;
+mod straggler;
+mod swarm_pilot;
+mod tuning;
 
 pub use params::PilotParams;
 pub use pilot::{Command, Heard, Pilot};

@@ -1,21 +1,27 @@
-//! What a drone is told before it starts: constants of the vehicle and the mission, no knowledge of the swarm's state.
+//! Parameters of a [`crate::SwarmPilot`]: constants of the vehicle and the mission, and no knowledge of the swarm's state.
 
-use crate::danger::Braking;
+use crate::detection::Braking;
 use crate::guidance::GuidanceParams;
-use crate::safety::SafetyParams;
+use crate::neighbour_table::NeighbourParams;
+use crate::queue::QueueParams;
+use crate::rollout::RolloutParams;
+use crate::safety::{RANGING_FACTOR, SafetyParams};
 use skein_leader::election::ElectionParams;
 use skein_leader::leading::LeadingParams;
 use skein_leader::params::PlannerParams;
 use skein_protocol::{DroneId, SimTime};
 
+/// Simulated drones sense obstacles within this distance, m.
+const OBSTACLE_REACH_M: f64 = 90.0;
+
 /// Parameters of a [`crate::SwarmPilot`].
 #[derive(Clone, Debug)]
 pub struct PilotParams {
-    /// Who it is.
+    /// The drone that it flies.
     pub me: DroneId,
-    /// Size of the swarm.
+    /// Number of drones in the swarm.
     pub drones: u32,
-    /// Of its process, from 1.
+    /// Incarnation of its process, from 1.
     pub incarnation: u32,
     /// When it starts.
     pub start: SimTime,
@@ -29,26 +35,26 @@ pub struct PilotParams {
     pub ranging: bool,
     /// Stopping distances.
     pub braking: Braking,
-    /// Planning, should it lead; also headway, routes and course for everybody.
+    /// Planning while it leads. Headway, routes and course line apply to every drone.
     pub planner: PlannerParams,
     /// Elections.
     pub election: ElectionParams,
-    /// Velocity error to acceleration, 1/s.
+    /// Acceleration per velocity error, 1/s.
     pub velocity_gain_per_s: f64,
-    /// Share of an evasion that the drone behind takes from the one ahead in the same queue, 0.5 to 1.
+    /// Share of an evasion that the rear one of two queued drones takes, 0.5 to 1.
     pub precedence_share: f64,
     /// Whether drones on one route slow down into a single file before its gate.
     pub queue: bool,
-    /// Between two beacons, s.
+    /// Time between two beacons, s.
     pub beacon_period_s: f64,
-    /// Between two repetitions of what has to be repeated, s.
+    /// Time between two repetitions of a message that has to be repeated, s.
     pub repeat_period_s: f64,
-    /// A peer that is silent for longer counts as gone, s.
+    /// Silence after which a peer counts as gone, s.
     pub peer_timeout_s: f64,
 }
 
 impl PilotParams {
-    /// What its leading part needs of them.
+    /// The parameters of its election and planning.
     #[must_use]
     pub fn leading(&self) -> LeadingParams {
         LeadingParams {
@@ -62,6 +68,38 @@ impl PilotParams {
             beacon_period_s: self.beacon_period_s,
             repeat_period_s: self.repeat_period_s,
             peer_timeout_s: self.peer_timeout_s,
+        }
+    }
+
+    /// The parameters of its look-ahead.
+    #[must_use]
+    pub fn rollout(&self) -> RolloutParams {
+        RolloutParams {
+            dt_s: self.dt_s,
+            safe_distance_m: self.safety.safe_distance_m,
+            clearance_m: self.safety.clearance_m,
+            acceleration_max_mps2: self.safety.acceleration_max_mps2,
+            detection_range_m: OBSTACLE_REACH_M,
+            ranging_m: RANGING_FACTOR * self.safety.safe_distance_m,
+            speed_mps: self.guidance.speed_mps,
+            reform_speed_max_mps: self.guidance.reform_speed_max_mps,
+            planner: self.planner.clone(),
+        }
+    }
+
+    pub(crate) fn queueing(&self) -> QueueParams {
+        QueueParams {
+            headway_s: self.planner.headway_s,
+            speed_mps: self.guidance.speed_mps,
+            speed_change_mps: self.guidance.speed_change_mps,
+        }
+    }
+
+    pub(crate) fn neighbours(&self) -> NeighbourParams {
+        NeighbourParams {
+            safe_distance_m: self.safety.safe_distance_m,
+            ranging: self.ranging,
+            precedence_share: self.precedence_share,
         }
     }
 }

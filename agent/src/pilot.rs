@@ -1,37 +1,37 @@
-//! What flies a drone: senses and messages in, a command and messages out.
+//! The interface of a pilot: senses and messages in, a command and messages out.
 
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, Phase, PlanStamp, SimTime, Vec2, flag};
 
-/// A message that came in by the radio, read where it lies.
+/// A message received by radio. It is read in place, without a copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heard<'a> {
-    /// Who said it.
+    /// The drone that sent it.
     pub source: DroneId,
-    /// What.
+    /// The message.
     pub message: MessageRef<'a>,
 }
 
-/// What a drone's actuators are to do, and what it obeys.
+/// What a drone's actuators are to do, and what the drone reports about itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// World frame, m/s².
     pub acceleration: Vec2,
-    /// The plan it obeys.
+    /// The plan that the drone obeys.
     pub obeyed: PlanStamp,
-    /// Hash of its part under that plan; 0 before the first.
+    /// Hash of its assignment under that plan; 0 before the first.
     pub part_hash: u64,
     /// Its group.
     pub group: GroupId,
-    /// The group it leads, if it leads.
+    /// The group that it leads, if it leads.
     pub leads: Option<GroupId>,
-    /// The term it obeys, or leads in.
+    /// The term that it obeys, or leads in.
     pub term: Ballot,
-    /// Phase of the plan it obeys.
-    pub phase: Phase,
-    /// Route and place in its queue while it passes an obstacle set.
+    /// Phase of the plan, a `PHASE_…`.
+    pub phase: u32,
+    /// Route and place in its queue while the drone passes an obstacle set.
     pub place: Option<(u16, u16)>,
 }
 
@@ -51,7 +51,7 @@ impl Default for Command {
 }
 
 impl Command {
-    /// Puts the command into an actuator slot.
+    /// Writes the command into an actuator slot.
     pub fn fill(&self, slot: &mut Slot) {
         slot.acceleration_mps2 = self.acceleration.into();
         slot.obeyed = self.obeyed;
@@ -65,11 +65,13 @@ impl Command {
     }
 }
 
-/// One drone's mind. Deterministic: equal senses and messages give equal commands and messages.
+/// The software that flies one drone. It is deterministic: equal senses and messages give equal commands and messages.
 pub trait Pilot: Send {
-    /// One tick: `heard` in the order in which it was heard; what is to be said is pushed to `say`.
+    /// Steps one tick. `heard`: the messages received, in the order of their arrival. The pilot pushes the messages that it
+    /// sends to `say`.
     fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command;
 
-    /// Ages of what it knows of its peers at `now`, in s, one a peer it knows: for the statistics.
+    /// Replaces the contents of `ages` with the ages at `now` of what it knows of its peers, s, one per known peer. They go
+    /// into the statistics.
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>);
 }

@@ -1,8 +1,8 @@
-//! The small quadratic program behind the safety filter: the acceleration nearest to the wanted one that keeps every
-//! half-plane and the greatest acceleration; where that is impossible, one that breaks them least, tier by tier.
+//! The small quadratic program behind the safety filter. It finds the acceleration nearest to the wanted one that satisfies
+//! every half-plane and the acceleration limit. If none exists, it finds one that violates them least, tier by tier.
 //!
-//! Incremental, as in two-dimensional linear programming: half-planes are added one by one, and whenever the optimum so
-//! far is cut off, the new one lies on the border just added. No allocation once its memory has grown.
+//! The method is incremental, as in two-dimensional linear programming. Half-planes are added one by one; if one cuts off the
+//! optimum so far, the new optimum lies on its border. Once its memory has grown, it allocates nothing.
 
 use skein_protocol::Vec2;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use std::ops::Range;
 pub struct HalfPlane {
     /// Unit normal, pointing inside.
     pub normal: Vec2,
-    /// m/s².
+    /// Least component along the normal, m/s².
     pub bound: f64,
 }
 
@@ -24,21 +24,21 @@ impl HalfPlane {
 
 /// Below this, two borders are parallel.
 const PARALLEL: f64 = 1e-9;
-/// A border that is missed by less is kept, m/s²: two that are nearly one must not contradict each other.
-const KEPT_MPS2: f64 = 1e-9;
+/// Violation that is tolerated, m/s², so that two nearly equal borders do not contradict each other.
+const TOLERANCE_MPS2: f64 = 1e-9;
 
-/// Where not everything can be kept, this much more than has to be is given up, m/s²: at the very least, a
-/// direction that hardly matters would be taken to the utmost.
-const GIVE_MPS2: f64 = 0.1;
+/// Slack beyond the least possible violation, m/s². Without it the solution would go to the limit in a direction that hardly
+/// matters.
+const SLACK_MPS2: f64 = 0.1;
 
-/// Memory for [`Program::solve`], kept from call to call.
+/// The memory of [`Program::solve`], reused from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
     relaxed: Vec<HalfPlane>,
     projected: Vec<HalfPlane>,
 }
 
-/// What is looked for on a border: the point nearest to one, or the farthest in a direction.
+/// What to find: the point nearest to a given one, or the farthest in a direction.
 #[derive(Clone, Copy)]
 enum Goal {
     Nearest(Vec2),
@@ -46,9 +46,9 @@ enum Goal {
 }
 
 impl Program {
-    /// The acceleration nearest to `wanted` within `limit` that keeps all `planes`. If not all can be kept, those of
-    /// one tier, `tiers` being where they end, come before those of the next: within a tier the greatest violation is
-    /// made least.
+    /// The acceleration nearest to `wanted` within `limit` that satisfies all `planes`, m/s². If none exists, earlier tiers
+    /// have priority over later ones, and within a tier the largest violation is minimised. `tiers`: the indices at which
+    /// the first two of the three tiers end.
     pub fn solve(&mut self, planes: &[HalfPlane], tiers: [usize; 2], limit: f64, wanted: Vec2) -> Vec2 {
         let goal = Goal::Nearest(wanted);
         if let Ok(a) = optimum(planes, limit, goal) {
@@ -62,15 +62,17 @@ impl Program {
                 let a = self.least_violation(from..to, limit, (failed, a));
                 let tier = &mut self.relaxed[from..to];
                 let worst = tier.iter().map(|plane| plane.violation(a)).fold(0.0, f64::max);
-                tier.iter_mut().for_each(|plane| plane.bound -= worst + GIVE_MPS2);
+                for plane in tier {
+                    plane.bound -= worst + SLACK_MPS2;
+                }
             }
             from = to;
         }
         optimum(&self.relaxed, limit, goal).unwrap_or_else(|(_, a)| a)
     }
 
-    /// From plane `failed` on, moves along: each plane of the tier that is broken by more than those before is made as
-    /// little broken as the earlier ones allow; those before the tier are kept.
+    /// Minimises the largest violation within the tier, from plane `failed` on. Each plane that is violated by more than
+    /// those before it is satisfied as far as those allow. The planes before the tier stay satisfied.
     fn least_violation(&mut self, tier: Range<usize>, limit: f64, (failed, start): (usize, Vec2)) -> Vec2 {
         let (mut best, mut worst) = (start, 0.0);
         for i in failed.max(tier.start)..tier.end {
@@ -81,7 +83,7 @@ impl Program {
             self.projected.clear();
             self.projected.extend_from_slice(&self.relaxed[..tier.start]);
             for earlier in &self.relaxed[tier.start..i] {
-                // Where `earlier` is broken no more than `plane`.
+                // The points at which `earlier` is violated no more than `plane`.
                 let difference = earlier.normal - plane.normal;
                 let length = difference.norm();
                 if length > PARALLEL {
@@ -98,7 +100,8 @@ impl Program {
     }
 }
 
-/// The optimum over the disc and all planes; else the first plane that empties the region, and the optimum before it.
+/// The optimum within the disc and all planes. If there is none: the first plane that leaves no point, and the optimum
+/// before it.
 fn optimum(planes: &[HalfPlane], limit: f64, goal: Goal) -> Result<Vec2, (usize, Vec2)> {
     let mut best = match goal {
         Goal::Nearest(point) if point.norm() > limit => point * (limit / point.norm()),
@@ -106,14 +109,14 @@ fn optimum(planes: &[HalfPlane], limit: f64, goal: Goal) -> Result<Vec2, (usize,
         Goal::Farthest(direction) => direction * limit,
     };
     for (i, plane) in planes.iter().enumerate() {
-        if plane.violation(best) > KEPT_MPS2 {
+        if plane.violation(best) > TOLERANCE_MPS2 {
             best = on_border(planes, i, limit, goal).ok_or((i, best))?;
         }
     }
     Ok(best)
 }
 
-/// The optimum on the border of plane `i`, inside the disc and the planes before it.
+/// The optimum on the border of plane `i`, within the disc and the planes before it.
 fn on_border(planes: &[HalfPlane], i: usize, limit: f64, goal: Goal) -> Option<Vec2> {
     let HalfPlane { normal, bound } = planes[i];
     let along = Vec2::new(normal.y, -normal.x);
@@ -127,7 +130,7 @@ fn on_border(planes: &[HalfPlane], i: usize, limit: f64, goal: Goal) -> Option<V
         let slope = plane.normal.dot(&along);
         let missing = plane.violation(foot);
         if slope.abs() <= PARALLEL {
-            if missing > KEPT_MPS2 {
+            if missing > TOLERANCE_MPS2 {
                 return None;
             }
         } else if slope > 0.0 {
@@ -160,7 +163,7 @@ mod tests {
         planes.iter().map(|p| p.violation(a)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Points of a fine polar grid in the disc.
+    /// The points of a fine polar grid in the disc.
     fn grid(limit: f64) -> impl Iterator<Item = Vec2> {
         (0..=80).flat_map(move |r| {
             (0..180).map(move |k| {
@@ -185,13 +188,13 @@ mod tests {
                 prop_assert!((a - wanted).norm() <= nearest.fold(f64::INFINITY, f64::min) + 1e-9);
             } else {
                 let least = grid(limit).map(|p| worst(&planes, p)).fold(f64::INFINITY, f64::min);
-                prop_assert!(worst(&planes, a) <= least + GIVE_MPS2 + 1e-6, "{} against {least}", worst(&planes, a));
+                prop_assert!(worst(&planes, a) <= least + SLACK_MPS2 + 1e-6, "{} against {least}", worst(&planes, a));
             }
         }
     }
 
     #[test]
-    fn hard_planes_are_kept_when_soft_ones_contradict() {
+    fn a_first_tier_is_satisfied_although_a_later_one_contradicts_it() {
         let planes = [plane(0.0, 1.0), plane(std::f64::consts::PI, 1.0)];
         let a = Program::default().solve(&planes, [1; 2], 5.0, Vec2::zeros());
         assert!(planes[0].violation(a) <= 1e-9, "{a}");

@@ -1,57 +1,68 @@
-//! A drone's reaction time t_c: what it decides takes effect so much later.
+//! The reaction time t_c of a drone: a command takes effect that long after it was given.
 
 use skein_protocol::Vec2;
 use std::collections::VecDeque;
 
-/// Commands on their way to the actuators.
+/// Holds commands back for the reaction time.
 #[derive(Clone, Debug)]
-pub(crate) struct Reaction {
-    own_s: f64,
+pub(crate) struct ReactionDelay {
+    nominal_s: f64,
     dt_s: f64,
-    line: VecDeque<Vec2>,
-    /// What takes effect now, m/s².
+    /// Commands that have been given and have not taken effect, the oldest first, m/s².
+    pending: VecDeque<Vec2>,
+    /// The command that took effect last, m/s².
     last: Vec2,
 }
 
-impl Reaction {
-    /// With a reaction time, s, and ticks of `dt_s`.
-    pub fn new(reaction_time_s: f64, dt_s: f64) -> Self {
-        let line = VecDeque::from(vec![Vec2::zeros(); ticks(reaction_time_s, dt_s)]);
-        Self { own_s: reaction_time_s, dt_s, line, last: Vec2::zeros() }
+/// How a drone moves until a command that it gives now takes effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PendingMotion {
+    /// How far it will have flown, m.
+    pub(crate) offset: Vec2,
+    /// Its velocity at the end, m/s.
+    pub(crate) velocity: Vec2,
+}
+
+impl ReactionDelay {
+    /// A delay of `reaction_time_s` in ticks of `dt_s`.
+    pub(crate) fn new(reaction_time_s: f64, dt_s: f64) -> Self {
+        let pending = VecDeque::from(vec![Vec2::zeros(); ticks(reaction_time_s, dt_s)]);
+        Self { nominal_s: reaction_time_s, dt_s, pending, last: Vec2::zeros() }
     }
 
-    /// Makes the reaction time longer than its own by this, s, and gives it: while the line gets longer the last command
-    /// goes on, when it gets shorter the oldest ones are left out.
-    pub fn slow_down(&mut self, extra_s: f64) -> f64 {
-        let wanted = ticks(self.own_s + extra_s, self.dt_s);
-        while self.line.len() > wanted {
-            self.line.pop_front();
+    /// Adds `extra_s` to the nominal reaction time and returns the sum, s. When the delay grows, the last command is
+    /// repeated; when it shrinks, the oldest commands are skipped.
+    pub(crate) fn set_extra(&mut self, extra_s: f64) -> f64 {
+        let wanted = ticks(self.nominal_s + extra_s, self.dt_s);
+        while self.pending.len() > wanted {
+            self.pending.pop_front();
         }
-        while self.line.len() < wanted {
-            self.line.push_front(self.last);
+        while self.pending.len() < wanted {
+            self.pending.push_front(self.last);
         }
-        self.own_s + extra_s
+        self.nominal_s + extra_s
     }
 
-    /// How long a command that is given now takes to take effect, s.
-    pub fn span_s(&self) -> f64 {
-        self.line.len() as f64 * self.dt_s
+    /// The delay in whole ticks, s.
+    pub(crate) fn delay_s(&self) -> f64 {
+        self.pending.len() as f64 * self.dt_s
     }
 
-    /// How far the drone will have flown, m, and its velocity, m/s, when a command that is given now takes effect: what is
-    /// on its way to the actuators is known.
-    pub fn foresee(&self, velocity: Vec2) -> (Vec2, Vec2) {
-        let fly = |(offset, velocity): (Vec2, Vec2), command: &Vec2| {
-            let next = velocity + command * self.dt_s;
-            (offset + (velocity + next) * (self.dt_s / 2.0), next)
-        };
-        self.line.iter().fold((Vec2::zeros(), velocity), fly)
+    /// The motion of a drone with `velocity` (m/s) under the pending commands.
+    pub(crate) fn pending_motion(&self, velocity: Vec2) -> PendingMotion {
+        let mut motion = PendingMotion { offset: Vec2::zeros(), velocity };
+        for command in &self.pending {
+            let next = motion.velocity + command * self.dt_s;
+            motion.offset += (motion.velocity + next) * (self.dt_s / 2.0);
+            motion.velocity = next;
+        }
+        motion
     }
 
-    /// Takes a command in, m/s², and gives the one that takes effect now.
-    pub fn delay(&mut self, command: Vec2) -> Vec2 {
-        self.line.push_back(command);
-        self.last = self.line.pop_front().unwrap_or(command);
+    /// Accepts a command and returns the one that takes effect now, m/s².
+    pub(crate) fn push(&mut self, command: Vec2) -> Vec2 {
+        self.pending.push_back(command);
+        self.last = self.pending.pop_front().unwrap_or(command);
         self.last
     }
 }
@@ -65,33 +76,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_on_its_way_is_foreseen() {
-        let mut reaction = Reaction::new(0.1, 0.02);
+    fn the_motion_under_pending_commands_is_predicted() {
+        let mut delay = ReactionDelay::new(0.1, 0.02);
         let (mut position, mut velocity) = (Vec2::zeros(), Vec2::new(10.0, 0.0));
         let commands: Vec<Vec2> = (0..20).map(|i| Vec2::new(f64::from(i % 7) - 3.0, f64::from(i % 3))).collect();
-        let mut foreseen = Vec::new();
+        let mut predicted = Vec::new();
         for command in commands {
-            let (offset, then) = reaction.foresee(velocity);
-            foreseen.push((position + offset, then));
-            let next = velocity + reaction.delay(command) * 0.02;
+            let motion = delay.pending_motion(velocity);
+            predicted.push((position + motion.offset, motion.velocity));
+            let next = velocity + delay.push(command) * 0.02;
             position += (velocity + next) * 0.01;
             velocity = next;
-            if foreseen.len() >= 5 {
-                let (p, v) = foreseen[foreseen.len() - 5];
+            if predicted.len() >= 5 {
+                let (p, v) = predicted[predicted.len() - 5];
                 assert!((p - position).norm() < 1e-12 && (v - velocity).norm() < 1e-12);
             }
         }
     }
 
     #[test]
-    fn the_line_is_lengthened_and_shortened() {
-        let mut reaction = Reaction::new(0.04, 0.02);
-        let mut said = Vec::new();
+    fn the_delay_grows_and_shrinks() {
+        let mut delay = ReactionDelay::new(0.04, 0.02);
+        let mut effective = Vec::new();
         for (tick, extra_s) in [0.0, 0.0, 0.0, 0.04, 0.04, 0.04, 0.0, 0.0].into_iter().enumerate() {
-            assert_eq!(reaction.slow_down(extra_s), 0.04 + extra_s);
-            said.push(reaction.delay(Vec2::new(1.0 + tick as f64, 0.0)).x);
+            assert_eq!(delay.set_extra(extra_s), 0.04 + extra_s);
+            effective.push(delay.push(Vec2::new(1.0 + tick as f64, 0.0)).x);
         }
-        // Two ticks late; then command 1 goes on until the line is four ticks long; then two are left out.
-        assert_eq!(said, [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 5.0, 6.0]);
+        // Two ticks late. Then command 1 repeats until the delay is four ticks. Then two commands are skipped.
+        assert_eq!(effective, [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 5.0, 6.0]);
     }
 }

@@ -1,88 +1,85 @@
-//! The paper's drone: detect, obey, avoid, queue, re-form; plan for all while it leads. Paper, Algorithm 1.
+//! The paper's pilot: it detects obstacles, obeys plans, avoids, queues and re-forms, and it plans while it leads (paper,
+//! Algorithm 1).
 
-use crate::danger::Detection;
+use crate::detection::Detection;
+use crate::emergency_route::EmergencyRoute;
 use crate::escape::Escape;
-use crate::foresight::Foresight;
 use crate::guidance::anchor;
+use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
-use crate::queue::{Ahead, ahead_of, queue_speed};
-use crate::reaction::Reaction;
-use crate::rollout::{MAX_MEMBERS, Rollout, Start};
-use crate::safety::{NearObstacle, Neighbour, Safety};
-use crate::stray::Stray;
-use crate::way::{OwnWay, Way};
-use skein_leader::cost::{Flight, shortest, trips};
+use crate::queue::QueuePacer;
+use crate::reaction::ReactionDelay;
+use crate::rollout::{MAX_MEMBERS, Rollout, RolloutDrone, RolloutInput, RolloutPilot};
+use crate::route_follower::RouteFollower;
+use crate::safety::{NearObstacle, Safety};
+use crate::silent_drones::SilentDrones;
+use crate::stale_formation::StaleFormation;
+use crate::state_predictor::StatePredictor;
+use crate::straggler::Straggler;
+use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, SILENT_DRONE_RADIUS};
+use skein_leader::cost::Flight;
 use skein_leader::leading::{Leading, Own};
-use skein_leader::params::Strategy;
-use skein_leader::plan_bundle::PlanBundle;
-use skein_leader::routes::{Body, Routes};
-use skein_protocol::downlink::Senses;
-use skein_protocol::payload::{MAX_PLACES, QueuePlace, set_tag};
-use skein_protocol::{Message, Phase, SimTime, Vec2};
+use skein_leader::ledger::{Ledger, PlanBundle};
+use skein_leader::planner::{Objective, Strategy};
+use skein_leader::routes::Routes;
+use skein_protocol::downlink::{SensedShape, Senses};
+use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, Plan, QueuePlace, set_tag};
+use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
 
-/// A drone that hangs dead in the air is given a wider berth than the safe distance, as a factor.
-const DEAD_BERTH: f64 = 1.1;
-
-/// A drone that does not get on waits so long before it gives way, s; in formation the leader opens ranks before.
-const PATIENCE_ON_THE_WAY_S: f64 = 3.0;
-const PATIENCE_IN_FORMATION_S: f64 = 8.0;
-
-/// A formation of another term than the leader's is given up after so long, s.
-const OLD_FORMATION_S: f64 = 5.0;
-
-/// Out of a gap that a body bars a drone flies back at this part of its speed.
-const CORNERED: f64 = 0.5;
-
-/// One drone's mind, and what it remembers.
+/// The pilot of one drone, composed of machines that each own their state.
 #[derive(Clone, Debug)]
 pub struct SwarmPilot {
-    pub(crate) params: PilotParams,
-    pub(crate) leading: Leading,
-    pub(crate) way: Way,
+    params: PilotParams,
+    leading: Leading,
+    route: RouteFollower,
+    queue: QueuePacer,
     safety: Safety,
-    reaction: Reaction,
-    foresight: Foresight,
+    reaction: ReactionDelay,
+    predictor: StatePredictor,
     escape: Escape,
-    stray: Stray,
-    /// Since when it obeys a formation of another term than its leader's.
-    old_formation: Option<SimTime>,
-    /// Apart: only a leader that thinks has one, and all others would carry the room for it through every tick.
-    rollout: Option<Box<Rollout>>,
-    silent: Vec<Vec2>,
-    ahead: Vec<Ahead>,
-    pub(crate) neighbours: Vec<Neighbour>,
+    straggler: Straggler,
+    stale_formation: StaleFormation,
+    silent: SilentDrones,
+    neighbours: NeighbourTable,
+    /// Boxed: only a leader that looks ahead has one, and the others would carry the memory for it through every tick.
+    rollout: Option<Box<Rollout<Self>>>,
 }
 
 impl SwarmPilot {
     /// A drone that has just started and knows nothing but its parameters.
     #[must_use]
     pub fn new(params: PilotParams) -> Self {
+        let leading = Leading::new(&params.leading());
+        Self::with_leading(params, leading)
+    }
+
+    fn with_leading(params: PilotParams, leading: Leading) -> Self {
         Self {
-            leading: Leading::new(&params.leading()),
-            way: Way::new(params.me, params.planner.course_y_m),
+            leading,
+            route: RouteFollower::new(params.me, params.planner.course_y_m),
+            queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
-            reaction: Reaction::new(params.braking.reaction_time_s, params.dt_s),
-            foresight: Foresight::default(),
+            reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
+            predictor: StatePredictor::default(),
             escape: Escape::default(),
-            stray: Stray::default(),
-            old_formation: None,
+            straggler: Straggler::default(),
+            stale_formation: StaleFormation::default(),
+            silent: SilentDrones::default(),
+            neighbours: NeighbourTable::new(params.neighbours()),
             rollout: None,
-            silent: Vec::new(),
-            ahead: Vec::new(),
-            neighbours: Vec::new(),
             params,
         }
     }
 
-    /// Algorithm 2: an obstacle in detection range is sensed whole, and told.
+    /// Algorithm 2: notes every obstacle in detection range, with its whole shape.
     fn sense(&mut self, senses: &Senses<'_>) {
         for shape in senses.obstacles.iter().filter_map(|entry| senses.shape(entry)) {
             self.leading.sense(senses.now, shape.id, shape.shape);
         }
     }
 
-    /// Elections, and planning while it leads.
+    /// Takes part in elections, and plans while it leads.
     fn lead(&mut self, senses: &Senses<'_>, own: &Own, say: &mut Vec<Message>) {
         self.leading.elect(senses.now, own, say);
         if self.leading.is_leader() {
@@ -94,116 +91,144 @@ impl SwarmPilot {
 
     fn plan(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
         self.leading.refresh_members(now, own);
-        if let Some(mut rollout) = self.rollout.take() {
-            // What became known meanwhile is planned for in the next tick.
-            let over = match rollout.still_holds(self.leading.members(), self.leading.obstacles().iter().count()) {
-                true => rollout.work(own.tick),
-                false => Some(rollout.choose()),
-            };
-            match over {
-                Some(bundle) => self.leading.adopt(now, bundle),
-                None => self.rollout = Some(rollout),
-            }
+        if let Some(rollout) = self.rollout.take() {
+            self.look_ahead(now, own.tick, rollout);
             return;
         }
-        let alternatives = self.leading.decide(now, &self.silent, say);
+        let alternatives = self.leading.decide(now, self.silent.positions(), say);
         match self.params.planner.strategy {
             Strategy::LookAhead(objective) if alternatives.len() > 1 && self.leading.living().len() <= MAX_MEMBERS => {
-                self.rehearse(Start { tick: own.tick, now, objective }, alternatives);
+                self.begin_rollout(now, own.tick, objective, alternatives);
             }
-            // Too many for a rehearsal: the rule's.
-            _ => alternatives.into_iter().take(2).next_back().into_iter().for_each(|o| self.leading.adopt(now, o)),
+            // Without a look-ahead the leader takes the plan of the paper's rule, which is the second, or the only one.
+            _ => {
+                if let Some(bundle) = alternatives.into_iter().take(2).next_back() {
+                    self.leading.adopt(now, bundle);
+                }
+            }
         }
     }
 
-    /// Sends all on the ways to fly meanwhile, in the groups they have, and begins to rehearse what else could be done.
-    fn rehearse(&mut self, start: Start, alternatives: Vec<PlanBundle>) {
+    /// Continues a look-ahead. If members or obstacles have changed, it ends at once with the best plan so far, and the
+    /// leader plans for the change in the next tick.
+    fn look_ahead(&mut self, now: SimTime, tick: u64, mut rollout: Box<Rollout<Self>>) {
+        let chosen = if rollout.is_current(self.leading.members(), self.leading.obstacles().iter().count()) {
+            rollout.advance(tick)
+        } else {
+            Some(rollout.choose())
+        };
+        match chosen {
+            Some(bundle) => self.leading.adopt(now, bundle),
+            None => self.rollout = Some(rollout),
+        }
+    }
+
+    /// Begins a look-ahead over these alternatives. Until it decides, the swarm flies the interim plan in its present
+    /// groups.
+    fn begin_rollout(&mut self, now: SimTime, tick: u64, objective: Objective, alternatives: Vec<PlanBundle>) {
         let (members, scope) = (self.leading.members(), self.leading.scope());
-        let mut first = alternatives[self.leading.interim()].clone();
+        let interim = self.leading.interim();
+        let mut first = alternatives[interim].clone();
         first.unsplit(members, scope);
         first.parts.retain(|id| members.iter().any(|m| m.id == id));
-        self.rollout = Some(Box::new(Rollout::new(self, start, alternatives)));
-        self.leading.adopt(start.now, first);
+        let params = self.params.rollout();
+        let obstacles = self.leading.obstacles().iter();
+        let input = RolloutInput {
+            tick,
+            now,
+            objective,
+            members: members.iter().map(|member| member.id).collect(),
+            obstacles: obstacles.map(|(id, known)| SensedShape { shape: known.shape, id, reserved: 0 }).collect(),
+            drones: self.rollout_drones(now, params.step_s()),
+            alternatives,
+            interim,
+        };
+        self.rollout = Some(Box::new(Rollout::new(params, input)));
+        self.leading.adopt(now, first);
     }
 
-    /// Where drones that say nothing hang by now: those ranged, where they are, heard before or not; of the others the last
-    /// beacon, and how far they took to stop.
-    fn find_silent(&mut self, senses: &Senses<'_>) {
-        let braking = 2.0 * self.params.safety.acceleration_max_mps2;
-        let peers = self.leading.peers();
-        let mute = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
-        self.silent.clear();
-        self.silent.extend(mute.map(|n| senses.position + Vec2::from(n.position_m)));
-        for (_, pose) in peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id)) {
-            let velocity = Vec2::from(pose.velocity_mps);
-            self.silent.push(Vec2::from(pose.position_m) + velocity * (velocity.norm() / braking));
+    /// All drones that this leader knows to live, to be stepped every `step_s`.
+    fn rollout_drones(&self, now: SimTime, step_s: f64) -> Vec<RolloutDrone<Self>> {
+        let ledger = self.leading.united_ledger(now);
+        let living = self.leading.living();
+        let drone = |member: &skein_leader::planner::Member| RolloutDrone {
+            pilot: self.rollout_pilot(member.id, now, step_s, &ledger),
+            position: member.position,
+            velocity: member.velocity,
+        };
+        living.iter().map(drone).collect()
+    }
+
+    /// The pilot of a drone as this leader knows it, to be stepped every `dt_s`.
+    fn rollout_pilot(&self, me: DroneId, now: SimTime, dt_s: f64, ledger: &Ledger) -> Self {
+        let mut params = PilotParams { me, start: now, dt_s, ..self.params.clone() };
+        params.safety.dt_s = dt_s;
+        params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
+        // A simulated leader does not look ahead itself.
+        params.planner.strategy = Strategy::PaperRule;
+        let leading = self.leading.rollout_member(&params.leading(), now, ledger.of_member(me));
+        Self::with_leading(params, leading)
+    }
+
+    /// Takes the shortest route past an obstacle that is in the danger zone and that no plan covers.
+    fn emergency_avoidance(&mut self, senses: &Senses<'_>) {
+        let Some(id) = self.urgent_obstacle(senses) else { return };
+        let obstacles = self.leading.obstacles();
+        let Some(set) = obstacles.sets().iter().find(|set| set.contains(&id)) else { return };
+        let tag = set_tag(set);
+        if self.route.emergency_set() == Some(tag) {
+            return;
+        }
+        let Some(shapes) = obstacles.shapes(set) else { return };
+        let planner = &self.params.planner;
+        let routes = Routes::new(&shapes, &planner.routes);
+        let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: planner.course_y_m };
+        if let Some(route) = EmergencyRoute::shortest(tag, routes, senses.position, &flight) {
+            self.route.set_emergency(route);
         }
     }
 
-    /// Nobody said anything about an obstacle, and it is dangerously near: go round it by the nearest way.
-    fn emergency_avoidance(&mut self, senses: &Senses<'_>) {
-        let clearance_m = self.params.safety.clearance_m;
+    /// Of the obstacles in the danger zone that this drone has neither passed nor an assignment for: the one with the
+    /// least time to impact.
+    fn urgent_obstacle(&self, senses: &Senses<'_>) -> Option<ObstacleId> {
+        let (me, clearance_m) = (self.params.me, self.params.safety.clearance_m);
         let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
-        let planned =
-            |id| self.leading.planned_sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(self.params.me));
-        let past = |id| self.leading.obstacles().has_passed(self.params.me, id);
+        let planned = |id| self.leading.planned_sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(me));
+        let past = |id| self.leading.obstacles().has_passed(me, id);
         let urgent = near.filter(|(detection, id)| detection.danger && !planned(*id) && !past(*id));
         let sooner = |a: &(Detection, _), b: &(Detection, _)| a.0.time_to_impact_s.total_cmp(&b.0.time_to_impact_s);
-        let Some((_, id)) = urgent.min_by(sooner) else { return };
-        let Some(set) = self.leading.obstacles().sets().iter().find(|set| set.contains(&id)) else { return };
-        let tag = set_tag(set);
-        if self.way.own.as_ref().is_some_and(|own| own.tag == tag) {
-            return;
-        }
-        let Some(shapes) = self.leading.obstacles().shapes(set) else { return };
-        let routes = Routes::new(&shapes, &self.params.planner.routes);
-        if senses.position.x >= routes.exit_x_m() {
-            return;
-        }
-        let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: self.params.planner.course_y_m };
-        let route = shortest(&trips(&[], &routes, senses.position, &flight));
-        self.way.own = Some(OwnWay { tag, routes, route });
+        urgent.min_by(sooner).map(|(_, id)| id)
     }
 
-    /// The velocity it wants, were nobody in the way, m/s.
-    fn wanted_velocity(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) -> Vec2 {
+    /// The velocity to fly if no other drone were near, m/s. `open`: the places in the queues of the sets still to leave.
+    fn wanted_velocity(&mut self, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
         let guidance = self.params.guidance;
-        let cruise = Vec2::new(guidance.speed_mps, 0.0);
-        if self.way.is_cornered() {
-            return Vec2::new(-CORNERED * guidance.speed_mps, 0.0);
+        if self.route.is_blocked() {
+            return Vec2::new(-BACK_OUT_SPEED * guidance.speed_mps, 0.0);
         }
-        if let Some(pull) = self.way.pull(senses.position) {
-            return pull.direction * self.queue_speed(senses.now, places);
+        if let Some(steering) = self.route.steering(senses.position) {
+            return steering.direction * self.queue_speed_mps(senses.now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
         let unfollowed = self.leading.is_unfollowed(senses.now);
-        if let Some((slot, velocity)) = self.stray.slot(senses.now, unfollowed, shape, spacing_m) {
-            return self.on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
+        if let Some((slot, velocity)) = self.straggler.slot(senses.now, unfollowed, shape, spacing_m) {
+            return self.limit_on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
         }
-        let over = self.is_formation_over(senses.now);
+        let stale = self.stale_formation.is_stale(senses.now, self.leading.obeyed(), self.leading.term());
         match (self.leading.obeyed(), self.leading.part()) {
-            (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !over => {
+            (Some(bundle), Some(part)) if bundle.plan.phase != PHASE_AVOID && !stale => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
-                self.on_sight(wanted, senses.now)
+                self.limit_on_sight(wanted, senses.now)
             }
-            _ => cruise,
+            _ => Vec2::new(guidance.speed_mps, 0.0),
         }
     }
 
-    /// Whether the formation it obeys was one of another term than that of its leader, who for long has made no new one: the
-    /// others are still on their way, and a drone that kept its slot might bar it.
-    fn is_formation_over(&mut self, now: SimTime) -> bool {
-        let term = self.leading.term();
-        let bundle = self.leading.obeyed();
-        let old = bundle.is_some_and(|bundle| bundle.plan.phase() == Phase::Reform && bundle.plan.id.ballot != term);
-        self.old_formation = old.then(|| self.old_formation.unwrap_or(now));
-        self.old_formation.is_some_and(|since| now.since(since) >= OLD_FORMATION_S)
-    }
-
-    /// No faster than on sight while somebody who may still fly is not heard: it may come the other way.
-    fn on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
+    /// Limits a velocity while a drone is silent that may still fly, because it may come the other way: two drones at this
+    /// speed can stop when they come into ranging distance.
+    fn limit_on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
         if self.leading.peers().silent(now).next().is_none() {
             return wanted;
         }
@@ -211,55 +236,52 @@ impl SwarmPilot {
         if speed > limit { wanted * (limit / speed) } else { wanted }
     }
 
-    fn queue_speed(&mut self, now: SimTime, places: &[QueuePlace; MAX_PLACES]) -> f64 {
-        let guidance = self.params.guidance;
-        let mut speed = guidance.speed_mps;
+    fn queue_speed_mps(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) -> f64 {
         if !self.params.queue {
-            return speed;
+            return self.params.guidance.speed_mps;
         }
-        for place in places.iter().filter(|place| place.set != 0 && self.way.is_open_set(place.set)) {
-            ahead_of(*place, self.leading.peers(), now, &mut self.ahead);
-            let headway_s = self.params.planner.headway_s;
-            let here =
-                queue_speed(&self.ahead, place.remaining_m, headway_s, guidance.speed_mps, guidance.speed_change_mps);
-            speed = speed.min(here);
-        }
-        speed
+        let places = open.iter().copied().filter(|place| place.set != 0);
+        self.queue.speed_mps(places, self.leading.peers(), now, &self.params.queueing())
     }
 
-    /// Acceleration towards a velocity, made safe, m/s².
-    fn accelerate(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
+    /// The safe acceleration nearest to the one that leads to the wanted velocity, m/s².
+    fn safe_acceleration(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
         let gain = self.params.velocity_gain_per_s;
         let obstacles = senses
             .obstacles
             .iter()
             .map(|o| NearObstacle { nearest_m: Vec2::from(o.nearest_m) - senses.position, distance_m: o.distance_m });
-        let neighbours = self.neighbours.iter().copied();
-        self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, neighbours)
+        self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, self.neighbours.iter())
     }
 
-    /// The acceleration to command now, m/s²: for the moment at which it takes effect.
-    fn steer(&mut self, senses: &Senses<'_>, places: &[QueuePlace; MAX_PLACES]) -> Vec2 {
-        let mut foresight = std::mem::take(&mut self.foresight);
-        let then = match self.reaction.span_s() {
-            span_s if span_s > 0.0 => {
-                foresight.look(senses, span_s, self.reaction.foresee(senses.velocity));
-                foresight.senses(senses)
-            }
-            _ => *senses,
+    /// The acceleration to command now, m/s², computed for the moment at which it takes effect.
+    fn steer(&mut self, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
+        let mut predictor = std::mem::take(&mut self.predictor);
+        let delay_s = self.reaction.delay_s();
+        let then = if delay_s > 0.0 {
+            predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity));
+            predictor.predicted(senses)
+        } else {
+            *senses
         };
-        let wanted = self.wanted_velocity(&then, places);
+        let wanted = self.wanted_velocity(&then, open);
         let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
-        let patience_s = if self.way.is_open() { PATIENCE_ON_THE_WAY_S } else { PATIENCE_IN_FORMATION_S };
+        let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
         let wanted = self.escape.steer(then.now, then.velocity, wanted, patience_s, slow_mps);
-        self.find_neighbours(senses.now, &then, places);
-        let safe = self.accelerate(wanted, &then);
-        self.foresight = foresight;
+        self.neighbours.update(&NeighbourView {
+            now: senses.now,
+            senses: &then,
+            peers: self.leading.peers(),
+            obeyed: self.leading.stamp(),
+            places: open,
+        });
+        let safe = self.safe_acceleration(wanted, &then);
+        self.predictor = predictor;
         safe
     }
 
-    fn command(&self, acceleration: Vec2, places: &[QueuePlace; MAX_PLACES]) -> Command {
-        let open = places.iter().find(|place| place.set != 0 && self.way.is_open_set(place.set));
+    fn command(&self, acceleration: Vec2, open: &[QueuePlace; MAX_PLACES]) -> Command {
+        let first = open.iter().find(|place| place.set != 0);
         Command {
             acceleration,
             obeyed: self.leading.stamp(),
@@ -267,34 +289,35 @@ impl SwarmPilot {
             group: self.leading.group(),
             leads: self.leading.is_leader().then(|| self.leading.scope()),
             term: self.leading.term(),
-            phase: self.leading.obeyed().map_or(Phase::Cruise, |bundle| bundle.plan.phase()),
-            place: open.map(|place| (place.route, place.rank)),
+            phase: self.leading.obeyed().map_or(0, |bundle| bundle.plan.phase),
+            place: first.map(|place| (place.route, place.rank)),
         }
     }
 }
 
 impl Pilot for SwarmPilot {
     fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
-        self.params.braking.reaction_time_s = self.reaction.slow_down(senses.extra_reaction_s);
-        self.safety.set_reaction_time(self.reaction.span_s());
+        self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
+        self.safety.set_reaction_time(self.reaction.delay_s());
         let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for &Heard { source, message } in heard {
             self.leading.hear(senses.now, source, message, say);
-            self.stray.hear(message);
+            self.straggler.hear(message);
         }
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
-        self.find_silent(senses);
+        let safety = self.params.safety;
+        self.silent.update(senses, self.leading.peers(), safety.acceleration_max_mps2);
         self.lead(senses, &own, say);
         self.emergency_avoidance(senses);
-        let radius_m = DEAD_BERTH * self.params.safety.safe_distance_m;
-        let bodies: Vec<Body> = self.silent.iter().map(|&centre_m| Body { centre_m, radius_m }).collect();
-        self.way.update(self.leading.ledger(), senses.position, &bodies);
+        let bodies = self.silent.bodies(SILENT_DRONE_RADIUS * safety.safe_distance_m);
+        self.route.update(self.leading.ledger(), senses.position, &bodies);
         self.leading.note_passed(senses.position);
-        let places = self.way.places(senses.position);
-        let safe = self.steer(senses, &places);
-        let acceleration = self.reaction.delay(safe);
-        let command = self.command(acceleration, &places);
+        let places = self.route.places(senses.position);
+        let open = self.route.open_places(places);
+        let safe = self.steer(senses, &open);
+        let acceleration = self.reaction.push(safe);
+        let command = self.command(acceleration, &open);
         self.leading.speak(senses.now, &own, &places, say);
         command
     }
@@ -302,5 +325,36 @@ impl Pilot for SwarmPilot {
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
         ages.extend(self.leading.peers().living(now).map(|(_, pose)| now.since(pose.stamp)));
+    }
+}
+
+impl RolloutPilot for SwarmPilot {
+    fn id(&self) -> DroneId {
+        self.params.me
+    }
+
+    fn obey(&mut self, now: SimTime, bundle: PlanBundle) {
+        self.leading.obey(now, bundle);
+    }
+
+    fn stamp(&self) -> PlanStamp {
+        self.leading.stamp()
+    }
+
+    fn newest_stamp(&self) -> PlanStamp {
+        self.leading.newest_stamp()
+    }
+
+    fn plan(&self) -> Option<&Plan> {
+        self.leading.obeyed().map(|bundle| &bundle.plan)
+    }
+
+    fn slot(&self) -> Option<Vec2> {
+        self.leading.part().map(|part| Vec2::from(part.slot_m))
+    }
+
+    fn last_gate_x_m(&self) -> f64 {
+        let gates = self.leading.planned_sets().iter().map(|set| set.routes.gate_x_m());
+        gates.fold(f64::NEG_INFINITY, f64::max)
     }
 }

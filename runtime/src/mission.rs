@@ -3,9 +3,9 @@
 use crate::beacon::BeaconPilot;
 use crate::pilot_host::PilotHost;
 use crate::{RuntimeError, plan};
-use skein_agent::danger::Braking;
+use skein_agent::detection::Braking;
 use skein_agent::guidance::GuidanceParams;
-use skein_agent::safety::{RANGING, SafetyParams};
+use skein_agent::safety::{RANGING_FACTOR, SafetyParams};
 use skein_agent::{Pilot, PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
 use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
@@ -44,7 +44,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         clearance_m: scenario.avoidance.clearance_m,
         planning_distance_m: scenario.avoidance.planning_distance_m,
         detection_range_m: scenario.sensors.detection_range_m,
-        ranging_m: scenario.sensors.ranging.then_some(RANGING * drone.safe_distance_m),
+        ranging_m: scenario.sensors.ranging.then_some(RANGING_FACTOR * drone.safe_distance_m),
         channel: scenario.channel(),
         locality: scenario.radio().locality(),
         failsafe: match scenario.faults.failsafe {

@@ -12,7 +12,7 @@ const PARAMS: SafetyParams = SafetyParams {
 };
 const DT: f64 = 0.02;
 
-/// Flies two drones, each wanting to fly with its velocity for ever; returns their least distance.
+/// Flies two drones, each of which wants to keep its velocity. Returns their least distance, m.
 fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
     let wanted = v;
     let mut filters = [Safety::new(PARAMS), Safety::new(PARAMS)];
@@ -51,13 +51,13 @@ proptest! {
 }
 
 #[test]
-fn one_that_takes_all_is_safe_from_one_that_takes_nothing() {
+fn a_drone_with_the_whole_share_is_safe_from_one_that_does_nothing() {
     let least = fly_pair([Vec2::zeros(), Vec2::new(90.0, 5.0)], [Vec2::new(10.0, 0.0), Vec2::zeros()], [1.0, 0.0]);
     assert!(least >= PARAMS.safe_distance_m, "{least}");
 }
 
 #[test]
-fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
+fn a_drone_that_brakes_hard_ahead_is_not_hit_for_any_share() {
     for share in [0.1, 0.5, 0.9] {
         let (mut ahead, mut behind) = ((31.0, 10.0), (0.0, 10.0));
         let mut filter = Safety::new(PARAMS);
@@ -83,15 +83,15 @@ fn a_drone_that_stops_dead_ahead_is_not_run_into_whatever_its_share_was() {
 }
 
 #[test]
-fn who_flies_on_sight_stops_for_whoever_comes_into_sight() {
+fn drones_at_the_speed_on_sight_stop_for_each_other() {
     let speed = PARAMS.speed_on_sight_mps();
-    let (apart, towards) = (Vec2::new(RANGING * PARAMS.safe_distance_m, 0.0), Vec2::new(speed, 0.0));
+    let (apart, towards) = (Vec2::new(RANGING_FACTOR * PARAMS.safe_distance_m, 0.0), Vec2::new(speed, 0.0));
     for offset in [0.0, 0.1, 8.0] {
         let least = fly_pair([Vec2::zeros(), apart + Vec2::new(0.0, offset)], [towards, -towards], [1.0, 1.0]);
         assert!(least >= PARAMS.safe_distance_m, "{least}");
     }
     let least = fly_pair([Vec2::zeros(), apart], [towards * 1.1, -towards * 1.1], [1.0, 1.0]);
-    assert!(least < PARAMS.safe_distance_m, "the speed is not lower than it has to be: {least}");
+    assert!(least < PARAMS.safe_distance_m, "the speed is not lower than necessary: {least}");
     let slow = SafetyParams { reaction_time_s: 0.5, ..PARAMS }.speed_on_sight_mps();
     assert!(slow < speed - 1.0 && slow > 0.0, "{slow}");
 }
@@ -108,7 +108,7 @@ fn a_drone_stops_before_a_wall() {
         v = next;
         assert!(x <= -PARAMS.clearance_m, "{x}");
     }
-    assert!(x > -PARAMS.clearance_m - 1.0, "it comes close: {x}");
+    assert!(x > -PARAMS.clearance_m - 1.0, "the drone stops close to the wall: {x}");
 }
 
 fn neighbour(position_m: Vec2, velocity_mps: Vec2, share: f64) -> Neighbour {
@@ -120,16 +120,16 @@ fn filtered(wanted: Vec2, velocity: Vec2, neighbours: &[Neighbour]) -> Vec2 {
 }
 
 #[test]
-fn an_old_beacon_of_a_drone_that_would_be_sensed_if_it_were_near_drives_nobody_away() {
+fn an_old_beacon_causes_no_evasion_if_ranging_would_sense_a_near_drone() {
     let told = Neighbour { age_s: 4.0, sensed: false, ..neighbour(Vec2::new(65.0, 0.0), Vec2::zeros(), 0.5) };
-    assert!(filtered(Vec2::zeros(), Vec2::zeros(), &[told]).x < -1.0, "without ranging it may be anywhere");
-    let unsensed = Neighbour { least_m: RANGING * PARAMS.safe_distance_m, ..told };
+    assert!(filtered(Vec2::zeros(), Vec2::zeros(), &[told]).x < -1.0, "without ranging the other may be anywhere");
+    let unsensed = Neighbour { least_m: RANGING_FACTOR * PARAMS.safe_distance_m, ..told };
     assert_eq!(filtered(Vec2::zeros(), Vec2::zeros(), &[unsensed]), Vec2::zeros());
 }
 
 #[test]
-fn a_drone_squeezed_from_two_sides_does_not_bolt_to_the_third() {
-    // Both a little too near and not quite opposite: across nothing is won by full acceleration.
+fn a_drone_between_two_others_does_not_bolt_sideways() {
+    // Both are a little too near and not quite opposite. Full acceleration sideways gains nothing.
     let distance_m = PARAMS.safe_distance_m + 0.3;
     let squeezed = [Vec2::new(distance_m, 0.0), Vec2::new(-distance_m, -0.6)].map(|p| neighbour(p, Vec2::zeros(), 1.0));
     let a = filtered(Vec2::zeros(), Vec2::zeros(), &squeezed);
@@ -137,7 +137,7 @@ fn a_drone_squeezed_from_two_sides_does_not_bolt_to_the_third() {
 }
 
 #[test]
-fn nobody_is_chased_into_a_body_by_a_silent_drone() {
+fn a_silent_drone_does_not_chase_another_into_a_body() {
     let body = neighbour(Vec2::new(34.0, 0.0), Vec2::new(-6.0, 0.0), 1.0);
     let chaser = neighbour(Vec2::new(-33.0, 0.0), Vec2::new(3.0, 0.0), 1.0);
     let own = Vec2::new(6.0, 0.0);

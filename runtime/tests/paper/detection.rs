@@ -1,8 +1,7 @@
 //! The global routine and obstacle detection: A1, A2, E1 to E4.
 
 use super::flown::{Flown, fly_file, scenario, velocity};
-use skein_agent::danger::Braking;
-use skein_protocol::Phase;
+use skein_agent::detection::Braking;
 use skein_protocol::record::EventKind;
 use skein_scenario::{Scenario, ScenarioSource};
 

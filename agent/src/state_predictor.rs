@@ -1,25 +1,31 @@
-//! What a drone will sense when a command that it gives now takes effect, a reaction time from now. Its own way until
-//! then is known, obstacles stay where they are, and neighbours are taken to keep their velocity.
+//! Predicts what a drone will sense when the command that it gives now takes effect, one reaction time later.
+//!
+//! The drone's own motion until then is known, because the pending commands are. Obstacles stay where they are.
+//! Neighbours are assumed to keep their velocities.
 
+use crate::reaction::PendingMotion;
 use skein_leader::geometry::nearest;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, Senses};
 use skein_protocol::{SimTime, Vec2};
 
-/// Senses ahead of time; keeps its memory.
+/// Predicted senses, and the memory for their entries.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Foresight {
+pub(crate) struct StatePredictor {
     now: SimTime,
-    body: (Vec2, Vec2),
+    position: Vec2,
+    velocity: Vec2,
     obstacles: Vec<SensedObstacle>,
     neighbours: Vec<SensedNeighbour>,
 }
 
-impl Foresight {
-    /// Looks `span_s` ahead, in which the drone will have flown `offset`, m, and have this velocity then, m/s.
-    pub fn look(&mut self, senses: &Senses<'_>, span_s: f64, (offset, velocity): (Vec2, Vec2)) {
+impl StatePredictor {
+    /// Predicts the senses `span_s` from now. Until then the drone moves by `motion`.
+    pub(crate) fn predict(&mut self, senses: &Senses<'_>, span_s: f64, motion: PendingMotion) {
+        let PendingMotion { offset, velocity } = motion;
         let position = senses.position + offset;
         self.now = senses.now.after(span_s);
-        self.body = (position, velocity);
+        self.position = position;
+        self.velocity = velocity;
         self.obstacles.clear();
         for sensed in senses.obstacles {
             let Some(outline) = senses.shape(sensed).map(|sensed| &sensed.shape) else { continue };
@@ -37,9 +43,9 @@ impl Foresight {
         }));
     }
 
-    /// What it will sense then.
-    pub fn senses<'a>(&'a self, senses: &Senses<'a>) -> Senses<'a> {
-        senses.at(self.now, self.body, &self.obstacles, &self.neighbours)
+    /// The predicted senses. `senses` are those that were passed to [`Self::predict`].
+    pub(crate) fn predicted<'a>(&'a self, senses: &Senses<'a>) -> Senses<'a> {
+        senses.at(self.now, (self.position, self.velocity), &self.obstacles, &self.neighbours)
     }
 }
 
@@ -51,7 +57,7 @@ mod tests {
     use skein_protocol::{DroneId, ObstacleId};
 
     #[test]
-    fn obstacles_stay_and_neighbours_fly_on() {
+    fn obstacles_stay_and_neighbours_keep_their_velocity() {
         let shape = ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap();
         let shapes = [SensedShape { shape, id: ObstacleId(3), reserved: 0 }];
         let obstacles = [SensedObstacle { nearest_m: [40.0, 0.0], distance_m: 40.0, shape: 0, reserved: 0 }];
@@ -59,9 +65,10 @@ mod tests {
             [SensedNeighbour { position_m: [0.0, 30.0], velocity_mps: [0.0, -2.0], drone: DroneId(7), reserved: 0 }];
         let body = (Vec2::zeros(), Vec2::new(10.0, 0.0));
         let senses = Senses::new((5, SimTime::from_secs(0.1)), body, &obstacles, &neighbours, &shapes);
-        let mut foresight = Foresight::default();
-        foresight.look(&senses, 0.5, (Vec2::new(4.0, 0.0), Vec2::new(6.0, 0.0)));
-        let ahead = foresight.senses(&senses);
+        let mut predictor = StatePredictor::default();
+        let motion = PendingMotion { offset: Vec2::new(4.0, 0.0), velocity: Vec2::new(6.0, 0.0) };
+        predictor.predict(&senses, 0.5, motion);
+        let ahead = predictor.predicted(&senses);
         assert_eq!((ahead.now, ahead.position, ahead.velocity.x), (SimTime::from_secs(0.6), Vec2::new(4.0, 0.0), 6.0));
         assert!((ahead.obstacles[0].distance_m - 36.0).abs() < 1e-12);
         assert!((Vec2::from(ahead.obstacles[0].nearest_m) - Vec2::new(40.0, 0.0)).norm() < 1e-12);

@@ -1,4 +1,4 @@
-//! Distances of obstacle detection: paper, Algorithm 2 and equations 1 to 4.
+//! Obstacle detection: distances and danger zone (paper, Algorithm 2 and equations 1 to 4).
 
 use skein_protocol::Vec2;
 use skein_protocol::downlink::SensedObstacle;
@@ -6,31 +6,32 @@ use skein_protocol::downlink::SensedObstacle;
 /// Standard gravity, m/s².
 pub const GRAVITY_MPS2: f64 = 9.81;
 
-/// What stopping takes: the vehicle's constants.
+/// Constants of the vehicle that determine its stopping distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Braking {
     /// c_d of equation 3, dimensionless, > 0.
     pub drag_coefficient: f64,
-    /// t_c of equation 4, s.
+    /// Reaction time t_c of equation 4, s.
     pub reaction_time_s: f64,
 }
 
-/// What a drone makes of an obstacle that it senses.
+/// The result of Algorithm 2 for one sensed obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// Distance to its nearest point, negative inside, m.
+    /// Distance to the nearest point of the obstacle, negative inside it, m.
     pub distance_m: f64,
-    /// Direction of that point against the drone's velocity, positive to the left, -π to π, rad; against the x axis at
-    /// rest.
+    /// Direction of that point relative to the drone's velocity, or to the x axis if the drone is at rest. Positive to
+    /// the left, -π to π, rad.
     pub bearing_rad: f64,
-    /// Until the drone is there if it flew straight at it (equation 1), s; infinity at rest.
+    /// Time to impact if the drone flew straight at that point (equation 1), s; infinite at rest.
     pub time_to_impact_s: f64,
-    /// Whether it is in the danger zone.
+    /// Whether the obstacle is in the danger zone.
     pub danger: bool,
 }
 
 impl Braking {
-    /// Algorithm 2 for one obstacle in range of a drone at `position`, m, with `velocity`, m/s, which is to keep `clearance_m`.
+    /// Algorithm 2 for one obstacle in range of a drone at `position` (world frame, m) with `velocity` (m/s). The drone
+    /// has to keep `clearance_m` away from the obstacle.
     #[must_use]
     pub fn detect(&self, position: Vec2, velocity: Vec2, obstacle: &SensedObstacle, clearance_m: f64) -> Detection {
         let (to, speed) = (Vec2::from(obstacle.nearest_m) - position, velocity.norm());
@@ -43,7 +44,7 @@ impl Braking {
         }
     }
 
-    /// Time to impact at this distance and speed (equation 1), s; infinity at rest.
+    /// Time to impact at this distance and speed (equation 1), s; infinite at rest.
     #[must_use]
     pub fn time_to_impact_s(distance_m: f64, speed_mps: f64) -> f64 {
         if speed_mps > 0.0 { distance_m / speed_mps } else { f64::INFINITY }
@@ -67,8 +68,8 @@ impl Braking {
         self.reaction_m(speed_mps) + self.braking_m(speed_mps)
     }
 
-    /// The danger zone around a drone: within it an obstacle cannot be kept `clearance_m` away from by braking alone;
-    /// twice the stopping distance leaves room to turn.
+    /// Radius of the danger zone, m: the clearance and twice the stopping distance. Twice, because a drone needs room to
+    /// turn as well as to brake.
     #[must_use]
     pub fn danger_zone_m(&self, speed_mps: f64, clearance_m: f64) -> f64 {
         clearance_m + 2.0 * self.stopping_m(speed_mps)
@@ -80,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_obstacle_is_detected_with_distance_bearing_and_danger() {
+    fn a_detection_has_distance_bearing_time_to_impact_and_danger() {
         let braking = Braking { drag_coefficient: 5.0 / GRAVITY_MPS2, reaction_time_s: 0.0 };
         let obstacle = |nearest_m: [f64; 2]| {
             let distance_m = Vec2::from(nearest_m).norm();

@@ -1,0 +1,101 @@
+//! The neighbours that a drone keeps its distance from, and its share of each evasion.
+
+use crate::safety::{Neighbour, RANGING_FACTOR};
+use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
+use skein_leader::membership::{Peers, extrapolated};
+use skein_protocol::downlink::{BROKEN_RANGING, Senses};
+use skein_protocol::payload::QueuePlace;
+use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
+
+/// Constants of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NeighbourParams {
+    /// Least distance between two drones, m.
+    pub(crate) safe_distance_m: f64,
+    /// Whether the drone has a sensor that ranges neighbours.
+    pub(crate) ranging: bool,
+    /// Share of an evasion that the rear one of two queued drones takes, 0.5 to 1.
+    pub(crate) precedence_share: f64,
+}
+
+/// What the table is made from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NeighbourView<'a> {
+    /// When the drone gives its command.
+    pub(crate) now: SimTime,
+    /// The senses predicted for the moment at which that command takes effect.
+    pub(crate) senses: &'a Senses<'a>,
+    /// What the drone knows of its peers.
+    pub(crate) peers: &'a Peers,
+    /// The plan it obeys.
+    pub(crate) obeyed: PlanStamp,
+    /// Its places in the queues of the sets that it has still to leave; unused entries have set 0.
+    pub(crate) places: &'a [QueuePlace],
+}
+
+/// The neighbours of a drone.
+#[derive(Clone, Debug)]
+pub(crate) struct NeighbourTable {
+    params: NeighbourParams,
+    neighbours: Vec<Neighbour>,
+}
+
+impl NeighbourTable {
+    /// An empty table.
+    pub(crate) fn new(params: NeighbourParams) -> Self {
+        Self { params, neighbours: Vec::new() }
+    }
+
+    /// Fills the table: first the neighbours that are ranged, then those known by beacon alone.
+    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) {
+        let senses = view.senses;
+        self.neighbours.clear();
+        for sensed in senses.neighbours {
+            self.neighbours.push(Neighbour {
+                id: sensed.drone,
+                position_m: sensed.position_m.into(),
+                velocity_mps: sensed.velocity_mps.into(),
+                age_s: 0.0,
+                sensed: true,
+                least_m: 0.0,
+                share: self.share(view, sensed.drone),
+            });
+        }
+        let reach_m = BEACON_REACH * self.params.safe_distance_m;
+        let ranges = self.params.ranging && senses.broken & BROKEN_RANGING == 0;
+        let least_m = if ranges { RANGING_FACTOR * self.params.safe_distance_m } else { 0.0 };
+        for (id, pose) in view.peers.living(view.now) {
+            let position_m = extrapolated(pose, senses.now) - senses.position;
+            if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
+                continue;
+            }
+            let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
+            let (age_s, share) = (senses.now.since(pose.stamp), self.share(view, id));
+            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
+        }
+    }
+
+    /// The neighbours that were found.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Neighbour> {
+        self.neighbours.iter().copied()
+    }
+
+    /// This drone's share of an evasion, 0 to 1. It is 1 if the other drone is silent, and one half between drones that do
+    /// not share a queue. The rear drone of a queue takes more than half. The front one takes less, but only while a fresh
+    /// beacon shows that the other obeys the same plan.
+    fn share(&self, view: &NeighbourView<'_>, other: DroneId) -> f64 {
+        let Some(pose) = view.peers.last_of_living(other, view.now) else { return 1.0 };
+        let age_s = view.now.since(pose.stamp);
+        for mine in view.places.iter().filter(|place| place.set != 0) {
+            let same = |place: &&QueuePlace| place.set == mine.set && place.route == mine.route;
+            let Some(theirs) = pose.queue.iter().find(same) else { continue };
+            if mine.rank > theirs.rank {
+                return self.params.precedence_share;
+            }
+            if mine.rank < theirs.rank && age_s <= FRESH_BEACON_S && pose.obeyed == view.obeyed {
+                return 1.0 - self.params.precedence_share;
+            }
+        }
+        0.5
+    }
+}

@@ -1,0 +1,30 @@
+//! What a rollout needs of a pilot.
+
+use crate::pilot::Pilot;
+use skein_leader::ledger::PlanBundle;
+use skein_protocol::payload::Plan;
+use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
+
+/// A pilot that can be simulated: it can be cloned, given a plan, and asked what it makes of the plan.
+pub trait RolloutPilot: Pilot + Clone {
+    /// The drone that it flies.
+    fn id(&self) -> DroneId;
+
+    /// Adopts a plan at once, as if it had heard every message of the plan.
+    fn obey(&mut self, now: SimTime, bundle: PlanBundle);
+
+    /// Stamp of the plan that it obeys; the default, lower than any, before the first.
+    fn stamp(&self) -> PlanStamp;
+
+    /// The newest stamp that it has heard of, whether it can obey that plan yet or not.
+    fn newest_stamp(&self) -> PlanStamp;
+
+    /// The plan that it obeys.
+    fn plan(&self) -> Option<&Plan>;
+
+    /// Its slot in that plan, relative to the plan's anchor, m.
+    fn slot(&self) -> Option<Vec2>;
+
+    /// Abscissa of the last gate on its way, m; negative infinity if it has none to pass.
+    fn last_gate_x_m(&self) -> f64;
+}

@@ -1,0 +1,257 @@
+//! Follows a drone's routes past the obstacle sets ahead: the shortest path through them, and the places in their queues.
+
+use crate::emergency_route::EmergencyRoute;
+use crate::tuning::REDRAW_DRIFT_M;
+use skein_leader::cost::{Flight, shortest, trips};
+use skein_leader::funnel::{Corridor, RUN_OUT_M, Steering};
+use skein_leader::ledger::{Ledger, PlannedSet};
+use skein_leader::routes::{Body, Routes};
+use skein_protocol::payload::{MAX_PLACES, QueuePlace};
+use skein_protocol::{DroneId, PlanStamp, Vec2};
+
+/// One set on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Leg {
+    place: QueuePlace,
+    gate_x_m: f64,
+    exit_x_m: f64,
+    /// Whether the drone has still to leave the set.
+    open: bool,
+}
+
+/// What the corridor was drawn for. When it changes, the corridor is drawn again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct DrawnFor {
+    stamp: PlanStamp,
+    emergency: bool,
+    legs_left: usize,
+}
+
+/// A route taken instead of the assigned one, because an obstacle abreast or a body in the gap blocks that one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Detour {
+    set: u32,
+    route: usize,
+}
+
+/// Whether a drone can continue on its route.
+enum RouteState {
+    /// It continues, or no other route is better.
+    Clear,
+    /// It changes to this route.
+    Detour(usize),
+    /// A body blocks the route, and every other one begins farther back.
+    Blocked,
+}
+
+/// The routes of one drone and the corridor through them.
+#[derive(Clone, Debug)]
+pub struct RouteFollower {
+    me: DroneId,
+    course_y_m: f64,
+    legs: Vec<Leg>,
+    corridor: Option<Corridor>,
+    drawn_for: Option<DrawnFor>,
+    detours: Vec<Detour>,
+    bodies: Vec<Body>,
+    blocked: bool,
+    emergency: Option<EmergencyRoute>,
+}
+
+impl RouteFollower {
+    /// A drone with nothing to pass. `course_y_m`: ordinate of the line to which its paths return, m.
+    #[must_use]
+    pub fn new(me: DroneId, course_y_m: f64) -> Self {
+        Self {
+            me,
+            course_y_m,
+            legs: Vec::new(),
+            corridor: None,
+            drawn_for: None,
+            detours: Vec::new(),
+            bodies: Vec::new(),
+            blocked: false,
+            emergency: None,
+        }
+    }
+
+    /// The set that the drone passes by a route of its own, if any.
+    #[must_use]
+    pub fn emergency_set(&self) -> Option<u32> {
+        self.emergency.as_ref().map(EmergencyRoute::set)
+    }
+
+    /// Takes a route of the drone's own, until it is past the set or has an assignment.
+    pub fn set_emergency(&mut self, route: EmergencyRoute) {
+        self.emergency = Some(route);
+    }
+
+    /// Follows the ledger: accepts new assignments, closes the legs that the drone has left, and evades `bodies`, silent
+    /// drones that hover. `position`: the drone's, world frame, m.
+    pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) {
+        if self.emergency.as_ref().is_some_and(|own| {
+            position.x >= own.routes().exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains(self.me))
+        }) {
+            self.emergency = None;
+        }
+        let moved = self.bodies.len() != bodies.len()
+            || self.bodies.iter().zip(bodies).any(|(old, new)| (old.centre_m - new.centre_m).norm() > REDRAW_DRIFT_M);
+        let key = self.drawing_key(ledger, position);
+        if self.drawn_for.is_none_or(|drawn| drawn.stamp != key.stamp) {
+            self.detours.clear();
+        }
+        let detoured = self.find_detours(ledger, position, bodies);
+        if self.drawn_for == Some(key) && !moved && !detoured {
+            return;
+        }
+        self.bodies.clear();
+        self.bodies.extend_from_slice(bodies);
+        self.draw(ledger, position);
+        self.drawn_for = Some(self.drawing_key(ledger, position));
+    }
+
+    fn drawing_key(&self, ledger: &Ledger, position: Vec2) -> DrawnFor {
+        let legs_left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
+        DrawnFor { stamp: ledger.stamp(), emergency: self.emergency.is_some(), legs_left }
+    }
+
+    /// The route that the drone flies past a set, and its place in the queue.
+    fn place(&self, set: &PlannedSet) -> Option<QueuePlace> {
+        let part = set.parts.get(self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
+        let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
+        Some(match self.detours.iter().find(|detour| detour.set == set.tag) {
+            Some(detour) => QueuePlace { route: detour.route as u16, rank: QueuePlace::NO_RANK, ..place },
+            None => place,
+        })
+    }
+
+    /// Finds another route wherever the drone was driven to the wrong side of an obstacle, or a body blocks its route.
+    /// Returns whether a route has changed.
+    fn find_detours(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) -> bool {
+        let (mut detoured, course_y_m) = (false, self.course_y_m);
+        self.blocked = false;
+        for set in ledger.sets().iter().filter(|set| position.x < set.routes.exit_x_m()) {
+            let Some(route) = self.place(set).map(|place| usize::from(place.route)) else { continue };
+            match route_state(&set.routes, route, course_y_m, position, bodies) {
+                RouteState::Clear => {}
+                RouteState::Blocked => self.blocked = true,
+                RouteState::Detour(open) => {
+                    self.detours.retain(|detour| detour.set != set.tag);
+                    self.detours.push(Detour { set: set.tag, route: open });
+                    detoured = true;
+                }
+            }
+        }
+        if let Some(own) = &mut self.emergency {
+            match route_state(own.routes(), own.route(), course_y_m, position, bodies) {
+                RouteState::Clear => {}
+                RouteState::Blocked => self.blocked = true,
+                RouteState::Detour(open) => {
+                    own.change_to(open);
+                    detoured = true;
+                }
+            }
+        }
+        detoured
+    }
+
+    /// Whether a body blocks the drone's route, and every other route begins farther back.
+    #[must_use]
+    pub fn is_blocked(&self) -> bool {
+        self.blocked
+    }
+
+    fn draw(&mut self, ledger: &Ledger, position: Vec2) {
+        let mut passages: Vec<(QueuePlace, &Routes)> =
+            ledger.sets().iter().filter_map(|set| self.place(set).map(|place| (place, &set.routes))).collect();
+        if let Some(own) = &self.emergency {
+            let (set, route) = (own.set(), own.route() as u16);
+            passages.push((QueuePlace { remaining_m: 0.0, set, route, rank: QueuePlace::NO_RANK }, own.routes()));
+        }
+        passages.sort_by(|a, b| a.1.gate_x_m().total_cmp(&b.1.gate_x_m()));
+        self.legs = passages
+            .iter()
+            .map(|&(place, routes)| Leg {
+                place,
+                gate_x_m: routes.gate_x_m(),
+                exit_x_m: routes.exit_x_m(),
+                open: position.x < routes.exit_x_m(),
+            })
+            .collect();
+        let open: Vec<(&Routes, usize)> = passages
+            .iter()
+            .filter(|(_, routes)| position.x < routes.exit_x_m())
+            .map(|&(place, routes)| (routes, usize::from(place.route)))
+            .collect();
+        let last_exit_x_m = open.iter().map(|(routes, _)| routes.exit_x_m()).reduce(f64::max);
+        self.corridor = last_exit_x_m
+            .map(|exit_x_m| Corridor::new(&open, &self.bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
+    }
+
+    /// Direction and remaining length of the path from `position` (world frame, m); `None` if nothing lies ahead.
+    #[must_use]
+    pub fn steering(&self, position: Vec2) -> Option<Steering> {
+        self.corridor.as_ref().map(|corridor| corridor.pull(position, self.first_gate_x_m()))
+    }
+
+    fn first_gate_x_m(&self) -> f64 {
+        self.legs.iter().find(|leg| leg.open).map_or(f64::INFINITY, |leg| leg.gate_x_m)
+    }
+
+    /// The places in the queues of the sets ahead, and of those behind until the swarm re-forms. Past a gate the remaining
+    /// path is negative. Unused entries have set 0.
+    #[must_use]
+    pub fn places(&self, position: Vec2) -> [QueuePlace; MAX_PLACES] {
+        let mut places = [QueuePlace::default(); MAX_PLACES];
+        let first = self.legs.len().saturating_sub(MAX_PLACES);
+        for (place, leg) in places.iter_mut().zip(&self.legs[first..]) {
+            *place = QueuePlace { remaining_m: self.remaining_m(leg, position), ..leg.place };
+        }
+        places
+    }
+
+    /// Of these places, those whose sets the drone has still to leave; the other entries get set 0.
+    #[must_use]
+    pub fn open_places(&self, mut places: [QueuePlace; MAX_PLACES]) -> [QueuePlace; MAX_PLACES] {
+        for place in &mut places {
+            if !self.legs.iter().any(|leg| leg.open && leg.place.set == place.set) {
+                *place = QueuePlace::default();
+            }
+        }
+        places
+    }
+
+    fn remaining_m(&self, leg: &Leg, position: Vec2) -> f64 {
+        match &self.corridor {
+            Some(corridor) if position.x < leg.gate_x_m => corridor.pull(position, leg.gate_x_m).to_gate_m,
+            _ => leg.gate_x_m - position.x,
+        }
+    }
+
+    /// Whether the drone has still to leave a set.
+    #[must_use]
+    pub fn is_passing(&self) -> bool {
+        self.corridor.is_some()
+    }
+}
+
+/// Whether a drone on `route` can continue. If not, it takes the shortest of the routes that are open to it and that no
+/// body blocks.
+fn route_state(routes: &Routes, route: usize, course_y_m: f64, position: Vec2, bodies: &[Body]) -> RouteState {
+    let barred = |route: usize| routes.is_barred(route, position, bodies);
+    let free = |route: usize| routes.is_open(route, position) && !barred(route);
+    if free(route) {
+        return RouteState::Clear;
+    }
+    let mut others = trips(&[], routes, position, &Flight { speed_mps: 1.0, course_y_m });
+    for (other, trip) in others.iter_mut().enumerate() {
+        if !free(other) {
+            trip.total_s = f64::INFINITY;
+        }
+    }
+    match shortest(&others) {
+        other if free(other) => RouteState::Detour(other),
+        _ if barred(route) && (0..others.len()).any(|other| !barred(other)) => RouteState::Blocked,
+        _ => RouteState::Clear,
+    }
+}

@@ -1,0 +1,64 @@
+//! A drone that no other drone hears is given no slot in the formation. It joins behind the last slot on its own.
+
+use crate::guidance::anchor;
+use crate::tuning::UNHEARD_S;
+use skein_protocol::formation::Shape;
+use skein_protocol::payload::{PHASE_REFORM, Plan};
+use skein_protocol::{GroupId, MessageRef, SimTime, Vec2};
+
+/// What a drone knows of the others' formation, and since when none of them follows it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Straggler {
+    /// The latest formation of the whole swarm, in any term.
+    formation: Option<Plan>,
+    unfollowed_since: Option<SimTime>,
+}
+
+impl Straggler {
+    /// Notes the formation that a message announces.
+    pub(crate) fn hear(&mut self, message: MessageRef<'_>) {
+        let MessageRef::Plan(plan) = message else { return };
+        let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
+        if later && plan.phase == PHASE_REFORM && plan.group == GroupId::ALL {
+            self.formation = Some(*plan);
+        }
+    }
+
+    /// The place behind the others' formation (world frame, m) and its velocity (m/s), once the drone has been
+    /// `unfollowed` for [`UNHEARD_S`]: the last slot of a formation with one drone more.
+    pub(crate) fn slot(
+        &mut self,
+        now: SimTime,
+        unfollowed: bool,
+        shape: &Shape,
+        spacing_m: f64,
+    ) -> Option<(Vec2, Vec2)> {
+        self.unfollowed_since = unfollowed.then(|| self.unfollowed_since.unwrap_or(now));
+        let unheard = self.unfollowed_since.is_some_and(|since| now.since(since) >= UNHEARD_S);
+        let plan = self.formation.as_ref().filter(|_| unheard)?;
+        let (front, velocity) = anchor(plan, now);
+        Some((front + *shape.slots(plan.members as usize + 1, spacing_m).last()?, velocity))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_drone_that_is_not_heard_takes_the_next_slot_until_it_is_followed() {
+        let plan = Plan { phase: PHASE_REFORM, members: 2, anchor_m: [50.0, 7.0], ..Plan::zeroed() };
+        let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0], [-20.0, 5.0]]);
+        let mut straggler = Straggler::default();
+        let slot = |straggler: &mut Straggler, now_s, unfollowed| {
+            straggler.slot(SimTime::from_secs(now_s), unfollowed, &shape, 10.0)
+        };
+        assert_eq!(slot(&mut straggler, 0.0, true), None);
+        assert_eq!(slot(&mut straggler, 6.0, true), None, "it knows of no formation");
+        straggler.hear(MessageRef::Plan(&plan));
+        assert_eq!(slot(&mut straggler, 6.1, true), Some((Vec2::new(30.0, 12.0), Vec2::zeros())));
+        assert_eq!(slot(&mut straggler, 6.2, false), None);
+        assert_eq!(slot(&mut straggler, 6.3, true), None, "it may last a moment only");
+    }
+}

@@ -1,0 +1,77 @@
+//! The tuned numbers of this crate, each with its unit, how it was found, and the command that finds it again.
+//!
+//! Where a number was chosen by hand, the named command shows what another value does.
+
+/// Age up to which a beacon shows what its drone does now, s. Chosen by hand: a few beacon periods. `skein sweep
+/// experiments/delay-loss.toml`.
+pub(crate) const FRESH_BEACON_S: f64 = 0.3;
+
+/// Distance up to which a neighbour counts that is known by beacon alone, in safe distances. Chosen by hand. `skein sweep
+/// experiments/silence.toml`.
+pub(crate) const BEACON_REACH: f64 = 4.0;
+
+/// Radius of the disc that paths keep around a silent drone, in safe distances. Chosen by hand: a little more than the
+/// safety filter keeps, so that the filter need not act. `skein sweep experiments/faults.toml`.
+pub(crate) const SILENT_DRONE_RADIUS: f64 = 1.1;
+
+/// How long a drone on its route waits before it escapes from where it is stuck, s. Chosen by hand. `skein sweep
+/// experiments/random-scenes.toml`.
+pub(crate) const PATIENCE_ON_ROUTE_S: f64 = 3.0;
+
+/// How long a drone in formation waits before it escapes from where it is stuck, s. Chosen by hand: longer than the
+/// leader takes to open the formation. `skein sweep experiments/faults.toml`.
+pub(crate) const PATIENCE_IN_FORMATION_S: f64 = 8.0;
+
+/// How long a drone keeps to a formation of another term than its leader's, s. Chosen by hand. `skein sweep
+/// experiments/silence.toml`.
+pub(crate) const STALE_FORMATION_S: f64 = 5.0;
+
+/// Speed at which a drone flies back out of a blocked gap, as a share of its nominal speed. Chosen by hand. `skein sweep
+/// experiments/faults.toml`.
+pub(crate) const BACK_OUT_SPEED: f64 = 0.5;
+
+/// How long a leader waits for a follower before it assumes that no drone hears it, s. Chosen by hand. `skein sweep
+/// experiments/silence.toml`.
+pub(crate) const UNHEARD_S: f64 = 5.0;
+
+/// Drift of a silent drone after which the corridor is drawn again, m. Chosen by hand.
+pub(crate) const REDRAW_DRIFT_M: f64 = 1.0;
+
+/// Closing speed per distance to the slot, 1/s. Chosen by hand. `skein reproduce`.
+pub(crate) const APPROACH_PER_S: f64 = 0.8;
+
+/// How long a leader simulates before it decides, s: the paper's t_c. Chosen by hand: enough for the alternatives of the
+/// paper's scenarios. `skein reproduce`.
+pub(crate) const DELIBERATION_S: f64 = 1.0;
+
+/// Length of a simulated step, s; never shorter than a tick. Chosen by hand: the forecast of the pass time stays within a
+/// quarter of a second. `cargo test -p skein-runtime --test rehearsal`.
+pub(crate) const ROLLOUT_STEP_S: f64 = 0.1;
+
+/// Drone-steps simulated in a second of flight, spread evenly over its ticks. Chosen by hand: what one core can do in real
+/// time. `skein bench runtime`.
+pub(crate) const DRONE_STEPS_PER_S: f64 = 120_000.0;
+
+/// Simulated time after which an alternative has failed, s. Chosen by hand: several times the length of a flight of the
+/// paper. `skein reproduce`.
+pub(crate) const ROLLOUT_HORIZON_S: f64 = 200.0;
+
+/// Saving that an alternative needs over the shortest paths, as a share of their cost. Chosen by hand: the accuracy of a
+/// forecast. `skein reproduce`.
+pub(crate) const MIN_SAVING: f64 = 0.03;
+
+/// The same while unknown obstacles may come, because these may undo a saving. Chosen by hand. `skein sweep
+/// experiments/random-scenes.toml`.
+pub(crate) const MIN_SAVING_UNSEEN: f64 = 0.2;
+
+/// Share of the shortest paths' pass time that an alternative with [`MIN_SAVING`] has to save while unknown obstacles may
+/// come. Chosen by hand. `skein sweep experiments/random-scenes.toml`.
+pub(crate) const MIN_TIME_SAVING_UNSEEN: f64 = 0.185;
+
+/// The same for an alternative whose paths are no longer and which costs no more: later obstacles cannot undo that.
+/// Chosen by hand. `skein sweep experiments/random-scenes.toml`.
+pub(crate) const MIN_TIME_SAVING_SAME_LENGTH: f64 = 0.09;
+
+/// Least length that another obstacle set needs ahead, in planning distances. Chosen by hand. `skein sweep
+/// experiments/random-scenes.toml`.
+pub(crate) const ROOM_FOR_A_SET: f64 = 3.0;
