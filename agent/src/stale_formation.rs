@@ -1,7 +1,7 @@
 //! Recognises a formation that its leader has abandoned.
 
 use crate::tuning::STALE_FORMATION_S;
-use skein_leader::ledger::PlanBundle;
+use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::payload::PHASE_REFORM;
 use skein_protocol::{Ballot, SimTime};
 

@@ -20,8 +20,10 @@ use crate::straggler::Straggler;
 use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, SILENT_DRONE_RADIUS};
 use skein_leader::cost::Flight;
 use skein_leader::leading::{Leading, Own};
-use skein_leader::ledger::{Ledger, PlanBundle};
-use skein_leader::planner::{Objective, Strategy};
+use skein_leader::ledger::Ledger;
+use skein_leader::member::Member;
+use skein_leader::params::{Objective, Strategy};
+use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, Plan, QueuePlace, set_tag};
@@ -151,7 +153,7 @@ impl SwarmPilot {
     fn rollout_drones(&self, now: SimTime, step_s: f64) -> Vec<RolloutDrone<Self>> {
         let ledger = self.leading.united_ledger(now);
         let living = self.leading.living();
-        let drone = |member: &skein_leader::planner::Member| RolloutDrone {
+        let drone = |member: &Member| RolloutDrone {
             pilot: self.rollout_pilot(member.id, now, step_s, &ledger),
             position: member.position,
             velocity: member.velocity,

@@ -20,8 +20,9 @@ pub use swarm::RolloutDrone;
 use crate::rollout::forecast::best;
 use crate::rollout::swarm::{RolloutSwarm, SwarmStart};
 use crate::tuning::{DELIBERATION_S, DRONE_STEPS_PER_S, ROOM_FOR_A_SET};
-use skein_leader::ledger::PlanBundle;
-use skein_leader::planner::{Member, Objective};
+use skein_leader::member::Member;
+use skein_leader::params::Objective;
+use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::SensedShape;
 use skein_protocol::{DroneId, SimTime};
 

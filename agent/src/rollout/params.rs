@@ -1,7 +1,7 @@
 //! Constants of a rollout.
 
 use crate::tuning::ROLLOUT_STEP_S;
-use skein_leader::planner::{Destination, PlannerParams};
+use skein_leader::params::{Destination, PlannerParams};
 
 /// The vehicle, its sensors and the mission, as a rollout needs them.
 #[derive(Clone, Debug)]
