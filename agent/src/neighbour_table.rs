@@ -99,3 +99,56 @@ impl NeighbourTable {
         0.5
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use skein_protocol::downlink::SensedNeighbour;
+    use skein_protocol::payload::{MAX_PLACES, Pose};
+
+    const PARAMS: NeighbourParams = NeighbourParams { safe_distance_m: 30.0, ranging: true, precedence_share: 0.8 };
+
+    fn place(rank: u16) -> QueuePlace {
+        QueuePlace { remaining_m: 50.0, set: 7, route: 1, rank }
+    }
+
+    /// This drone's share against a ranged neighbour that was heard `age_s` ago in its queue with this rank, or never.
+    fn share(mine: Option<u16>, theirs: Option<(u16, f64)>) -> f64 {
+        let now = SimTime::from_secs(10.0);
+        let mut peers = Peers::new(2, 2.0);
+        if let Some((rank, age_s)) = theirs {
+            let stamp = SimTime::from_secs(10.0 - age_s);
+            let queue = [place(rank), QueuePlace::default()];
+            peers.hear(stamp, DroneId(1), Pose { stamp, queue, ..Pose::zeroed() });
+        }
+        let neighbours =
+            [SensedNeighbour { position_m: [40.0, 0.0], velocity_mps: [0.0; 2], drone: DroneId(1), reserved: 0 }];
+        let senses = Senses::new((500, now), (Vec2::zeros(), Vec2::zeros()), &[], &neighbours, &[]);
+        let mut places = [QueuePlace::default(); MAX_PLACES];
+        places[0] = mine.map_or_else(QueuePlace::default, place);
+        let mut table = NeighbourTable::new(PARAMS);
+        let obeyed = PlanStamp::default();
+        table.update(&NeighbourView { now, senses: &senses, peers: &peers, obeyed, places: &places });
+        let found: Vec<Neighbour> = table.iter().collect();
+        assert_eq!(found.len(), 1, "a neighbour that is ranged and heard counts once");
+        found[0].share
+    }
+
+    #[test]
+    fn a_silent_neighbour_leaves_the_whole_evasion_to_this_drone() {
+        assert_eq!(share(None, None), 1.0);
+    }
+
+    #[test]
+    fn the_rear_drone_of_a_queue_takes_the_larger_share() {
+        assert_eq!(share(Some(3), Some((2, 0.1))), 0.8);
+        assert!((share(Some(1), Some((2, 0.1))) - 0.2).abs() < 1e-12);
+        assert_eq!(share(None, Some((2, 0.1))), 0.5, "they share no queue");
+    }
+
+    #[test]
+    fn the_front_drone_takes_less_only_while_the_beacon_is_fresh() {
+        assert_eq!(share(Some(1), Some((2, 0.5))), 0.5);
+    }
+}

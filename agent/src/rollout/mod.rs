@@ -165,3 +165,6 @@ fn superseding(mut bundle: PlanBundle, decision: SimTime) -> PlanBundle {
     }
     bundle
 }
+
+#[cfg(test)]
+mod tests;

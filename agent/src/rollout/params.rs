@@ -1,7 +1,7 @@
 //! Constants of a rollout.
 
 use crate::tuning::ROLLOUT_STEP_S;
-use skein_leader::params::{Destination, PlannerParams};
+use skein_leader::params::PlannerParams;
 
 /// The vehicle, its sensors and the mission, as a rollout needs them.
 #[derive(Clone, Debug)]
@@ -42,10 +42,7 @@ impl RolloutParams {
     /// Abscissas of the slots in which this many drones end the mission, m.
     pub(crate) fn end_slots(&self, drones: usize) -> Vec<f64> {
         let planner = &self.planner;
-        let front_m = match planner.destination {
-            Destination::Hold { stop_x_m } => stop_x_m,
-            Destination::Goal { front_m } => front_m.x,
-        };
+        let front_m = planner.destination.stop_x_m();
         planner.shape.slots(drones, planner.spacing_m).iter().map(|slot| front_m + slot.x).collect()
     }
 }
