@@ -3,7 +3,7 @@
 use crate::safety::{Neighbour, RANGING_FACTOR};
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::membership::{Peers, extrapolated};
-use skein_protocol::downlink::{BROKEN_RANGING, Senses};
+use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
 
@@ -62,7 +62,7 @@ impl NeighbourTable {
             });
         }
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
-        let ranges = self.params.ranging && senses.broken & BROKEN_RANGING == 0;
+        let ranges = self.params.ranging && !senses.broken.ranging;
         let least_m = if ranges { RANGING_FACTOR * self.params.safe_distance_m } else { 0.0 };
         for (id, pose) in view.peers.living(view.now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;

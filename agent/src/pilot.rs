@@ -29,8 +29,8 @@ pub struct Command {
     pub leads: Option<GroupId>,
     /// The term that it obeys, or leads in.
     pub term: Ballot,
-    /// Phase of the plan, a `PHASE_…`.
-    pub phase: u32,
+    /// Phase of the plan that it obeys.
+    pub phase: Phase,
     /// Route and place in its queue while the drone passes an obstacle set.
     pub place: Option<(u16, u16)>,
 }

@@ -3,8 +3,8 @@
 use crate::guidance::anchor;
 use crate::tuning::UNHEARD_S;
 use skein_protocol::formation::Shape;
-use skein_protocol::payload::{PHASE_REFORM, Plan};
-use skein_protocol::{GroupId, MessageRef, SimTime, Vec2};
+use skein_protocol::payload::Plan;
+use skein_protocol::{GroupId, MessageRef, Phase, SimTime, Vec2};
 
 /// What a drone knows of the others' formation, and since when none of them follows it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,7 +19,7 @@ impl Straggler {
     pub(crate) fn hear(&mut self, message: MessageRef<'_>) {
         let MessageRef::Plan(plan) = message else { return };
         let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
-        if later && plan.phase == PHASE_REFORM && plan.group == GroupId::ALL {
+        if later && plan.phase() == Phase::Reform && plan.group == GroupId::ALL {
             self.formation = Some(*plan);
         }
     }
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn a_drone_that_is_not_heard_takes_the_next_slot_until_it_is_followed() {
-        let plan = Plan { phase: PHASE_REFORM, members: 2, anchor_m: [50.0, 7.0], ..Plan::zeroed() };
+        let plan = Plan { phase: Phase::Reform.to_wire(), members: 2, anchor_m: [50.0, 7.0], ..Plan::zeroed() };
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0], [-20.0, 5.0]]);
         let mut straggler = Straggler::default();
         let slot = |straggler: &mut Straggler, now_s, unfollowed| {

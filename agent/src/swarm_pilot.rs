@@ -26,8 +26,8 @@ use skein_leader::params::{Objective, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
 use skein_protocol::downlink::{SensedShape, Senses};
-use skein_protocol::payload::{MAX_PLACES, PHASE_AVOID, Plan, QueuePlace, set_tag};
-use skein_protocol::{DroneId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::payload::{MAX_PLACES, Plan, QueuePlace, set_tag};
+use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
 /// The pilot of one drone, composed of machines that each own their state.
 #[derive(Clone, Debug)]
@@ -219,7 +219,7 @@ impl SwarmPilot {
         }
         let stale = self.stale_formation.is_stale(senses.now, self.leading.obeyed(), self.leading.term());
         match (self.leading.obeyed(), self.leading.part()) {
-            (Some(bundle), Some(part)) if bundle.plan.phase != PHASE_AVOID && !stale => {
+            (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !stale => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
                 self.limit_on_sight(wanted, senses.now)
@@ -291,7 +291,7 @@ impl SwarmPilot {
             group: self.leading.group(),
             leads: self.leading.is_leader().then(|| self.leading.scope()),
             term: self.leading.term(),
-            phase: self.leading.obeyed().map_or(0, |bundle| bundle.plan.phase),
+            phase: self.leading.obeyed().map_or(Phase::Cruise, |bundle| bundle.plan.phase()),
             place: first.map(|place| (place.route, place.rank)),
         }
     }

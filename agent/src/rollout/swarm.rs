@@ -11,8 +11,7 @@ use skein_leader::params::{Destination, Objective};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
-use skein_protocol::payload::PHASE_AVOID;
-use skein_protocol::{DroneId, Message, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2};
 
 /// A formation that is held moves no faster, m/s.
 const HOLD_SPEED_MPS: f64 = 1.0;
@@ -214,7 +213,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
 
     /// Once all drones are in their slots: how long the formation cruises until the mission's end, s.
     fn remaining_cruise_s(&self) -> Option<f64> {
-        let plan = self.drones.first()?.pilot.plan().filter(|plan| plan.phase != PHASE_AVOID)?;
+        let plan = self.drones.first()?.pilot.plan().filter(|plan| plan.phase() != Phase::Avoid)?;
         let (place, velocity) = anchor(plan, self.now);
         let error_m = self.params.planner.arrival_error_m;
         let holds = matches!(self.params.planner.destination, Destination::Hold { .. });
