@@ -2,6 +2,7 @@
 
 use super::flown::{Flown, fly_file, scenario, velocity};
 use skein_agent::detection::Braking;
+use skein_protocol::Phase;
 use skein_protocol::record::EventKind;
 use skein_scenario::{Scenario, ScenarioSource};
 
