@@ -21,12 +21,7 @@ pub struct GuidanceParams {
 /// the plan's stamp on, until it reaches the abscissa at which it stops.
 #[must_use]
 pub fn anchor(plan: &Plan, now: SimTime) -> (Vec2, Vec2) {
-    let (start, velocity) = (Vec2::from(plan.anchor_m), Vec2::from(plan.anchor_mps));
-    let here = start + velocity * now.since(plan.stamp);
-    if velocity.x > 0.0 && here.x >= plan.anchor_stop_x_m {
-        return (Vec2::new(plan.anchor_stop_x_m.max(start.x), here.y), Vec2::zeros());
-    }
-    (here, velocity)
+    plan.anchor_at(now)
 }
 
 impl GuidanceParams {

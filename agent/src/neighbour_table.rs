@@ -2,7 +2,7 @@
 
 use crate::safety::{Neighbour, RANGING_FACTOR};
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
-use skein_leader::membership::{Peers, extrapolated};
+use skein_leader::peers::{Peers, extrapolated};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};

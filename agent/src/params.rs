@@ -7,7 +7,7 @@ use crate::queue::QueueParams;
 use crate::rollout::RolloutParams;
 use crate::safety::{RANGING_FACTOR, SafetyParams};
 use skein_leader::election::ElectionParams;
-use skein_leader::leading::LeadingParams;
+use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
 use skein_protocol::{DroneId, SimTime};
 

@@ -1,6 +1,6 @@
 //! The queue of drones on a shared route. The foremost drone has precedence; the others merge behind it (paper, results).
 
-use skein_leader::membership::Peers;
+use skein_leader::peers::Peers;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{SimTime, Vec2};
 

@@ -1,6 +1,6 @@
 //! Drones that send nothing any more: they may be dead and hover where they were.
 
-use skein_leader::membership::Peers;
+use skein_leader::peers::Peers;
 use skein_leader::routes::Body;
 use skein_protocol::Vec2;
 use skein_protocol::downlink::Senses;

@@ -19,9 +19,10 @@ use crate::state_predictor::StatePredictor;
 use crate::straggler::Straggler;
 use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, SILENT_DRONE_RADIUS};
 use skein_leader::cost::Flight;
-use skein_leader::leading::{Leading, Own};
+use skein_leader::leading::Leading;
 use skein_leader::ledger::Ledger;
 use skein_leader::member::Member;
+use skein_leader::own_state::OwnState;
 use skein_leader::params::{Objective, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
@@ -82,7 +83,7 @@ impl SwarmPilot {
     }
 
     /// Takes part in elections, and plans while it leads.
-    fn lead(&mut self, senses: &Senses<'_>, own: &Own, say: &mut Vec<Message>) {
+    fn lead(&mut self, senses: &Senses<'_>, own: &OwnState, say: &mut Vec<Message>) {
         self.leading.elect(senses.now, own, say);
         if self.leading.is_leader() {
             self.plan(senses.now, own, say);
@@ -91,7 +92,7 @@ impl SwarmPilot {
         }
     }
 
-    fn plan(&mut self, now: SimTime, own: &Own, say: &mut Vec<Message>) {
+    fn plan(&mut self, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
         self.leading.refresh_members(now, own);
         if let Some(rollout) = self.rollout.take() {
             self.look_ahead(now, own.tick, rollout);
@@ -301,7 +302,7 @@ impl Pilot for SwarmPilot {
     fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
-        let own = Own { tick: senses.tick, position: senses.position, velocity: senses.velocity };
+        let own = OwnState { tick: senses.tick, position: senses.position, velocity: senses.velocity };
         for &Heard { source, message } in heard {
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(message);

@@ -1,6 +1,7 @@
-//! Explores every course of a short mission, with more faults than fit a test:
-//! `cargo run --release -p skein-leader --example check -- DRONES WALLS STEPS MESSAGES CRASHES CUTS`, or the whole
-//! list without numbers. Prints the number of different states. Ends with an error as soon as a property is broken, and tells the course that breaks it.
+//! Explores every course of a short mission, with more faults than a test has time for:
+//! `cargo run --release -p skein-leader --example check -- DRONES WALLS STEPS MESSAGES CRASHES CUTS`. Without numbers it
+//! explores a built-in list. Prints the number of different states. Fails at the first broken property and prints the
+//! course that breaks it.
 #![allow(clippy::unwrap_used, clippy::disallowed_macros, reason = "a command that prints")]
 
 #[path = "../tests/model/mod.rs"]
@@ -35,7 +36,11 @@ fn explore([drones, walls, steps, messages, crashes, cuts]: [u8; 6]) {
 fn main() {
     let numbers: Vec<u8> = std::env::args().skip(1).map(|number| number.parse().expect("a small number")).collect();
     match numbers[..] {
-        [] => LIST.into_iter().for_each(explore),
+        [] => {
+            for mission in LIST {
+                explore(mission);
+            }
+        }
         [drones, walls, steps, messages, crashes, cuts] => explore([drones, walls, steps, messages, crashes, cuts]),
         _ => panic!("expected DRONES WALLS STEPS MESSAGES CRASHES CUTS, or nothing"),
     }

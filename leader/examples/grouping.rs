@@ -1,4 +1,4 @@
-//! How long the exact grouping of 1000 drones over four routes takes, with and without its tie-break:
+//! Measures the exact grouping of 1000 drones over four routes, with and without its tie-break:
 //! `cargo run --release -p skein-leader --example grouping`.
 #![allow(
     clippy::disallowed_macros,

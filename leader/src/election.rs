@@ -1,70 +1,67 @@
-//! Who leads: a sans-IO machine. The member closest to the destination claims; a term is a ballot, ordered
-//! lexicographically, for a group: the term's scope. Of all terms whose scope holds its own group a drone obeys the
-//! highest it has heard of. Closeness decides elections only: a healthy leader is not deposed by being overtaken.
+//! Leader election: a sans-IO state machine.
 //!
-//! Uniqueness of a leader for a ballot holds by construction: a ballot names its claimant, and the launcher gives each
-//! start of a process an incarnation of its own.
+//! A term is a ballot for a group, the term's scope. Ballots are ordered lexicographically. Of all terms whose scope
+//! contains its own group, a drone obeys the highest one it has heard of. The living member that is closest to the
+//! destination claims a new term. Closeness decides elections only: a healthy leader keeps its term when it is overtaken.
+//!
+//! In Raft's words: a drone that misses its leader first asks for a *pre-vote*. A member that has heard the leader since
+//! *rejects* it. Without a rejection the drone claims. A leader can *transfer* its leadership to a named drone. There are
+//! no votes: a claim takes effect wherever it is heard, and the higher ballot wins.
+//!
+//! A ballot has only one leader by construction: it names its claimant, and the launcher gives each start of a process an
+//! incarnation of its own.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
-use skein_protocol::LeadershipKind;
+use crate::tuning::{NEWCOMER_TIMEOUTS, PARTED_TIMEOUTS, SAME_BEAT};
 use skein_protocol::payload::Leadership;
-use skein_protocol::{Ballot, DroneId, GroupId, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, SimTime};
 
-/// No honest swarm claims more often than this, 1/s: a round that is higher than what that gives since the start is
-/// refused, so that nobody drives rounds to where they cannot be raised any more.
+/// Upper bound of claims in an honest swarm, 1/s. A round that is higher than this rate allows since the start is ignored,
+/// so that a hostile drone cannot exhaust the rounds.
 const CLAIMS_PER_S: f64 = 1000.0;
-
-/// Signs of a leader that come sooner after another one than this part of its period belong to the same beat.
-const BEAT: f64 = 0.75;
-
-/// A drone that was started again listens for so many time-outs before it claims.
-const NEWCOMER_TIMEOUTS: f64 = 4.0;
-
-/// A drone whose group was split without it waits for so many time-outs to be taken in, and then claims its group.
-const PARTED_TIMEOUTS: f64 = 4.0;
 
 /// Periods and time-outs.
 #[derive(Clone, Copy, Debug)]
 pub struct ElectionParams {
-    /// A leader says that it lives this often, s.
+    /// Period of a leader's heartbeats, s.
     pub heartbeat_period_s: f64,
-    /// A leader that is silent for so long is missed, s; it is given more on a bad link.
+    /// A leader that is silent for longer is missed, s. Longer on a bad link.
     pub leader_timeout_s: f64,
-    /// How long the closest member waits for objections before it claims, s; the next one waits as much longer, and so
-    /// on, so that one claim reaches all before the next is due. Longer if the air takes longer.
+    /// How long the closest member waits for a rejection of its pre-vote before it claims, s. The next one waits as much
+    /// longer, and so on, so that one claim reaches all members before the next is due. Longer if messages take longer.
     pub wait_s: f64,
 }
 
-/// What the machine is told.
+/// An input of the state machine.
 #[derive(Clone, Copy, Debug)]
 pub enum Input {
     /// A message about leading was heard.
     Heard(Leadership),
-    /// Something was heard that the leader of this term said: as good as a heartbeat.
+    /// A message of the leader of this term was heard. It counts as a heartbeat.
     Sign {
         /// The term.
         ballot: Ballot,
-        /// The group it is for.
+        /// The group that the term is for.
         scope: GroupId,
-        /// Whether it was said to this drone by name: then it is for this drone, whatever its group is.
+        /// Whether the message names this drone: then the term is for this drone, whatever its group is.
         named: bool,
     },
-    /// This drone is in this group from now on.
+    /// This drone is in this group now.
     Joined(GroupId),
-    /// Lead this group, whoever led before.
+    /// Claim this group, whichever drone leads it.
     Claim(GroupId),
-    /// Ask another member to take over; nothing unless this drone leads.
-    Yield(DroneId),
-    /// Time went on; `closer` living members are closer to the destination than this drone.
+    /// Transfer the leadership to this drone. Without effect unless this drone leads.
+    Transfer(DroneId),
+    /// Time has passed.
     Tick {
-        /// How many, not counting the leader whose silence started the election.
+        /// Number of living members that are closer to the destination than this drone, without the missing leader.
         closer: usize,
-        /// How long a message is on the air, s.
+        /// How long a message takes to arrive, s.
         delay_s: f64,
     },
 }
 
-/// The machine of one drone.
+/// The election state of one drone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Election {
     me: DroneId,
@@ -77,19 +74,19 @@ pub struct Election {
     scope: GroupId,
     highest_round: u32,
     leads: bool,
-    /// Last sign of life of the leader, heard by itself or by another, or the start.
+    /// Last sign of life of the leader, heard by this drone or by another one; or the start.
     heard: SimTime,
-    /// Of the leaders' own signs.
+    /// Of the leaders' signs that this drone heard itself.
     adaptive_timeout: AdaptiveTimeout,
-    /// Since when only leaders of parts of its group are heard.
+    /// Since when it has heard only leaders of parts of its group.
     parted: Option<SimTime>,
     next_heartbeat: SimTime,
-    /// When it asked who has heard of the leader it misses.
-    probed: Option<SimTime>,
+    /// When it asked for a pre-vote.
+    pre_voted: Option<SimTime>,
 }
 
 impl Election {
-    /// A drone that has just started and obeys nobody.
+    /// A drone that has just started and obeys no leader.
     #[must_use]
     pub fn new(me: DroneId, incarnation: u32, params: ElectionParams, now: SimTime) -> Self {
         Self {
@@ -107,17 +104,17 @@ impl Election {
             adaptive_timeout: AdaptiveTimeout::expecting(now, params.heartbeat_period_s),
             parted: None,
             next_heartbeat: now,
-            probed: None,
+            pre_voted: None,
         }
     }
 
-    /// Whether this drone leads.
+    /// Whether this drone leads its term.
     #[must_use]
     pub fn leads(&self) -> bool {
         self.leads
     }
 
-    /// The term it obeys; [`Ballot::NONE`] before the first.
+    /// The term it obeys, or leads; [`Ballot::NONE`] before the first.
     #[must_use]
     pub fn obeyed(&self) -> Ballot {
         self.obeyed
@@ -129,54 +126,60 @@ impl Election {
         self.scope
     }
 
-    /// The group this drone is in: the scope, or split from it.
+    /// The group this drone is in: the scope, or a part of it.
     #[must_use]
     pub fn group(&self) -> GroupId {
         self.group
     }
 
-    /// How long the leader may be silent, s: the time-out, or more if its signs come in rarely or irregularly.
-    #[must_use]
-    pub fn patience_s(&self) -> f64 {
-        self.adaptive_timeout.patience_s(self.leader_timeout_s)
+    /// How long the closest member waits before it claims, s. The next one waits as much longer, and so on.
+    pub(crate) fn wait_s(&self) -> f64 {
+        self.wait_s
     }
 
-    /// Whether it leads, or the leader it obeys is not silent for too long.
+    /// The longest silence of the leader that is not yet significant, s: the time-out, or more if its signs come rarely or
+    /// irregularly.
+    #[must_use]
+    pub fn silence_s(&self) -> f64 {
+        self.adaptive_timeout.timeout_s(self.leader_timeout_s)
+    }
+
+    /// Whether it leads, or the leader it obeys has not been silent for too long.
     #[must_use]
     pub fn has_leader(&self, now: SimTime) -> bool {
-        self.leads || (self.obeyed.is_some() && now.since(self.heard) <= self.patience_s())
+        self.leads || (self.obeyed.is_some() && now.since(self.heard) <= self.silence_s())
     }
 
-    /// Whether it has no leader, or has asked who heard of the one it misses.
+    /// Whether it has no leader, or has asked for a pre-vote.
     #[must_use]
     pub fn seeks(&self, now: SimTime) -> bool {
-        self.probed.is_some() || !self.has_leader(now)
+        self.pre_voted.is_some() || !self.has_leader(now)
     }
 
-    /// When the machine next wants a [`Input::Tick`], if nothing is heard until then. Answers to a probe need the air's
-    /// delay twice, a claim needs it once. It is asked so early that the answer is there when patience ends, but not
-    /// before half of it.
+    /// When the machine next needs an [`Input::Tick`], if it hears nothing until then. A rejection needs the message delay
+    /// twice, a claim once. The pre-vote is asked for so early that its answer is there when the time-out ends, but not
+    /// before half of the time-out.
     #[must_use]
     pub fn next_deadline(&self, closer: usize, delay_s: f64) -> SimTime {
         let (closer, answer_s) = (closer as f64, self.wait_s.max(2.0 * delay_s));
-        match self.probed {
+        match self.pre_voted {
             _ if self.leads => self.next_heartbeat,
-            Some(probed) => probed.after(answer_s + self.wait_s.max(delay_s) * closer),
+            Some(asked) => asked.after(answer_s + self.wait_s.max(delay_s) * closer),
             None if self.obeyed.is_some() => {
-                self.heard.after((self.patience_s() - answer_s).max(0.5 * self.patience_s()))
+                self.heard.after((self.silence_s() - answer_s).max(0.5 * self.silence_s()))
             }
             None => self.heard.after(self.newcomer_s() + self.wait_s * (closer + 1.0)),
         }
     }
 
-    /// How long a drone that was started again listens, before it takes it that nobody leads, s: in its first life nobody
-    /// can lead yet, later somebody most likely does.
+    /// How long a drone listens before it concludes that no drone leads, s. In its first incarnation no drone can lead yet;
+    /// after a restart there most likely is a leader.
     fn newcomer_s(&self) -> f64 {
         if self.incarnation > 1 { NEWCOMER_TIMEOUTS * self.leader_timeout_s } else { 0.0 }
     }
 
-    /// Takes an input; returns what is to be said, if anything. `epoch` is the number of the last plan this drone made
-    /// or obeys, told along with a heartbeat.
+    /// Takes an input; returns what is to be said, if anything. `epoch`: number of the plan this drone obeys, which goes
+    /// into the messages.
     pub fn handle(&mut self, now: SimTime, epoch: u32, input: Input) -> Option<Leadership> {
         match input {
             Input::Heard(message) => self.hear(now, epoch, &message),
@@ -189,7 +192,7 @@ impl Election {
                 None
             }
             Input::Claim(scope) => self.claim(now, scope),
-            Input::Yield(heir) => {
+            Input::Transfer(heir) => {
                 self.leads.then(|| self.message(LeadershipKind::LeadershipTransfer, now, epoch, heir))
             }
             Input::Tick { closer, delay_s } => self.tick(now, epoch, closer, delay_s),
@@ -207,7 +210,7 @@ impl Election {
             LeadershipKind::PreVoteRejection => {
                 if ballot == self.obeyed && message.stamp > self.heard && message.stamp <= now {
                     self.heard = message.stamp;
-                    self.probed = None;
+                    self.pre_voted = None;
                 }
                 None
             }
@@ -230,25 +233,25 @@ impl Election {
             self.obeyed = ballot;
             self.scope = scope;
             self.leads = false;
-            self.adaptive_timeout.turn(now);
+            self.adaptive_timeout.restart(now);
         }
-        // Its group was split without it: whoever leads a part will take it in, and what it led is no more. One of an
-        // older term cannot.
+        // Its group was split without it. A leader of a part will take it in, and its own term ends. A leader of an older
+        // term cannot do that.
         let parted = ballot > self.obeyed && scope != self.group && self.group.contains(scope);
         if parted {
             self.leads = false;
         }
         if ballot == self.obeyed {
             self.parted = None;
-            self.adaptive_timeout.hear(now, BEAT * self.heartbeat_period_s, self.patience_s());
+            self.adaptive_timeout.hear(now, SAME_BEAT * self.heartbeat_period_s, self.silence_s());
         }
         if ballot == self.obeyed || (parted && self.may_be_taken_in(now)) {
             self.heard = now;
-            self.probed = None;
+            self.pre_voted = None;
         }
     }
 
-    /// Whether the leaders of parts have not had their time yet to take this drone in.
+    /// Whether the leaders of parts still have time to take this drone in.
     fn may_be_taken_in(&mut self, now: SimTime) -> bool {
         now.since(*self.parted.get_or_insert(now)) < PARTED_TIMEOUTS * self.leader_timeout_s
     }
@@ -262,15 +265,15 @@ impl Election {
             self.next_heartbeat = now.after(self.heartbeat_period_s);
             return Some(self.message(LeadershipKind::Heartbeat, now, epoch, DroneId::NONE));
         }
-        if self.obeyed.is_some() && self.probed.is_none() {
-            self.probed = Some(now);
+        if self.obeyed.is_some() && self.pre_voted.is_none() {
+            self.pre_voted = Some(now);
             return Some(self.message(LeadershipKind::PreVote, self.heard, epoch, DroneId::NONE));
         }
         let scope = if self.scope.contains(self.group) { self.scope } else { self.group };
         self.claim(now, scope)
     }
 
-    /// A round at the very top cannot be raised: then nobody claims any more, and the drones fly on by themselves.
+    /// Claims a new term. `None` if the rounds are exhausted: then the drones fly on without a leader.
     fn claim(&mut self, now: SimTime, scope: GroupId) -> Option<Leadership> {
         let round = self.highest_round.checked_add(1)?;
         self.highest_round = round;
@@ -279,7 +282,7 @@ impl Election {
         self.leads = true;
         self.parted = None;
         self.heard = now;
-        self.probed = None;
+        self.pre_voted = None;
         self.next_heartbeat = now.after(self.heartbeat_period_s);
         Some(self.message(LeadershipKind::Claim, now, 0, DroneId::NONE))
     }

@@ -1,53 +1,54 @@
-//! The taut string: the shortest path past constraint points whose x never goes back (a funnel).
+//! The funnel algorithm: the shortest path past constraint points, with x never decreasing.
 
 use crate::routes::{Body, Constraint, Routes, Side, Wall, sort};
+use crate::tuning::LOOK_AHEAD_M;
+
+pub use crate::tuning::RUN_OUT_M;
 use skein_protocol::Vec2;
 
-/// A lane's target is this far past the last set's exit, m.
-pub const RUN_OUT_M: f64 = 60.0;
-/// And never less than this far ahead of the drone, m.
-pub const LOOK_AHEAD_M: f64 = 30.0;
-/// Constraint points less than this ahead are passed, m.
+/// Constraint points that are less than this ahead count as passed, m.
 const PASSED_M: f64 = 1e-6;
 
-/// The way past one or several sets and back to the course line, made once and pulled taut every tick.
+/// The corridor past one or several obstacle sets and back to the course line. It is made once; the shortest path through
+/// it is computed in every tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Corridor {
     constraints: Vec<Constraint>,
     target: Vec2,
 }
 
-/// A taut string.
+/// The shortest path through a corridor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steering {
-    /// Unit vector of its first leg.
+    /// Unit vector of the first leg.
     pub direction: Vec2,
-    /// Length to the gate, m; past the gate the negative difference in x, beyond the target straight on.
+    /// Length to the gate, m. Past the gate: the negative difference in x. If the gate is beyond the target, the path goes
+    /// straight on.
     pub to_gate_m: f64,
     /// Length to the target, m.
     pub total_m: f64,
 }
 
 impl Corridor {
-    /// A lane past these sets, each with the route taken past it (0 = rightmost), to a target on the course line,
-    /// [`RUN_OUT_M`] past the last exit.
+    /// A corridor past these sets, each with the route taken past it (0 = rightmost), to a target on the course line
+    /// (world frame, m), usually [`RUN_OUT_M`] past the last exit.
     ///
-    /// A body that leaves no way between itself and a wall of the routes counts to that wall (the nearer one, if
-    /// several); any other one stays on the side on which the string from the course line passes its centre anyway.
+    /// A body that leaves no gap between itself and a wall of the routes becomes part of that wall, of the nearest one if
+    /// there are several. Any other body stays on the side on which the path from the course line passes its centre.
     #[must_use]
     pub fn new(passages: &[(&Routes, usize)], bodies: &[Body], target: Vec2) -> Self {
         let taken = || passages.iter().map(|&(routes, route)| routes.route(route));
         let constraints = taken().flat_map(|route| route.constraints().iter().copied()).collect();
-        let mut lane = Self { constraints, target };
-        sort(&mut lane.constraints);
+        let mut corridor = Self { constraints, target };
+        sort(&mut corridor.constraints);
         if !bodies.is_empty() {
-            lane.evade(bodies, taken().flat_map(|route| route.walls().iter().cloned()).collect());
+            corridor.evade(bodies, taken().flat_map(|route| route.walls().iter().cloned()).collect());
         }
-        lane
+        corridor
     }
 
-    /// Pulls the string taut from a position (finite, m) and measures it up to the abscissa `gate_x_m`. Does not
-    /// allocate. Finite wherever the drone is: one that is inside a wall is led out of it.
+    /// The shortest path from a position (world frame, m, finite), measured up to the abscissa `gate_x_m`. Does not
+    /// allocate. The result is finite wherever the drone is; a drone inside a wall is led out of it.
     #[must_use]
     pub fn pull(&self, position: Vec2, gate_x_m: f64) -> Steering {
         let past_m = position.x - gate_x_m;
@@ -66,7 +67,7 @@ impl Corridor {
         Steering { direction: direction.unwrap_or(Vec2::x()), to_gate_m, total_m }
     }
 
-    /// Visits the legs of the taut string, each at least [`PASSED_M`] long in x.
+    /// Visits the legs of the shortest path, each at least [`PASSED_M`] long in x.
     fn walk(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
         let end = Vec2::new(self.target.x.max(position.x + LOOK_AHEAD_M), self.target.y);
         let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
@@ -81,7 +82,7 @@ impl Corridor {
         leg(from, end);
     }
 
-    /// Ordinate at an abscissa of the string that comes along the course line.
+    /// Ordinate at an abscissa of the path that comes along the course line, m.
     fn height_m(&self, x_m: f64) -> f64 {
         let first_x_m = self.constraints.first().map_or(x_m, |c| c.x_m.min(x_m));
         let start = Vec2::new(first_x_m - RUN_OUT_M, self.target.y);
@@ -94,7 +95,7 @@ impl Corridor {
         y_m
     }
 
-    /// Adds bodies: first those that close up with a wall, or with one that does; then the free ones.
+    /// Adds bodies: first those that leave no gap to a wall, or to such a body; then the free ones.
     fn evade(&mut self, bodies: &[Body], mut walls: Vec<Wall>) {
         let usable = |b: &&Body| b.radius_m > 0.0 && (b.centre_m.x + b.centre_m.y + b.radius_m).is_finite();
         let mut free: Vec<&Body> = bodies.iter().filter(usable).collect();
@@ -113,15 +114,15 @@ impl Corridor {
     }
 }
 
-/// The side of the nearest wall, if it leaves no way between itself and a body.
+/// The side of the nearest wall, if there is no gap between it and a body.
 fn closed_side(walls: &[Wall], body: &Body) -> Option<Side> {
     let distances = walls.iter().map(|wall| (wall.distance_m(body.centre_m), wall.side));
     let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (nearest.0 < body.radius_m).then_some(nearest.1)
 }
 
-/// Where the string from `from` to `end` first bends: the funnel of directions narrows point by point until one, or the
-/// end, is outside of it. `None` if it runs straight. Points are ahead of `from`.
+/// Index of the point at which the path from `from` to `end` first bends; `None` if it is straight. The funnel of
+/// directions narrows point by point until a point, or the end, is outside of it. All points must be ahead of `from`.
 fn first_bend(from: Vec2, points: &[Constraint], end: Vec2) -> Option<usize> {
     let slope = |x_m: f64, y_m: f64| (y_m - from.y) / (x_m - from.x);
     let (mut low, mut high) = ((f64::NEG_INFINITY, None), (f64::INFINITY, None));

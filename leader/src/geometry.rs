@@ -1,16 +1,16 @@
-//! Convex polygons in the plane: hulls, rounding, distance. Vertices counter-clockwise; one vertex is a point, two are
-//! a segment.
+//! Convex polygons in the plane: hulls, inflation, distance. Vertices are counter-clockwise. One vertex is a point, two
+//! are a segment.
 
 use skein_protocol::Vec2;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Sides of the polygon that stands for a circle.
+/// Number of sides of the polygon that approximates a circle.
 pub const CIRCLE_SIDES: usize = 32;
 
-/// Corners that bend by less than this (twice the area of the triangle they cut off, m²) are left out.
+/// Flatter corners are left out. The measure is twice the area of the triangle that a corner cuts off, m².
 const FLAT_M2: f64 = 1e-9;
 
-/// Convex hull, counter-clockwise from its leftmost lowest vertex.
+/// The convex hull, counter-clockwise from its leftmost lowest vertex.
 #[must_use]
 pub fn hull(points: &[Vec2]) -> Vec<Vec2> {
     let sorted = sorted(points);
@@ -23,7 +23,7 @@ pub fn hull(points: &[Vec2]) -> Vec<Vec2> {
     hull
 }
 
-/// The lower side of the points' hull, left to right, x strictly increasing.
+/// The lower side of the points' hull, by strictly increasing x.
 #[must_use]
 pub fn lower_chain(points: &[Vec2]) -> Vec<Vec2> {
     let mut lowest = sorted(points);
@@ -31,15 +31,15 @@ pub fn lower_chain(points: &[Vec2]) -> Vec<Vec2> {
     half_hull(lowest.into_iter())
 }
 
-/// The upper side of the points' hull, left to right, x strictly increasing.
+/// The upper side of the points' hull, by strictly increasing x.
 #[must_use]
 pub fn upper_chain(points: &[Vec2]) -> Vec<Vec2> {
     let flipped: Vec<Vec2> = points.iter().map(|p| Vec2::new(p.x, -p.y)).collect();
     lower_chain(&flipped).into_iter().map(|p| Vec2::new(p.x, -p.y)).collect()
 }
 
-/// All points within `radius_m` of a polygon: its hull with a circumscribed [`CIRCLE_SIDES`]-gon at each vertex, so
-/// never too small. Sides that face along an axis are at the exact distance.
+/// All points within `radius_m` (m) of a polygon. Each corner is rounded by a circumscribed [`CIRCLE_SIDES`]-gon, so the
+/// result is never too small. Sides that face along an axis are at the exact distance.
 #[must_use]
 pub fn inflate(polygon: &[Vec2], radius_m: f64) -> Vec<Vec2> {
     if radius_m <= 0.0 {
@@ -48,7 +48,7 @@ pub fn inflate(polygon: &[Vec2], radius_m: f64) -> Vec<Vec2> {
     let step = 2.0 * PI / CIRCLE_SIDES as f64;
     let corner_m = radius_m / inscribed();
     let mut points = Vec::with_capacity(polygon.len() * CIRCLE_SIDES);
-    // One quadrant, mirrored: a mirrored obstacle has an exactly mirrored rounding.
+    // One quadrant, mirrored: a mirrored obstacle has an exactly mirrored outline.
     for angle in (0..CIRCLE_SIDES / 4).map(|k| FRAC_PI_2 - (k as f64 + 0.5) * step) {
         let (dy, dx) = (corner_m * angle.sin(), corner_m * angle.cos());
         for &p in polygon {
@@ -58,7 +58,7 @@ pub fn inflate(polygon: &[Vec2], radius_m: f64) -> Vec<Vec2> {
     hull(&points)
 }
 
-/// Distance of the rounding's sides over that of its corners.
+/// Ratio of the inner radius to the outer radius of the polygon that approximates a circle.
 #[must_use]
 pub fn inscribed() -> f64 {
     (PI / CIRCLE_SIDES as f64).cos()
@@ -91,7 +91,7 @@ fn nearest_on_segment(a: Vec2, b: Vec2, point: Vec2) -> Vec2 {
     a + edge * ((point - a).dot(&edge) / length2).clamp(0.0, 1.0)
 }
 
-/// By x, then y, without repetition.
+/// The points by x, then y, without repetitions.
 fn sorted(points: &[Vec2]) -> Vec<Vec2> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)));
@@ -99,7 +99,7 @@ fn sorted(points: &[Vec2]) -> Vec<Vec2> {
     sorted
 }
 
-/// Keeps the points at which the way through them turns left.
+/// Keeps the points at which the path through them turns left.
 fn half_hull(points: impl Iterator<Item = Vec2>) -> Vec<Vec2> {
     let mut kept: Vec<Vec2> = Vec::new();
     for point in points {
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hull_has_no_inner_or_flat_points() {
+    fn a_hull_has_no_inner_points_and_no_flat_corners() {
         let mut points = square(0.0, 0.0, 2.0);
         points.extend([Vec2::new(0.0, 0.0), Vec2::new(2.0, 0.5), Vec2::new(-2.0, -2.0)]);
         assert_eq!(hull(&points), square(0.0, 0.0, 2.0));
@@ -133,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn chains_are_the_two_sides() {
+    fn the_chains_of_a_square_are_its_two_sides() {
         let hull = square(0.0, 0.0, 2.0);
         assert_eq!(lower_chain(&hull), vec![Vec2::new(-2.0, -2.0), Vec2::new(2.0, -2.0)]);
         assert_eq!(upper_chain(&hull), vec![Vec2::new(-2.0, 2.0), Vec2::new(2.0, 2.0)]);
     }
 
     #[test]
-    fn rounding_is_exact_along_the_axes_and_never_too_small() {
+    fn inflation_is_exact_along_the_axes_and_never_too_small() {
         let disc = inflate(&[Vec2::new(5.0, 1.0)], 20.0);
         assert_eq!(disc.len(), CIRCLE_SIDES);
         let top = disc.iter().map(|p| p.y).fold(f64::MIN, f64::max);
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn crossed_bars_overlap_though_no_corner_is_inside() {
+    fn crossed_bars_overlap_though_neither_has_a_corner_in_the_other() {
         let bar = |x: f64, y: f64| hull(&[Vec2::new(-x, -y), Vec2::new(x, -y), Vec2::new(x, y), Vec2::new(-x, y)]);
         assert_eq!(separation(&bar(9.0, 1.0), &bar(1.0, 9.0)), Vec2::zeros());
         assert_eq!(separation(&bar(1.0, 1.0), &[Vec2::new(4.0, 5.0)]), Vec2::new(3.0, 4.0));

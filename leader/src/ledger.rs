@@ -1,5 +1,5 @@
-//! What a drone knows of plans: the newest it has heard of, the one it obeys, and everybody's parts in it. The same
-//! ledger serves the one who obeys and the one who plans; a new leader continues from its own.
+//! What a drone knows of plans: the newest one it has heard of, the one it obeys, and the assignments in it. Leaders and
+//! followers use the same ledger; a new leader continues from its own.
 
 use crate::obstacles::{Obstacles, set_ids};
 use crate::plan_bundle::PlanBundle;
@@ -11,23 +11,25 @@ use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
 use skein_protocol::{Ballot, DroneId, GroupId, Phase, PlanStamp};
 
-/// The ledger of one drone. Bounded by the size of the swarm and of an obstacle set.
+/// The ledger of one drone. Memory is bounded by the size of the swarm and of an obstacle set.
 #[derive(Clone, Debug)]
 pub struct Ledger {
     me: DroneId,
     drones: u32,
     params: RouteParams,
+    /// The newest stamp it has heard of.
     stamp: PlanStamp,
+    /// The plan of that stamp.
     plan: Option<Plan>,
-    /// Of the newest plan, until it is obeyed: then they are in `obeyed`.
+    /// The assignments of that stamp, until the plan is obeyed. Then they are in `obeyed`.
     parts: Roster,
     obeyed: Option<PlanBundle>,
-    /// This drone's part in it: what is asked for in every tick lies with what else is, not among a thousand others.
+    /// This drone's assignment in `obeyed`: a copy that can be read without a search.
     mine: Option<Assignment>,
-    /// The plan that split the group whose leader made the plan it obeys, if that one came from another leader.
+    /// The plan of an earlier leader that split the group, if this drone obeys a plan for a part.
     origin: Option<PlanBundle>,
     sets: Vec<PlannedSet>,
-    /// Of this drone's part under what it obeys.
+    /// Hash of `mine`.
     part_hash: u64,
 }
 
@@ -50,7 +52,7 @@ impl Ledger {
         }
     }
 
-    /// The ledger that another drone would have, had it heard the same.
+    /// The ledger that drone `me` would have if it had heard the same.
     #[must_use]
     pub fn of_member(&self, me: DroneId) -> Self {
         let mut ledger = Self { me, ..self.clone() };
@@ -59,8 +61,8 @@ impl Ledger {
         ledger
     }
 
-    /// The ledger as if all drones were one group, and everything known had been planned in one term. `places`: what
-    /// drones are known to fly; it counts for those whose parts the newest plan does not give.
+    /// The ledger as if all drones were one group and all plans had been made in one term. `places`: queue places that
+    /// drones are known to have. They count for drones that the newest plan does not assign.
     #[must_use]
     pub fn united(&self, ballot: Ballot, places: &[(DroneId, QueuePlace)]) -> Self {
         let mut all = Self { origin: None, ..self.clone() };
@@ -81,32 +83,32 @@ impl Ledger {
         all
     }
 
-    /// The plan this drone obeys, with the parts it has heard of.
+    /// The plan this drone obeys, with the assignments it has heard of.
     #[must_use]
     pub fn obeyed(&self) -> Option<&PlanBundle> {
         self.obeyed.as_ref()
     }
 
-    /// The plan that made this drone's group, of a wider group's leader; repeated to those who missed it by whoever leads
-    /// a part of that group now.
+    /// The plan that made this drone's group, by the leader of a wider group. The leaders of the parts repeat it for drones
+    /// that missed it.
     #[must_use]
     pub fn origin(&self) -> Option<&PlanBundle> {
         self.origin.as_ref()
     }
 
-    /// The stamp it obeys; the default, lower than any, before the first.
+    /// The stamp of the plan it obeys; the default, lower than any, before the first.
     #[must_use]
     pub fn stamp(&self) -> PlanStamp {
         self.obeyed.as_ref().map_or(PlanStamp::default(), |bundle| bundle.plan.id)
     }
 
-    /// The newest stamp heard of, whether it can be obeyed yet or not.
+    /// The newest stamp it has heard of, whether it can obey that plan yet or not.
     #[must_use]
     pub fn newest(&self) -> PlanStamp {
         self.stamp
     }
 
-    /// This drone's part in the plan it obeys.
+    /// This drone's assignment in the plan it obeys.
     #[must_use]
     pub fn part(&self) -> Option<&Assignment> {
         self.mine.as_ref()
@@ -116,7 +118,7 @@ impl Ledger {
         self.obeyed.as_ref()?.parts.get(self.me).copied()
     }
 
-    /// Whether this drone has, as far as it heard, no part in the newest plan.
+    /// Whether the newest plan, as far as it was heard, has no assignment for this drone.
     #[must_use]
     pub fn is_left_out(&self) -> bool {
         let newer = self.plan.as_ref().is_some_and(|plan| plan.id > self.stamp());
@@ -129,7 +131,7 @@ impl Ledger {
         &self.sets
     }
 
-    /// Hash of this drone's part under what it obeys: equal stamps must mean equal hashes. 0 before the first.
+    /// Hash of this drone's assignment: equal stamps must mean equal hashes. 0 before the first plan.
     #[must_use]
     pub fn part_hash(&self) -> u64 {
         self.part_hash
@@ -149,7 +151,7 @@ impl Ledger {
         self.part().map_or(GroupId::ALL, |part| part.group)
     }
 
-    /// Hears a plan. Older ones are ignored.
+    /// Hears a plan. An older plan is ignored.
     pub fn hear_plan(&mut self, plan: &Plan, obstacles: &Obstacles) {
         if self.open(plan.id) {
             self.plan.get_or_insert(*plan);
@@ -157,21 +159,23 @@ impl Ledger {
         }
     }
 
-    /// Hears somebody's part. Those of older plans, and of nobody in the swarm, are ignored.
+    /// Hears a drone's assignment. An assignment of an older plan, or of no drone of the swarm, is ignored.
     pub fn hear_assignment(&mut self, part: &Assignment, obstacles: &Obstacles) {
         if part.drone.0 >= self.drones || !self.open(part.id) {
             return;
         }
         if let Some(bundle) = self.obeyed.as_mut().filter(|bundle| bundle.plan.id == part.id) {
             bundle.parts.add(*part);
-            self.sets.iter_mut().filter(|set| set.stamp == part.id).for_each(|set| _ = set.parts.add(*part));
+            for set in self.sets.iter_mut().filter(|set| set.stamp == part.id) {
+                set.parts.add(*part);
+            }
         } else {
             self.parts.add(*part);
             self.settle(obstacles);
         }
     }
 
-    /// Takes what another drone says that it flies for its part in a set, if that was not heard.
+    /// Takes the queue places in a beacon for the drone's assignments, where those were not heard.
     pub fn hear_place(&mut self, drone: DroneId, pose: &Pose) {
         for place in pose.queue.iter().filter(|place| place.rank != QueuePlace::NO_RANK) {
             let (route, rank) = (place.route, place.rank);
@@ -184,7 +188,7 @@ impl Ledger {
         }
     }
 
-    /// Takes up orders of one's own making.
+    /// Adopts a plan.
     pub fn adopt(&mut self, bundle: PlanBundle, obstacles: &Obstacles) {
         if self.open(bundle.plan.id) {
             self.plan = Some(bundle.plan);
@@ -193,7 +197,7 @@ impl Ledger {
         }
     }
 
-    /// Starts over for a newer stamp; false if this one is older than what is known.
+    /// Starts over if the stamp is newer than the newest one. Returns false if it is older.
     fn open(&mut self, stamp: PlanStamp) -> bool {
         if stamp > self.stamp {
             self.stamp = stamp;
@@ -203,8 +207,8 @@ impl Ledger {
         stamp == self.stamp
     }
 
-    /// Obeys the newest plan once the plan, one's own part in it and all its obstacles are known. Call again when an
-    /// obstacle was learnt.
+    /// Obeys the newest plan once the plan, this drone's assignment and all obstacles of the set are known. Call again when
+    /// an obstacle was learnt.
     pub fn settle(&mut self, obstacles: &Obstacles) {
         let Some(plan) = self.plan.filter(|plan| plan.id > self.stamp()) else { return };
         if !self.parts.contains(self.me) {
@@ -225,11 +229,10 @@ impl Ledger {
         let parts = std::mem::take(&mut self.parts);
         let before = self.obeyed.replace(PlanBundle { plan, parts });
         self.mine = self.find_part();
-        match before {
-            Some(before) if before.plan.group != plan.group => {
-                self.origin = before.plan.group.contains(plan.group).then_some(before);
-            }
-            _ => {}
+        if let Some(before) = before
+            && before.plan.group != plan.group
+        {
+            self.origin = before.plan.group.contains(plan.group).then_some(before);
         }
         self.part_hash = self.hash_part();
     }

@@ -1,19 +1,19 @@
-//! Drones to slots at least cost, by successive shortest exchanges.
+//! Weighted matroid intersection: drones to slots of routes at least cost, by successive shortest exchanges. It is a
+//! minimum-cost matching that does not need the matrix of n drones × n·K slots.
 //!
-//! Each route has slots 0, 1, 2, …, one drone a slot; a drone can use the first `cap` slots of a route. A set of drones
-//! fits a route if for every level d at most d of them have a cap of d or less; the level is tight if d of them do. A
-//! drone of cap c that enters a route therefore displaces one of those with a cap up to the first tight level ≥ c, or
-//! none if there is no such level. Drones are inserted one after the other, each along a cheapest chain of
-//! displacements; among equals a shortest chain, which keeps the result valid (weighted matroid intersection). That is
-//! a min-cost matching without the n × (n·K) matrix.
+//! Each route has slots 0, 1, 2, …, one drone per slot. A drone can use the first `cap` slots of a route. A set of drones
+//! fits a route if, for every level d, at most d of them have a cap of d or less. The level is tight if exactly d do. A
+//! drone of cap c that enters a route displaces a drone with a cap up to the first tight level ≥ c, or none if there is no
+//! such level. Drones are inserted one after the other, each along a cheapest chain of displacements. Among equal chains
+//! a shortest one is taken, which keeps the result valid.
 
-/// Cost of a route for a drone; arrivals are in microseconds.
+/// Cost of a route for a drone: its arrival, µs.
 pub(crate) type Cost = i64;
 
-/// A level beyond every tight one: there is a free slot.
+/// A level above every tight one: the route has a free slot.
 const FREE: u32 = u32::MAX;
 
-/// A drone in hand that could enter a route next: cost so far and who.
+/// A displaced drone that could enter a route next: the cost of the chain so far, and the drone.
 type Entry = (Cost, usize);
 const NO_ENTRY: Entry = (Cost::MAX, usize::MAX);
 
@@ -21,22 +21,22 @@ const NO_ENTRY: Entry = (Cost::MAX, usize::MAX);
 struct Exchange<'a> {
     caps: &'a [Vec<u32>],
     costs: &'a [Vec<Cost>],
-    /// Whether costs count, or only whether everybody finds a place.
+    /// Whether costs count. Otherwise any complete placement will do.
     weighted: bool,
     route: Vec<Option<usize>>,
-    /// By route and cap, number of drones.
+    /// Number of drones by route and cap.
     population: Vec<Vec<u32>>,
-    /// By route and cap, first tight level not below it.
+    /// First tight level not below a cap, by route and cap.
     reach: Vec<Vec<u32>>,
-    /// Scratch: by route and level, the cheapest entry that reaches just so far.
+    /// Scratch: the cheapest entry that reaches exactly a level, by route and level.
     entries: Vec<Vec<Entry>>,
 }
 
-/// The route of each drone, or `None` if they do not all fit. `caps[drone][route]` is the number of slots it can use,
-/// at most the number of drones. `costs` are looked at where the cap is not 0; the total is least if `weighted`.
+/// The route of each drone, or `None` if not all of them fit. `caps[drone][route]`: number of slots that the drone can
+/// use, at most the number of drones. `costs` count where the cap is not 0. The total cost is least if `weighted`.
 pub(crate) fn place(caps: &[Vec<u32>], costs: &[Vec<Cost>], weighted: bool) -> Option<Vec<usize>> {
     let (drones, routes) = (caps.len(), caps.first().map_or(0, Vec::len));
-    let mut matroid_intersection = Exchange {
+    let mut exchange = Exchange {
         caps,
         costs,
         weighted,
@@ -45,17 +45,17 @@ pub(crate) fn place(caps: &[Vec<u32>], costs: &[Vec<Cost>], weighted: bool) -> O
         reach: vec![vec![FREE; drones + 1]; routes],
         entries: vec![vec![NO_ENTRY; drones + 2]; routes],
     };
-    (0..drones).try_for_each(|drone| matroid_intersection.insert(drone))?;
-    matroid_intersection.route.into_iter().collect()
+    (0..drones).try_for_each(|drone| exchange.insert(drone))?;
+    exchange.route.into_iter().collect()
 }
 
-/// Chains of displacements from one new drone.
+/// Chains of displacements that begin with one new drone.
 struct Search {
-    /// By drone: cost of a chain after which it is without a place.
+    /// By drone: cost of the cheapest chain that displaces it.
     cost: Vec<Cost>,
-    /// By drone: who displaces it.
+    /// By drone: the drone that displaces it.
     by: Vec<usize>,
-    /// Cost, the last drone's own cost, that drone, and the route on which it finds a free slot.
+    /// The best end of a chain: its cost, the last drone's own cost, that drone, and the route with a free slot for it.
     end: Option<(Cost, Cost, usize, usize)>,
 }
 
@@ -71,10 +71,10 @@ impl Exchange<'_> {
         let mut search =
             Search { cost: vec![Cost::MAX; self.caps.len()], by: vec![usize::MAX; self.caps.len()], end: None };
         search.cost[drone] = 0;
-        let mut in_hand = vec![drone];
-        while !in_hand.is_empty() && (self.weighted || search.end.is_none()) {
-            self.enter(&in_hand, &mut search);
-            in_hand = self.displace(&mut search);
+        let mut displaced = vec![drone];
+        while !displaced.is_empty() && (self.weighted || search.end.is_none()) {
+            self.enter(&displaced, &mut search);
+            displaced = self.displace(&mut search);
         }
         let (_, _, mut last, mut route) = search.end?;
         loop {
@@ -86,19 +86,21 @@ impl Exchange<'_> {
         }
     }
 
-    /// Of the routes with a free slot for a drone, the one on which it arrives first.
+    /// The route on which a drone arrives first, of those with a free slot for it.
     fn free_route(&self, drone: usize) -> Option<usize> {
         let caps = self.caps[drone].iter().enumerate();
         let free = caps.filter(|&(route, &cap)| cap > 0 && self.reach[route][cap as usize] == FREE);
         free.map(|(route, _)| route).min_by_key(|&route| self.costs[drone][route])
     }
 
-    /// Offers the drones in hand to all other routes: they find a free slot, or enter where they displace another.
-    fn enter(&mut self, in_hand: &[usize], search: &mut Search) {
-        self.entries.iter_mut().for_each(|entries| entries.fill(NO_ENTRY));
+    /// Offers displaced drones to all other routes. They find a free slot, or an entry where they displace another drone.
+    fn enter(&mut self, displaced: &[usize], search: &mut Search) {
+        for entries in &mut self.entries {
+            entries.fill(NO_ENTRY);
+        }
         let known = search.end.map_or(Cost::MAX, |end| end.0);
         let mut end = None;
-        for &drone in in_hand {
+        for &drone in displaced {
             for (route, &cap) in self.caps[drone].iter().enumerate() {
                 if cap == 0 || self.route[drone] == Some(route) {
                     continue;
@@ -117,31 +119,32 @@ impl Exchange<'_> {
         search.end = end.filter(|end| end.0 < known).or(search.end);
     }
 
-    /// Takes the drones in hand that the entries displace at less cost than known so far.
+    /// The drones that the entries displace at less cost than known so far.
     fn displace(&mut self, search: &mut Search) -> Vec<usize> {
         for entries in &mut self.entries {
             for level in (0..entries.len() - 1).rev() {
                 entries[level] = entries[level].min(entries[level + 1]);
             }
         }
-        let mut in_hand = Vec::new();
+        let mut displaced = Vec::new();
         for (drone, place) in self.route.iter().enumerate() {
             let Some(route) = *place else { continue };
             let (cost, by) = self.entries[route][self.caps[drone][route] as usize];
             if by != usize::MAX && cost - self.weight(drone, route) < search.cost[drone] {
                 search.cost[drone] = cost - self.weight(drone, route);
                 search.by[drone] = by;
-                in_hand.push(drone);
+                displaced.push(drone);
             }
         }
-        in_hand
+        displaced
     }
 
+    /// The cost of a route for a drone, or 0 if costs do not count.
     fn weight(&self, drone: usize, route: usize) -> Cost {
         if self.weighted { self.costs[drone][route] } else { 0 }
     }
 
-    /// Moves a drone to a route; answers where it was.
+    /// Moves a drone to a route. Returns the route it was on.
     fn shift(&mut self, drone: usize, route: usize) -> Option<usize> {
         let before = self.route[drone].replace(route);
         self.population[route][self.caps[drone][route] as usize] += 1;
@@ -153,6 +156,7 @@ impl Exchange<'_> {
         before
     }
 
+    /// Determines the tight levels of a route anew.
     fn mark_tight(&mut self, route: usize) {
         let population = &self.population[route];
         let mut below: u32 = population.iter().sum();

@@ -1,11 +1,11 @@
-//! What a drone knows of obstacles, by its own senses or by being told, and who is past them.
+//! What a drone knows of obstacles, from its own senses or from messages, and which drones have passed them.
 
 use skein_protocol::payload::{MAX_SET, Passed};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, ObstacleId, SimTime};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most obstacles a drone keeps; further ones are not taken up.
+/// Most obstacles that a drone keeps. Further ones are ignored.
 pub const MAX_KNOWN: usize = 1024;
 
 /// A known obstacle.
@@ -13,13 +13,13 @@ pub const MAX_KNOWN: usize = 1024;
 pub struct Known {
     /// Its outline, world frame.
     pub shape: ConvexShape,
-    /// Who sensed it first.
+    /// The drone that sensed it first.
     pub witness: DroneId,
     /// When this drone learnt of it.
     pub since: SimTime,
 }
 
-/// Known obstacles and who passed them. Bounded.
+/// The known obstacles, and which drones have passed them. Memory is bounded.
 #[derive(Clone, Debug, Default)]
 pub struct Obstacles {
     known: BTreeMap<ObstacleId, Known>,
@@ -30,14 +30,14 @@ pub struct Obstacles {
 }
 
 impl Obstacles {
-    /// Nothing known, in a swarm of `drones`; obstacles whose extents along the flight are closer than `reach_m` belong
-    /// to one set.
+    /// No obstacles yet, in a swarm of `drones`. Obstacles whose extents along the flight are closer than `reach_m` (m)
+    /// belong to one set.
     #[must_use]
     pub fn new(drones: u32, reach_m: f64) -> Self {
         Self { drones, reach_m, ..Self::default() }
     }
 
-    /// Learns of an obstacle; true if it is new.
+    /// Learns of an obstacle. Returns whether it is new.
     pub fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
         if self.known.contains_key(&id) || self.known.len() >= MAX_KNOWN {
             return false;
@@ -47,12 +47,12 @@ impl Obstacles {
         true
     }
 
-    /// Learns who is past what.
+    /// Hears which obstacles a drone has passed.
     pub fn hear_passed(&mut self, source: DroneId, message: &Passed) {
         self.note_passed(source, set_ids(&message.set, message.set_count));
     }
 
-    /// Notes that a drone is past these obstacles, however far it may turn back later.
+    /// Notes that a drone has passed these obstacles. That holds even if it turns back later.
     pub fn note_passed(&mut self, drone: DroneId, ids: &[ObstacleId]) {
         if drone.0 >= self.drones {
             return;
@@ -62,10 +62,10 @@ impl Obstacles {
         }
     }
 
-    /// Whether a drone said that it is past an obstacle.
+    /// Whether a drone is noted to have passed an obstacle.
     #[must_use]
     pub fn has_passed(&self, drone: DroneId, id: ObstacleId) -> bool {
-        self.passed.get(&id).is_some_and(|who| who.contains(&drone))
+        self.passed.get(&id).is_some_and(|drones| drones.contains(&drone))
     }
 
     /// One obstacle.
@@ -74,7 +74,7 @@ impl Obstacles {
         self.known.get(&id)
     }
 
-    /// All of them, by id.
+    /// All known obstacles, by id.
     pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> {
         self.known.iter().map(|(&id, known)| (id, known))
     }
@@ -85,21 +85,21 @@ impl Obstacles {
         ids.iter().map(|&id| self.get(id).map(|known| (id, known.shape))).collect()
     }
 
-    /// Whether a drone there is past all obstacles of a set: it said so, or it is beyond the exit.
+    /// Whether a drone at abscissa `x_m` has passed a set: it is beyond the exit, or it is noted for every obstacle.
     #[must_use]
     pub fn is_past(&self, drone: DroneId, x_m: f64, set: &[ObstacleId], exit_x_m: f64) -> bool {
         x_m >= exit_x_m || set.iter().all(|&id| self.has_passed(drone, id))
     }
 
-    /// Where a set is left: its rear edge and `beyond_m`, m.
+    /// The exit of a set: the abscissa of its rear edge, plus `beyond_m`, m.
     #[must_use]
     pub fn exit_x_m(&self, set: &[ObstacleId], beyond_m: f64) -> f64 {
         let rear = set.iter().filter_map(|&id| self.get(id)).map(|known| known.shape.bounds().1.x);
         rear.fold(f64::NEG_INFINITY, f64::max) + beyond_m
     }
 
-    /// The obstacle sets, in flight order. Ids ascending; a set has at most [`MAX_SET`] obstacles, the farther ones of a
-    /// larger set form the next.
+    /// The obstacle sets, in flight order, each with ascending ids. A set has at most [`MAX_SET`] obstacles; the farther
+    /// ones of a larger set form the next one.
     #[must_use]
     pub fn sets(&self) -> &[Vec<ObstacleId>] {
         &self.sets
@@ -121,7 +121,9 @@ impl Obstacles {
             }
             rear = rear.max(end);
         }
-        sets.iter_mut().for_each(|set| set.sort_unstable());
+        for set in &mut sets {
+            set.sort_unstable();
+        }
         sets
     }
 }
@@ -163,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_knows_cannot_be_passed() {
+    fn only_known_obstacles_can_be_passed() {
         let mut obstacles = Obstacles::new(4, 40.0);
         obstacles.learn(SimTime::ZERO, ObstacleId(1), disc(0.0), DroneId(0));
         let (set, set_count) = set_array(&[ObstacleId(1), ObstacleId(9)]);

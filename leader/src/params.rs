@@ -1,9 +1,10 @@
-//! What planning needs to know of the mission.
+//! Parameters of planning and of leading.
 
+use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
-use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// How a leader chooses among the groupings of its members.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,4 +105,29 @@ pub struct PlannerParams {
     /// Delay between learning an obstacle and planning for it, so that one plan covers obstacles that are learnt together;
     /// also between a change of the members and new slots, s.
     pub debounce_s: f64,
+}
+
+/// What [`crate::leading::Leading`] needs to know before it starts.
+#[derive(Clone, Debug)]
+pub struct LeadingParams {
+    /// This drone.
+    pub me: DroneId,
+    /// Number of drones in the swarm.
+    pub drones: u32,
+    /// Number of this start of the drone's process, from 1. No two starts of one drone share it.
+    pub incarnation: u32,
+    /// When it starts.
+    pub start: SimTime,
+    /// Length of a tick, s.
+    pub dt_s: f64,
+    /// Parameters of elections.
+    pub election: ElectionParams,
+    /// Parameters of planning.
+    pub planner: PlannerParams,
+    /// Period of beacons, s.
+    pub beacon_period_s: f64,
+    /// Period of repetitions, s.
+    pub repeat_period_s: f64,
+    /// A peer that is silent for longer counts as gone, s. Longer on a bad link.
+    pub peer_timeout_s: f64,
 }

@@ -1,18 +1,13 @@
-//! What leaders tell each other before they plan for one obstacle set: the rows of the table they all split. Each
-//! applies the part about its own members.
+//! The exchange of arrivals between leaders before they plan for one obstacle set. Each leader sends the rows of its own
+//! members. All of them split the same table, and each applies the part about its own members.
 
 use crate::split::NEVER_S;
+use crate::tuning::{ANNOUNCE_S, ARRIVALS_TIMEOUT_S};
 use skein_protocol::payload::{Arrivals, MAX_ROUTES};
 use skein_protocol::{ArrivalsKind, Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
 
-/// A leader that hears nothing of the others for so long plans alone, s; the air's delay comes on top, both ways.
-pub const PATIENCE_S: f64 = 0.3;
-
-/// What was chosen for other groups is repeated for so long, s.
-const ANNOUNCE_S: f64 = 1.0;
-
-/// What is said again and again for a while.
+/// Rows that are repeated for a while.
 #[derive(Clone, Debug, PartialEq)]
 struct Announcement {
     until: SimTime,
@@ -20,7 +15,7 @@ struct Announcement {
     rows: Vec<Arrivals>,
 }
 
-/// A question that is open: this drone waits for the rows of others.
+/// An open question: this drone waits for the rows of others.
 #[derive(Clone, Debug, PartialEq)]
 struct Question {
     set: u32,
@@ -29,25 +24,25 @@ struct Question {
     rows: Vec<Arrivals>,
 }
 
-/// Rows heard, and the question asked. Bounded by the size of the swarm.
+/// The rows heard, and the question asked. Memory is bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlanExchange {
+pub(crate) struct PlanExchange {
     drones: u32,
     repeat_s: f64,
     heard: BTreeMap<DroneId, Arrivals>,
-    /// What one leader chose for all.
+    /// The rows of a choice that the coordinator made.
     chosen: BTreeMap<DroneId, Arrivals>,
     announced: Option<Announcement>,
     question: Option<Question>,
-    /// The set that somebody else asked about last, and when this drone may answer again.
+    /// The set that another leader asked about last.
     asked: Option<u32>,
+    /// When this drone may answer again.
     next_answer: SimTime,
 }
 
 impl PlanExchange {
-    /// Nothing heard, in a swarm of `drones`; what has to be repeated is repeated every `repeat_s`.
-    #[must_use]
-    pub fn new(drones: u32, repeat_s: f64) -> Self {
+    /// Nothing heard, in a swarm of `drones`. Repetitions are `repeat_s` apart.
+    pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
         Self {
             drones,
             repeat_s,
@@ -60,11 +55,11 @@ impl PlanExchange {
         }
     }
 
-    /// Hears a row. One that is older than what is known, from the future, of nobody in the swarm, or of a drone that
-    /// could go nowhere is ignored.
-    pub fn hear(&mut self, now: SimTime, row: &Arrivals) {
-        let somewhere = arrivals_s(row).iter().any(|s| s.abs() < NEVER_S);
-        if row.drone.0 >= self.drones || row.stamp > now || !somewhere {
+    /// Hears a row. A row is ignored if it is older than the last one, from the future, of no drone of the swarm, or if it
+    /// has no usable route.
+    pub(crate) fn hear(&mut self, now: SimTime, row: &Arrivals) {
+        let usable = arrivals_s(row).iter().any(|s| s.abs() < NEVER_S);
+        if row.drone.0 >= self.drones || row.stamp > now || !usable {
             return;
         }
         let rows = match row.kind() {
@@ -81,9 +76,15 @@ impl PlanExchange {
         }
     }
 
-    /// Asks about a set with the rows of one's own members, made by `rows` for the first time; they stay the same until
-    /// the answer, so that all split the same table. Says them when due.
-    pub fn ask(&mut self, now: SimTime, set: u32, rows: impl FnOnce() -> Vec<Arrivals>, say: &mut Vec<Arrivals>) {
+    /// Asks about a set with the rows of this leader's members. `rows` makes them once; they stay the same until the
+    /// answer, so that all leaders split the same table. Says them when due.
+    pub(crate) fn ask(
+        &mut self,
+        now: SimTime,
+        set: u32,
+        rows: impl FnOnce() -> Vec<Arrivals>,
+        say: &mut Vec<Arrivals>,
+    ) {
         let question = match &mut self.question {
             Some(question) if question.set == set => question,
             other => other.insert(Question { set, since: now, next_said: now, rows: rows() }),
@@ -94,14 +95,20 @@ impl PlanExchange {
         }
     }
 
-    /// The whole table once everybody in `others` has a row, or after waiting for too long: `delay_s` is how long a
-    /// message is on the air. By drone; one's own rows among them.
-    pub fn answer(&self, now: SimTime, others: &[DroneId], routes: usize, delay_s: f64) -> Option<Vec<Arrivals>> {
+    /// The whole table, by drone, once every drone of `others` has a row or the wait is over. It includes the rows of this
+    /// leader's members. `delay_s`: how long a message takes to arrive.
+    pub(crate) fn answer(
+        &self,
+        now: SimTime,
+        others: &[DroneId],
+        routes: usize,
+        delay_s: f64,
+    ) -> Option<Vec<Arrivals>> {
         let question = self.question.as_ref()?;
         let fits = |row: &&Arrivals| row.set == question.set && row.routes as usize == routes;
         let foreign: Vec<Arrivals> =
             others.iter().filter_map(|drone| self.heard.get(drone)).filter(fits).copied().collect();
-        let waited = now.since(question.since) >= PATIENCE_S + 2.0 * delay_s;
+        let waited = now.since(question.since) >= ARRIVALS_TIMEOUT_S + 2.0 * delay_s;
         if foreign.len() < others.len() && !waited {
             return None;
         }
@@ -111,8 +118,8 @@ impl PlanExchange {
         Some(table)
     }
 
-    /// The question is settled. Its rows are said once more without a question: others may still wait for them.
-    pub fn close(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
+    /// Closes the question. Its rows are said once more, as other leaders may still wait for them.
+    pub(crate) fn close(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
         if let Some(question) = self.question.take() {
             self.next_answer = now.after(self.repeat_s);
             self.asked = None;
@@ -120,13 +127,13 @@ impl PlanExchange {
         }
     }
 
-    /// Says for a while what was chosen for all.
-    pub fn announce(&mut self, now: SimTime, rows: Vec<Arrivals>) {
+    /// Repeats these rows of a choice for a while.
+    pub(crate) fn announce(&mut self, now: SimTime, rows: Vec<Arrivals>) {
         self.announced = Some(Announcement { until: now.after(ANNOUNCE_S), next_said: now, rows });
     }
 
-    /// Says again what is due.
-    pub fn repeat(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
+    /// Says the rows of a choice when they are due.
+    pub(crate) fn repeat(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
         let Some(announcement) = self.announced.as_mut().filter(|one| now <= one.until) else { return };
         if now >= announcement.next_said {
             announcement.next_said = now.after(self.repeat_s);
@@ -134,16 +141,15 @@ impl PlanExchange {
         }
     }
 
-    /// The route past a set that this leader has chosen for a drone since then, if it was heard.
-    #[must_use]
-    pub fn chosen(&self, drone: DroneId, set: u32, leader: DroneId, since: SimTime) -> Option<usize> {
+    /// The route past a set that `leader` chose for a drone at `since` or later, if it was heard.
+    pub(crate) fn chosen(&self, drone: DroneId, set: u32, leader: DroneId, since: SimTime) -> Option<usize> {
         let row = self.chosen.get(&drone)?;
         let meant = row.set == set && row.ballot.claimant == leader && row.stamp >= since;
         row.gate_s.iter().take(row.routes as usize).position(|s| s.is_finite()).filter(|_| meant)
     }
 
-    /// The set that another leader asked about, if an answer is due.
-    pub fn asked(&mut self, now: SimTime) -> Option<u32> {
+    /// The set that another leader asked about, if an answer is due. Marks it as answered.
+    pub(crate) fn asked(&mut self, now: SimTime) -> Option<u32> {
         if now < self.next_answer {
             return None;
         }
@@ -153,9 +159,8 @@ impl PlanExchange {
     }
 }
 
-/// A row: `gate_s` in s from `now`, one a route.
-#[must_use]
-pub fn row(now: SimTime, ballot: Ballot, group: GroupId, drone: DroneId, set: u32, gate_s: &[f64]) -> Arrivals {
+/// A row of the table. `gate_s`: time to the gate along each route, s from `now`.
+pub(crate) fn row(now: SimTime, ballot: Ballot, group: GroupId, drone: DroneId, set: u32, gate_s: &[f64]) -> Arrivals {
     let mut row = Arrivals {
         stamp: now,
         ballot,
@@ -166,13 +171,14 @@ pub fn row(now: SimTime, ballot: Ballot, group: GroupId, drone: DroneId, set: u3
         kind: ArrivalsKind::Report.to_wire(),
         gate_s: [f32::INFINITY; MAX_ROUTES],
     };
-    row.gate_s.iter_mut().zip(gate_s).for_each(|(to, &from)| *to = from as f32);
+    for (to, &from) in row.gate_s.iter_mut().zip(gate_s) {
+        *to = from as f32;
+    }
     row
 }
 
-/// The arrivals in a row, in s from the mission's start, so that rows made at different times can be compared.
-#[must_use]
-pub fn arrivals_s(row: &Arrivals) -> Vec<f64> {
+/// The arrivals in a row, s from the start of the mission, so that rows of different times can be compared.
+pub(crate) fn arrivals_s(row: &Arrivals) -> Vec<f64> {
     let start_s = row.stamp.since(SimTime::ZERO);
     row.gate_s.iter().take(row.routes as usize).map(|&s| start_s + f64::from(s)).collect()
 }
@@ -190,69 +196,69 @@ mod tests {
         row(at(stamp_s), ballot, GroupId::ALL.child(1), DroneId(drone), set, &[1.0, f64::INFINITY])
     }
 
-    fn asking(plan_exchange: &mut PlanExchange, now_s: f64) -> Vec<Arrivals> {
+    fn asking(exchange: &mut PlanExchange, now_s: f64) -> Vec<Arrivals> {
         let mut said = Vec::new();
-        plan_exchange.ask(at(now_s), 7, || vec![row_of(0, now_s, 7)], &mut said);
+        exchange.ask(at(now_s), 7, || vec![row_of(0, now_s, 7)], &mut said);
         said
     }
 
     #[test]
-    fn a_table_is_whole_once_everybody_has_a_row() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
-        assert_eq!(asking(&mut plan_exchange, 1.0).len(), 1);
-        assert!(plan_exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none());
-        plan_exchange.hear(at(1.1), &row_of(2, 1.05, 8));
-        assert!(plan_exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).is_none());
-        plan_exchange.hear(at(1.1), &row_of(2, 1.06, 7));
-        let table = plan_exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).unwrap();
+    fn a_table_is_complete_once_every_drone_has_a_row() {
+        let mut exchange = PlanExchange::new(4, 0.2);
+        assert_eq!(asking(&mut exchange, 1.0).len(), 1);
+        assert!(exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none());
+        exchange.hear(at(1.1), &row_of(2, 1.05, 8));
+        assert!(exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).is_none());
+        exchange.hear(at(1.1), &row_of(2, 1.06, 7));
+        let table = exchange.answer(at(1.1), &[DroneId(2)], 2, 0.0).unwrap();
         assert_eq!(table.iter().map(|row| row.drone.0).collect::<Vec<_>>(), [0, 2]);
         assert!((arrivals_s(&table[1])[0] - 2.06).abs() < 1e-9 && arrivals_s(&table[1])[1].is_infinite());
     }
 
     #[test]
-    fn rows_stay_the_same_are_repeated_and_nobody_waits_for_ever() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
-        let first = asking(&mut plan_exchange, 1.0);
-        assert!(asking(&mut plan_exchange, 1.1).is_empty());
-        assert_eq!(asking(&mut plan_exchange, 1.2), first);
-        assert!(plan_exchange.answer(at(1.29), &[DroneId(2)], 2, 0.0).is_none());
-        assert_eq!(plan_exchange.answer(at(1.3), &[DroneId(2)], 2, 0.0).unwrap().len(), 1);
-        assert!(plan_exchange.answer(at(2.3), &[DroneId(2)], 2, 1.0).is_none());
+    fn rows_stay_the_same_and_are_repeated_until_the_wait_is_over() {
+        let mut exchange = PlanExchange::new(4, 0.2);
+        let first = asking(&mut exchange, 1.0);
+        assert!(asking(&mut exchange, 1.1).is_empty());
+        assert_eq!(asking(&mut exchange, 1.2), first);
+        assert!(exchange.answer(at(1.29), &[DroneId(2)], 2, 0.0).is_none());
+        assert_eq!(exchange.answer(at(1.3), &[DroneId(2)], 2, 0.0).unwrap().len(), 1);
+        assert!(exchange.answer(at(2.3), &[DroneId(2)], 2, 1.0).is_none());
     }
 
     #[test]
-    fn whoever_asks_late_is_answered_but_not_in_every_tick() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
-        plan_exchange.hear(at(1.0), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.0, 7) });
-        assert_eq!(plan_exchange.asked(at(1.0)), Some(7));
-        plan_exchange.hear(at(1.1), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.1, 7) });
-        assert_eq!((plan_exchange.asked(at(1.1)), plan_exchange.asked(at(1.2))), (None, Some(7)));
+    fn a_late_question_is_answered_but_not_in_every_tick() {
+        let mut exchange = PlanExchange::new(4, 0.2);
+        exchange.hear(at(1.0), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.0, 7) });
+        assert_eq!(exchange.asked(at(1.0)), Some(7));
+        exchange.hear(at(1.1), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.1, 7) });
+        assert_eq!((exchange.asked(at(1.1)), exchange.asked(at(1.2))), (None, Some(7)));
     }
 
     #[test]
-    fn a_choice_counts_from_the_one_who_thinks_for_all_and_not_if_it_is_older() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
+    fn a_choice_counts_only_from_the_coordinator_and_only_if_it_is_new() {
+        let mut exchange = PlanExchange::new(4, 0.2);
         let choice = |stamp_s| Arrivals {
             kind: ArrivalsKind::Decision.to_wire(),
             gate_s: one_of(1),
             routes: 3,
             ..row_of(2, stamp_s, 7)
         };
-        plan_exchange.hear(at(1.1), &choice(1.0));
-        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
-        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
-        assert_eq!(plan_exchange.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
-        assert_eq!(plan_exchange.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
-        assert!(plan_exchange.heard.is_empty(), "a choice is no row of the table");
+        exchange.hear(at(1.1), &choice(1.0));
+        assert_eq!(exchange.chosen(DroneId(2), 7, DroneId(0), at(1.0)), Some(1));
+        assert_eq!(exchange.chosen(DroneId(2), 7, DroneId(3), at(1.0)), None);
+        assert_eq!(exchange.chosen(DroneId(2), 8, DroneId(0), at(1.0)), None);
+        assert_eq!(exchange.chosen(DroneId(2), 7, DroneId(0), at(1.05)), None);
+        assert!(exchange.heard.is_empty(), "a choice is not a row of the table");
     }
 
     #[test]
     fn a_choice_is_repeated_for_a_while() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
-        plan_exchange.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
+        let mut exchange = PlanExchange::new(4, 0.2);
+        exchange.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
         let mut said = Vec::new();
         for tick in 0..100 {
-            plan_exchange.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
+            exchange.repeat(at(1.0 + 0.05 * f64::from(tick)), &mut said);
         }
         assert!((5..=7).contains(&said.len()), "{}", said.len());
     }
@@ -264,12 +270,12 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_strangers_from_the_future_and_to_nowhere_are_refused() {
-        let mut plan_exchange = PlanExchange::new(4, 0.2);
-        asking(&mut plan_exchange, 1.0);
-        plan_exchange.hear(at(1.0), &row_of(9, 0.5, 7));
-        plan_exchange.hear(at(1.0), &row_of(2, 1.5, 7));
-        plan_exchange.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
-        assert!(plan_exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && plan_exchange.heard.is_empty());
+    fn rows_of_strangers_of_the_future_and_without_a_route_are_ignored() {
+        let mut exchange = PlanExchange::new(4, 0.2);
+        asking(&mut exchange, 1.0);
+        exchange.hear(at(1.0), &row_of(9, 0.5, 7));
+        exchange.hear(at(1.0), &row_of(2, 1.5, 7));
+        exchange.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
+        assert!(exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && exchange.heard.is_empty());
     }
 }

@@ -1,10 +1,10 @@
-//! Everybody's part in a plan: one block of memory, sorted by drone. Looked through far more often than added to, and what
-//! is added mostly comes in the order of ids.
+//! The assignments of a plan: one block of memory, sorted by drone. It is read far more often than added to, and additions
+//! mostly come in the order of ids.
 
 use skein_protocol::DroneId;
 use skein_protocol::payload::Assignment;
 
-/// One part a drone, by id.
+/// At most one assignment per drone, by id.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roster(Vec<Assignment>);
 
@@ -16,24 +16,24 @@ impl Roster {
         }
     }
 
-    /// The part of a drone.
+    /// The assignment of a drone.
     #[must_use]
     pub fn get(&self, drone: DroneId) -> Option<&Assignment> {
         self.place(drone).ok().map(|place| &self.0[place])
     }
 
-    /// The part of a drone, to be changed; who it is for is to stay.
+    /// The assignment of a drone, to be changed. Its drone must stay the same.
     pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut Assignment> {
         self.place(drone).ok().map(|place| &mut self.0[place])
     }
 
-    /// Whether a drone has a part.
+    /// Whether a drone has an assignment.
     #[must_use]
     pub fn contains(&self, drone: DroneId) -> bool {
         self.place(drone).is_ok()
     }
 
-    /// Adds a part, unless its drone has one already; the one it has then.
+    /// Adds an assignment, unless its drone has one already. Returns the one that the drone has then.
     pub fn add(&mut self, part: Assignment) -> &mut Assignment {
         let place = self.place(part.drone).unwrap_or_else(|place| {
             self.0.insert(place, part);
@@ -42,45 +42,47 @@ impl Roster {
         &mut self.0[place]
     }
 
-    /// All parts, by drone.
+    /// All assignments, by drone.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &Assignment> + Clone {
         self.0.iter()
     }
 
-    /// All parts, by drone, to be changed; who they are for is to stay.
+    /// All assignments, by drone, to be changed. Their drones must stay the same.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Assignment> {
         self.0.iter_mut()
     }
 
-    /// Number of drones that have a part.
+    /// Number of assignments.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether nobody has a part.
+    /// Whether there is no assignment.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Keeps the parts of these drones alone.
+    /// Removes the assignments of all other drones.
     pub fn retain(&mut self, stays: impl Fn(DroneId) -> bool) {
         self.0.retain(|part| stays(part.drone));
     }
 
-    /// Leaves nobody a part.
+    /// Removes all assignments.
     pub fn clear(&mut self) {
         self.0.clear();
     }
 }
 
-/// Of several parts of one drone the first counts.
+/// Of several assignments of one drone the first one counts.
 impl FromIterator<Assignment> for Roster {
     fn from_iter<I: IntoIterator<Item = Assignment>>(parts: I) -> Self {
         let parts = parts.into_iter();
         let mut roster = Self(Vec::with_capacity(parts.size_hint().0));
-        parts.for_each(|part| _ = roster.add(part));
+        for part in parts {
+            roster.add(part);
+        }
         roster
     }
 }
@@ -95,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn in_whatever_order_they_come_they_are_by_drone_and_the_first_of_each_counts() {
+    fn assignments_are_sorted_by_drone_and_the_first_of_each_drone_counts() {
         let mut roster: Roster = [part(5, 0), part(1, 1), part(9, 2), part(5, 3), part(3, 4)].into_iter().collect();
         let all = |roster: &Roster| roster.iter().map(|p| (p.drone.0, p.rank)).collect::<Vec<_>>();
         assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2)]);

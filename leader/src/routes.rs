@@ -1,42 +1,42 @@
-//! Routes past a set of obstacles (paper, Alg. 4 and E5: k obstacles have k + 1 routes).
+//! Routes past a set of obstacles (paper, Algorithm 4 and E5: k obstacles have k + 1 routes).
 //!
-//! Obstacles with a gap that is too narrow between them are enveloped as one. A route is told by constraint
-//! points: corners of the inflated obstacles that the flight path has to pass on the given side.
+//! Obstacles with too narrow a gap between them are merged into one envelope. A route is a list of constraint points:
+//! corners of the inflated obstacles that the path has to pass on a given side.
 
 use crate::geometry::{hull, inflate, inscribed, lower_chain, nearest, separation, upper_chain};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 
-/// Distances that routes are made with.
+/// Clearances of routes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RouteParams {
-    /// r_obs: least distance of a drone's centre to an obstacle, m. A gap wider than twice this is passable.
+    /// r_obs: least distance of a drone's centre from an obstacle, m. A gap wider than twice this is passable.
     pub clearance_m: f64,
     /// r_plan: distance at which paths are planned, m; at least `clearance_m`.
     pub planning_distance_m: f64,
 }
 
-/// On which side of a point a path has to pass.
+/// The side on which a path has to pass a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Side {
-    /// To the left of it: y at least the point's.
+    /// To the left of it: at a higher or equal y.
     Above,
-    /// To the right of it: y at most the point's.
+    /// To the right of it: at a lower or equal y.
     Below,
 }
 
 /// A point that a path has to pass on one side. World frame, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraint {
-    /// Along the flight.
+    /// Abscissa, along the flight.
     pub x_m: f64,
-    /// Across the flight, to the left.
+    /// Ordinate, to the left of the flight.
     pub y_m: f64,
-    /// Where the path is.
+    /// The side on which the path passes.
     pub side: Side,
 }
 
-/// A disc in the way that is no obstacle of the set, such as a dead drone that hovers.
+/// A disc that is not an obstacle of the set, such as a dead drone that hovers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     /// Its centre, world frame, m.
@@ -46,7 +46,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The wall it is to a path on this side of it.
+    /// The body as a wall, for a path on this side of it.
     pub(crate) fn wall(&self, side: Side) -> Wall {
         Wall { side, outline: inflate(&[self.centre_m], self.radius_m) }
     }
@@ -55,14 +55,14 @@ impl Body {
 /// An inflated obstacle beside a route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
-    /// Where a path is, seen from the obstacle.
+    /// The side of the obstacle on which the path passes.
     pub side: Side,
-    /// The inflated obstacle: where no path may lead, m.
+    /// The inflated obstacle: the area that no path may enter, m.
     pub outline: Vec<Vec2>,
 }
 
 impl Wall {
-    /// Its corners on the path's side, by x.
+    /// The corners on the path's side, by x.
     pub fn constraints(&self) -> impl Iterator<Item = Constraint> + use<> {
         let side = self.side;
         let chain = match side {
@@ -79,7 +79,7 @@ impl Wall {
     }
 }
 
-/// One way past a set.
+/// One route past a set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Route {
     walls: Vec<Wall>,
@@ -117,32 +117,32 @@ pub struct Routes {
     routes: Vec<Route>,
     gate_x_m: f64,
     exit_x_m: f64,
-    /// From right to left, what each route's bodies are made of: obstacles inflated by r_obs.
+    /// The obstacles inflated by r_obs, by envelope, from right to left.
     blocks: Vec<Vec<Block>>,
 }
 
 impl Routes {
-    /// The routes past these obstacles, in whatever order they are given. Shapes that fail
-    /// [`ConvexShape::check`] are left out. Without obstacles: one free route, its gate and exit at x = 0.
+    /// The routes past these obstacles. The order of the obstacles does not matter. Shapes that fail
+    /// [`ConvexShape::check`] are left out. Without obstacles there is one free route, with gate and exit at x = 0.
     #[must_use]
     pub fn new(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
-        let masses = ordered(merged(obstacles, params), params);
-        if masses.is_empty() {
+        let envelopes = ordered(merged(obstacles, params), params);
+        if envelopes.is_empty() {
             return Self { routes: vec![Route::default()], gate_x_m: 0.0, exit_x_m: 0.0, blocks: Vec::new() };
         }
-        let routes = (0..=masses.len()).map(|route| Route::new(walls(&masses, route, params))).collect();
-        let centres = masses.iter().map(|mass| (mass.low.x + mass.high.x) / 2.0);
-        let rear_m = masses.iter().map(|mass| mass.high.x).fold(f64::NEG_INFINITY, f64::max);
+        let routes = (0..=envelopes.len()).map(|route| Route::new(walls(&envelopes, route, params))).collect();
+        let centres = envelopes.iter().map(|envelope| (envelope.low.x + envelope.high.x) / 2.0);
+        let rear_m = envelopes.iter().map(|envelope| envelope.high.x).fold(f64::NEG_INFINITY, f64::max);
         Self {
             routes,
-            gate_x_m: centres.sum::<f64>() / masses.len() as f64,
+            gate_x_m: centres.sum::<f64>() / envelopes.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
-            blocks: masses.iter().map(|mass| mass.blocks.clone()).collect(),
+            blocks: envelopes.iter().map(|envelope| envelope.blocks.clone()).collect(),
         }
     }
 
-    /// Whether a drone at `position` can still take a route: whether no obstacle lies abreast between it and the side on
-    /// which the route passes.
+    /// Whether a drone at `position` (world frame, m) can still take a route: no obstacle abreast of it lies between it and
+    /// the route.
     #[must_use]
     pub fn is_open(&self, route: usize, position: Vec2) -> bool {
         let (right, left) = self.blocks.split_at(route.min(self.blocks.len()));
@@ -151,7 +151,7 @@ impl Routes {
         !right.iter().flatten().any(above) && !left.iter().flatten().any(below)
     }
 
-    /// Whether bodies ahead of a drone at `position` bar a route: whether they leave no way between the walls on its
+    /// Whether bodies ahead of a drone at `position` (world frame, m) bar a route: they leave no gap between the walls on its
     /// right and those on its left.
     #[must_use]
     pub fn is_barred(&self, route: usize, position: Vec2, bodies: &[Body]) -> bool {
@@ -160,7 +160,7 @@ impl Routes {
         let touches = |body: &Body, side: Side| {
             walls.iter().any(|wall| wall.side == side && wall.distance_m(body.centre_m) < body.radius_m)
         };
-        // What the walls on the right reach by way of bodies.
+        // Bodies that are connected to the walls on the right.
         let mut reached: Vec<&Body> = Vec::new();
         let near = |a: &Body, b: &Body| (a.centre_m - b.centre_m).norm() < a.radius_m + b.radius_m;
         while let Some(i) =
@@ -171,35 +171,34 @@ impl Routes {
         reached.iter().any(|body| touches(body, Side::Below))
     }
 
-    /// Number of routes: obstacles, those enveloped as one counting once, plus one (paper, E5).
+    /// Number of routes: number of envelopes plus one (paper, E5).
     #[must_use]
     pub fn count(&self) -> usize {
         self.routes.len()
     }
 
-    /// A route, 0 = rightmost. Beyond the last: the leftmost.
+    /// A route, 0 = rightmost. An index beyond the last gives the leftmost.
     #[must_use]
     pub fn route(&self, index: usize) -> &Route {
         &self.routes[index.min(self.routes.len() - 1)]
     }
 
-    /// Abscissa at which the set counts as passed (paper, C1): mean of the centres of the obstacles (or of the
-    /// envelopes of those that have no way between them), m.
+    /// The gate: abscissa at which the set counts as passed (paper, C1). It is the mean of the envelopes' centres, m.
     #[must_use]
     pub fn gate_x_m(&self) -> f64 {
         self.gate_x_m
     }
 
-    /// Abscissa past which the set does not matter any more: rear edge and planning distance, m.
+    /// The exit: abscissa past which the set does not matter any more. It is the rear edge plus the planning distance, m.
     #[must_use]
     pub fn exit_x_m(&self) -> f64 {
         self.exit_x_m
     }
 }
 
-/// One or several obstacles taken as one: all points within `radius_m` of `core`.
+/// An envelope of one or several obstacles: all points within `radius_m` of `core`.
 #[derive(Clone, Debug)]
-struct Mass {
+struct Envelope {
     id: ObstacleId,
     core: Vec<Vec2>,
     radius_m: f64,
@@ -208,7 +207,7 @@ struct Mass {
     blocks: Vec<Block>,
 }
 
-/// An obstacle inflated by r_obs, by its sides to the right and to the left, along x.
+/// An obstacle inflated by r_obs, as its right and left side along x.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
     lower: Vec<Vec2>,
@@ -220,20 +219,20 @@ impl Block {
         Self { lower: lower_chain(outline), upper: upper_chain(outline) }
     }
 
-    /// From where to where it reaches across the flight at an abscissa, m.
+    /// Its lowest and highest ordinate at an abscissa, m.
     fn extent(&self, x_m: f64) -> Option<(f64, f64)> {
         Some((height(&self.lower, x_m)?, height(&self.upper, x_m)?))
     }
 }
 
-/// Ordinate of a chain at an abscissa; `None` beyond its ends.
+/// Ordinate of a chain at an abscissa, m. `None` beyond its ends.
 fn height(chain: &[Vec2], x_m: f64) -> Option<f64> {
     let legs = chain.iter().zip(chain.iter().skip(1));
     let (a, b) = legs.clone().find(|(a, b)| (a.x..=b.x).contains(&x_m))?;
     Some(a.y + (b.y - a.y) * (x_m - a.x) / (b.x - a.x))
 }
 
-impl Mass {
+impl Envelope {
     fn new(id: ObstacleId, core: Vec<Vec2>, radius_m: f64) -> Self {
         let margin = Vec2::repeat(radius_m);
         let low = core.iter().fold(Vec2::repeat(f64::INFINITY), |low, p| low.inf(p)) - margin;
@@ -241,20 +240,20 @@ impl Mass {
         Self { id, core, radius_m, low, high, blocks: Vec::new() }
     }
 
-    /// Shortest vector between the cores, and what is left of its length without the roundings, m.
+    /// The shortest vector between the cores, and the gap between the outlines, m.
     fn gap(&self, other: &Self) -> (Vec2, f64) {
         let between = separation(&self.core, &other.core);
         (between, (between.norm() - self.radius_m - other.radius_m).max(0.0))
     }
 
-    /// Whether the boxes around both are within `reach_m` of each other on both axes.
+    /// Whether the bounding boxes are within `reach_m` of each other on both axes.
     fn is_near(&self, other: &Self, reach_m: f64) -> bool {
         let apart = (other.low - self.high).sup(&(self.low - other.high));
         apart.x <= reach_m && apart.y <= reach_m
     }
 
-    /// The convex hull of both. The smaller rounding is kept exactly, the rest of the larger one by its polygon.
-    fn envelope(&self, other: &Self) -> Self {
+    /// The convex hull of both. The smaller radius is kept exactly; the rest of the larger one becomes a polygon.
+    fn merged_with(&self, other: &Self) -> Self {
         let radius_m = self.radius_m.min(other.radius_m);
         let mut points = inflate(&self.core, self.radius_m - radius_m);
         points.extend(inflate(&other.core, other.radius_m - radius_m));
@@ -263,50 +262,52 @@ impl Mass {
     }
 }
 
-/// Envelopes whatever has no passable gap between it, until all gaps that are left are passable.
-fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<Mass> {
+/// Merges obstacles without a passable gap between them, until all remaining gaps are passable.
+fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<Envelope> {
     let valid = obstacles.iter().filter(|(_, shape)| shape.check().is_ok());
-    let mass = |(id, shape): &(ObstacleId, ConvexShape)| {
+    let envelope = |(id, shape): &(ObstacleId, ConvexShape)| {
         let core = hull(&shape.vertices().collect::<Vec<_>>());
         let block = Block::new(&inflate(&core, shape.radius_m + params.clearance_m));
-        Mass { blocks: vec![block], ..Mass::new(*id, core, shape.radius_m) }
+        Envelope { blocks: vec![block], ..Envelope::new(*id, core, shape.radius_m) }
     };
-    let mut masses: Vec<Mass> = valid.map(mass).collect();
-    masses.sort_by_key(|mass| mass.id);
+    let mut envelopes: Vec<Envelope> = valid.map(envelope).collect();
+    envelopes.sort_by_key(|envelope| envelope.id);
     let least_m = 2.0 * params.clearance_m;
-    let closed = |a: &Mass, b: &Mass| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
-    let pair = |masses: &[Mass]| {
-        (0..masses.len()).flat_map(|i| (0..i).map(move |j| (i, j))).find(|&(i, j)| closed(&masses[i], &masses[j]))
+    let closed = |a: &Envelope, b: &Envelope| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
+    let pair = |envelopes: &[Envelope]| {
+        (0..envelopes.len())
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .find(|&(i, j)| closed(&envelopes[i], &envelopes[j]))
     };
-    while let Some((i, j)) = pair(&masses) {
-        let other = masses.remove(i);
-        masses[j] = masses[j].envelope(&other);
+    while let Some((i, j)) = pair(&envelopes) {
+        let other = envelopes.remove(i);
+        envelopes[j] = envelopes[j].merged_with(&other);
     }
-    masses
+    envelopes
 }
 
-/// From right to left: by lateral position, but of two that one line across the flight can meet, the one that lies to
-/// the right there comes first, so that there is a way between them. A mirrored set has the reverse order: ranks from
-/// the right and from the left count alike.
-fn ordered(masses: Vec<Mass>, params: &RouteParams) -> Vec<Mass> {
+/// The envelopes from right to left, by lateral position. If a line across the flight can meet two of them, the one that
+/// lies to the right on that line comes first, so that there is a route between them. Ranks from the right and from the
+/// left count alike, so that a mirrored set has the reverse order.
+fn ordered(envelopes: Vec<Envelope>, params: &RouteParams) -> Vec<Envelope> {
     let reach_m = 2.0 * params.planning_distance_m;
-    let right_of = |a: &Mass, b: &Mass| {
+    let right_of = |a: &Envelope, b: &Envelope| {
         let apart_m = (b.low.x - a.high.x).max(a.low.x - b.high.x);
         apart_m < reach_m && a.gap(b).0.y > 0.0
     };
-    let lateral_m: Vec<f64> = masses.iter().map(|mass| (mass.low.y + mass.high.y) / 2.0).collect();
-    let right: Vec<Vec<bool>> = masses.iter().map(|a| masses.iter().map(|b| right_of(a, b)).collect()).collect();
+    let lateral_m: Vec<f64> = envelopes.iter().map(|envelope| (envelope.low.y + envelope.high.y) / 2.0).collect();
+    let right: Vec<Vec<bool>> = envelopes.iter().map(|a| envelopes.iter().map(|b| right_of(a, b)).collect()).collect();
     let from_right = ranks(&lateral_m, |i, j| right[i][j]);
     let from_left = ranks(&lateral_m.iter().map(|y| -y).collect::<Vec<_>>(), |i, j| right[j][i]);
-    let mut sorted: Vec<(usize, Mass)> = masses.into_iter().enumerate().collect();
+    let mut sorted: Vec<(usize, Envelope)> = envelopes.into_iter().enumerate().collect();
     let place = |i: usize| from_right[i] as i64 - from_left[i] as i64;
     sorted.sort_by(|(a, _), (b, _)| {
         place(*a).cmp(&place(*b)).then(lateral_m[*a].total_cmp(&lateral_m[*b])).then(a.cmp(b))
     });
-    sorted.into_iter().map(|(_, mass)| mass).collect()
+    sorted.into_iter().map(|(_, envelope)| envelope).collect()
 }
 
-/// Ranks by key, except that whoever is `before` another has the lower rank.
+/// Ranks by key, except that an element that is `before` another has the lower rank.
 fn ranks(keys: &[f64], before: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let mut open: Vec<usize> = (0..keys.len()).collect();
     open.sort_by(|&a, &b| keys[a].total_cmp(&keys[b]).then(a.cmp(&b)));
@@ -319,16 +320,17 @@ fn ranks(keys: &[f64], before: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     ranks
 }
 
-/// The masses beside a route, inflated by r_plan; where the gap across the route is less than twice that, by half of it
-/// (less what the corners of the rounding stick out by, so that walls never overlap), but by r_obs at least.
-fn walls(masses: &[Mass], route: usize, params: &RouteParams) -> Vec<Wall> {
-    let (right, left) = masses.split_at(route);
-    let wall = |mass: &Mass, across: &[Mass], side: Side| {
-        let half_gap_m = across.iter().map(|other| mass.gap(other).1 / 2.0).fold(f64::INFINITY, f64::min);
-        let inscribed_m = (mass.radius_m + half_gap_m) * inscribed() - mass.radius_m;
+/// The envelopes beside a route, inflated by r_plan. Where the gap across the route is less than twice that, they are
+/// inflated by half of the gap, reduced by what the corners of the inflation stick out, so that walls never overlap. The
+/// least inflation is r_obs.
+fn walls(envelopes: &[Envelope], route: usize, params: &RouteParams) -> Vec<Wall> {
+    let (right, left) = envelopes.split_at(route);
+    let wall = |envelope: &Envelope, across: &[Envelope], side: Side| {
+        let half_gap_m = across.iter().map(|other| envelope.gap(other).1 / 2.0).fold(f64::INFINITY, f64::min);
+        let inscribed_m = (envelope.radius_m + half_gap_m) * inscribed() - envelope.radius_m;
         let reach_m = params.planning_distance_m.min(inscribed_m.max(params.clearance_m));
-        Wall { side, outline: inflate(&mass.core, mass.radius_m + reach_m) }
+        Wall { side, outline: inflate(&envelope.core, envelope.radius_m + reach_m) }
     };
-    let right_walls = right.iter().map(|mass| wall(mass, left, Side::Above));
-    right_walls.chain(left.iter().map(|mass| wall(mass, right, Side::Below))).collect()
+    let right_walls = right.iter().map(|envelope| wall(envelope, left, Side::Above));
+    right_walls.chain(left.iter().map(|envelope| wall(envelope, right, Side::Below))).collect()
 }

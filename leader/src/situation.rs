@@ -3,27 +3,49 @@
 use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::obstacles::Obstacles;
-use skein_protocol::{Ballot, GroupId, SimTime, Vec2};
+use crate::params::PlannerParams;
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
 /// What a leader knows when it decides: a read-only view, made anew for each decision.
 #[derive(Clone, Copy, Debug)]
-pub struct Situation<'a> {
+pub(crate) struct Situation<'a> {
+    /// Parameters of the mission.
+    pub(crate) params: &'a PlannerParams,
     /// The current time.
-    pub now: SimTime,
+    pub(crate) now: SimTime,
     /// The leader's term.
-    pub ballot: Ballot,
+    pub(crate) ballot: Ballot,
     /// The group that it leads.
-    pub scope: GroupId,
+    pub(crate) scope: GroupId,
     /// The living members of that group, the leader included, by id.
-    pub members: &'a [Member],
+    pub(crate) members: &'a [Member],
     /// Living drones of other groups, by id.
-    pub others: &'a [Member],
+    pub(crate) others: &'a [Member],
     /// How long a message takes to arrive, s.
-    pub delay_s: f64,
+    pub(crate) delay_s: f64,
     /// Where silent drones may hover, world frame, m.
-    pub silent: &'a [Vec2],
+    pub(crate) silent: &'a [Vec2],
     /// Known obstacles.
-    pub obstacles: &'a Obstacles,
+    pub(crate) obstacles: &'a Obstacles,
     /// What was planned so far.
-    pub ledger: &'a Ledger,
+    pub(crate) ledger: &'a Ledger,
+}
+
+impl Situation<'_> {
+    /// The abscissa past which a set does not matter any more, m.
+    pub(crate) fn exit_x_m(&self, set: &[ObstacleId]) -> f64 {
+        self.obstacles.exit_x_m(set, self.params.routes.planning_distance_m)
+    }
+
+    /// Drones of other groups that still have to pass a set.
+    pub(crate) fn others_before(&self, set: &[ObstacleId]) -> Vec<DroneId> {
+        let exit_x_m = self.exit_x_m(set);
+        let before = |m: &&Member| !self.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
+        self.others.iter().filter(before).map(|m| m.id).collect()
+    }
+
+    /// Whether one of these obstacles was planned for before.
+    pub(crate) fn was_planned(&self, set: &[ObstacleId]) -> bool {
+        self.ledger.sets().iter().any(|planned| planned.ids.iter().any(|id| set.contains(id)))
+    }
 }

@@ -1,15 +1,16 @@
-//! Exact grouping (paper, Alg. 3): which drone takes which route, so that the last one passes as early as possible (C1).
+//! Exact grouping (paper, Algorithm 3): which drone takes which route, so that the last one passes as early as possible
+//! (C1).
 //!
-//! On each route drones pass in order of arrival, a headway apart. With slots counted from the last, drone i can take
-//! slot m of route r if a_ir + m·h_r ≤ T. The least T for which all drones find a slot is searched, and among the
-//! groupings that reach it the one of least total arrival is taken: exact, and polynomial where trying all assignments
-//! is not. Times are counted in whole microseconds, so that ties are ties.
+//! On each route, drones pass in order of arrival, a headway apart. With slots counted from the last, drone i can take
+//! slot m of route r if a_ir + m·h_r ≤ T. A search finds the least T for which all drones have a slot. Among the groupings
+//! that reach it, the one of least total arrival is taken. This is exact and takes polynomial time. Times are counted in
+//! whole microseconds, so that ties are exact.
 
 use crate::matroid_intersection::{Cost, place};
 use thiserror::Error;
 
 const MICROS: f64 = 1e6;
-/// Arrivals later than this (s) count as never; it keeps all sums in range.
+/// Arrivals later than this count as never, s. It keeps all sums in range.
 pub(crate) const NEVER_S: f64 = 1e6;
 
 /// What is wrong with a table of arrivals.
@@ -18,7 +19,7 @@ pub enum SplitError {
     /// A row has another length than there are headways.
     #[error("drone {drone} has {found} arrival times, expected one for each of the {expected} routes")]
     Columns {
-        /// Row.
+        /// The row.
         drone: usize,
         /// Its length.
         found: usize,
@@ -28,23 +29,23 @@ pub enum SplitError {
     /// A headway is negative or not finite.
     #[error("the headway of route {route} is {headway_s} s, expected a finite time that is not negative")]
     Headway {
-        /// Column.
+        /// The column.
         route: usize,
-        /// What was given.
+        /// The headway given, s.
         headway_s: f64,
     },
     /// An arrival is not a number.
     #[error("the arrival of drone {drone} on route {route} is not a number")]
     Arrival {
-        /// Row.
+        /// The row.
         drone: usize,
-        /// Column.
+        /// The column.
         route: usize,
     },
     /// A drone cannot take any route.
     #[error("drone {drone} has no usable route, expected a finite arrival on at least one")]
     NoRoute {
-        /// Row.
+        /// The row.
         drone: usize,
     },
     /// The wanted numbers of drones for each route do not fit.
@@ -53,7 +54,7 @@ pub enum SplitError {
         /// Number of rows.
         drones: usize,
     },
-    /// An assignment that names no usable route for each drone.
+    /// An assignment does not name a usable route for each drone.
     #[error("the assignment does not name a usable route for each of the {drones} drones")]
     Assignment {
         /// Number of rows.
@@ -61,20 +62,20 @@ pub enum SplitError {
     },
 }
 
-/// When each drone would pass on each route if it were alone, and how far apart drones pass.
+/// When each drone would pass on each route if it were alone, and the headway of each route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrivalTable {
-    /// By drone and route, µs; `None` where the drone cannot take the route.
+    /// By drone and route, µs. `None` where the drone cannot take the route.
     arrivals: Vec<Vec<Option<Cost>>>,
     headways: Vec<Cost>,
 }
 
-/// A grouping. Drones are the rows of the table; routes its columns.
+/// A grouping. Drones are the rows of the table, routes its columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RouteAssignment {
     /// Route of each drone.
     pub routes: Vec<usize>,
-    /// Drones on each route in the order in which they pass: by arrival, ties by row.
+    /// Drones on each route in the order in which they pass: by arrival, then by row.
     pub queues: Vec<Vec<usize>>,
     /// When each drone passes: t₁ = a₁, t_k = max(a_k, t_{k−1} + h), s.
     pub pass_s: Vec<f64>,
@@ -85,8 +86,8 @@ pub struct RouteAssignment {
 }
 
 impl ArrivalTable {
-    /// Checks arrivals `[drone][route]` (s; infinite: not usable; negative: passed already) and the headway of each
-    /// route (s).
+    /// Checks arrivals `[drone][route]` (s; infinite: not usable; negative: already passed) and the headway of each route
+    /// (s).
     ///
     /// # Errors
     /// [`SplitError`] for a row of the wrong length or without a usable route, and for bad numbers.
@@ -122,10 +123,10 @@ impl ArrivalTable {
         self.least(&unlimited).expect("every drone has a usable route, and every route a slot for every drone")
     }
 
-    /// The best grouping with this many drones on each route; the same tie-break.
+    /// The best grouping with `counts[route]` drones on each route, with the same tie-break.
     ///
     /// # Errors
-    /// [`SplitError::Counts`] if there is none.
+    /// [`SplitError::Counts`] if there is no such grouping.
     pub fn fixed(&self, counts: &[usize]) -> Result<RouteAssignment, SplitError> {
         let drones = self.arrivals.len();
         let sum = counts.iter().try_fold(0usize, |sum, &count| sum.checked_add(count));
@@ -135,7 +136,7 @@ impl ArrivalTable {
         self.least(counts)
     }
 
-    /// Each drone on the route on which it arrives first, ties to the right; the others do not matter.
+    /// Each drone on the route on which it arrives first, whatever the others do. The rightmost one wins a tie.
     #[must_use]
     pub fn shortest(&self) -> RouteAssignment {
         let nearest = |row: &Vec<Option<Cost>>| {
@@ -148,7 +149,7 @@ impl ArrivalTable {
     /// Queues and pass times of an assignment, `routes[drone]`.
     ///
     /// # Errors
-    /// [`SplitError::Assignment`] if it is not one.
+    /// [`SplitError::Assignment`] if it does not name a usable route for each drone.
     pub fn assigned(&self, routes: &[usize]) -> Result<RouteAssignment, SplitError> {
         let usable = |(row, &route): (&Vec<Option<Cost>>, &usize)| row.get(route).is_some_and(Option::is_some);
         if routes.len() != self.arrivals.len() || !self.arrivals.iter().zip(routes).all(usable) {
@@ -157,14 +158,14 @@ impl ArrivalTable {
         Ok(self.queued(routes.to_vec()))
     }
 
-    /// The least makespan alone, s: [`ArrivalTable::split`] without its tie-break, for a fraction of the time.
+    /// The least makespan, s: [`ArrivalTable::split`] without its tie-break, in a fraction of the time.
     #[must_use]
     pub fn least_makespan_s(&self) -> f64 {
         let unlimited = vec![self.arrivals.len(); self.headways.len()];
         self.search(&unlimited, &self.costs()).map_or(0.0, |makespan| makespan as f64 / MICROS)
     }
 
-    /// The grouping of least makespan with at most `limits[route]` drones on each route, ties to the least total.
+    /// The grouping of least makespan with at most `limits[route]` drones on each route; among those, one of least total.
     fn least(&self, limits: &[usize]) -> Result<RouteAssignment, SplitError> {
         let costs = self.costs();
         let makespan = self.search(limits, &costs)?;
@@ -195,7 +196,7 @@ impl ArrivalTable {
         Ok(reached)
     }
 
-    /// Slots of each route that each drone can use if the last one passes at `makespan`.
+    /// Number of slots of each route that each drone can use if the last one passes at `makespan`.
     fn caps(&self, makespan: Cost, limits: &[usize]) -> Vec<Vec<u32>> {
         let cap = |(route, arrival): (usize, &Option<Cost>)| match *arrival {
             Some(arrival) if arrival <= makespan => {

@@ -21,7 +21,7 @@ fn counts(routes: &[usize], number: usize) -> Vec<usize> {
     (0..number).map(|route| routes.iter().filter(|&&r| r == route).count()).collect()
 }
 
-/// Makespan by its definition: the queue of each route, drone after drone, µs.
+/// The makespan by its definition, µs: the queue of each route, drone after drone.
 fn makespan(arrivals: &[Vec<f64>], headway_s: &[f64], routes: &[usize]) -> i64 {
     let last = |route: usize| {
         let mut queue: Vec<i64> =
@@ -57,7 +57,7 @@ fn value(split: &RouteAssignment) -> (i64, i64) {
     (micros(split.makespan_s), micros(split.total_s))
 }
 
-/// Continuous times, or coarse ones that make many ties; at times a route that a drone cannot take.
+/// Continuous times, or coarse ones with many ties. Some routes are not usable.
 fn arrival() -> impl Strategy<Value = f64> {
     prop_oneof![4 => 0.0..20.0, 4 => (0..12i32).prop_map(f64::from), 1 => Just(f64::INFINITY), 1 => -5.0..0.0]
 }
@@ -83,7 +83,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn split_is_the_best_of_all_assignments((arrivals, headway_s) in any_instance()) {
+    fn the_split_is_the_best_of_all_assignments((arrivals, headway_s) in any_instance()) {
         let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         let (best, all) = brute_force(&arrivals, &headway_s, None).unwrap();
         prop_assert_eq!(value(&split), best);
@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn identical_drones_are_split_at_best(
+    fn identical_drones_are_split_optimally(
         row in prop::collection::vec((0..9i32).prop_map(f64::from), 1..4), drones in 1..8usize, headway in 0.5..3.0,
     ) {
         let (arrivals, headway_s) = (vec![row.clone(); drones], vec![headway; row.len()]);
@@ -101,7 +101,7 @@ proptest! {
     }
 
     #[test]
-    fn fixed_is_the_best_with_its_counts((arrivals, headway_s) in any_instance(), pick in any::<prop::sample::Index>()) {
+    fn a_fixed_split_is_the_best_with_its_counts((arrivals, headway_s) in any_instance(), pick in any::<prop::sample::Index>()) {
         let routes = headway_s.len();
         let code = pick.index(routes.pow(arrivals.len() as u32));
         let wanted = counts(&assignments(arrivals.len(), routes).nth(code).unwrap(), routes);
@@ -131,7 +131,7 @@ proptest! {
     }
 
     #[test]
-    fn passes_follow_the_queue((arrivals, headway_s) in any_instance()) {
+    fn pass_times_follow_the_queue((arrivals, headway_s) in any_instance()) {
         let split = ArrivalTable::new(&arrivals, &headway_s).unwrap().split();
         let mut seen = vec![false; arrivals.len()];
         for (route, queue) in split.queues.iter().enumerate() {
@@ -149,7 +149,7 @@ proptest! {
     }
 
     #[test]
-    fn slots_are_the_best_permutation(
+    fn the_slot_assignment_is_the_best_permutation(
         positions in prop::collection::vec((-9..9i32, -9..9i32), 0..=6usize),
         slots in prop::collection::vec((-9.0..9.0, -9.0..9.0), 6..=7usize),
     ) {
@@ -202,7 +202,7 @@ proptest! {
 }
 
 #[test]
-fn bad_tables_are_named() {
+fn a_bad_table_is_refused_with_its_reason() {
     let new = |rows: &[Vec<f64>], headways: &[f64]| ArrivalTable::new(rows, headways).unwrap_err();
     let columns = SplitError::Columns { drone: 1, found: 1, expected: 2 };
     assert_eq!(new(&[vec![1.0, 2.0], vec![1.0]], &[1.0, 1.0]), columns);
@@ -218,7 +218,7 @@ fn bad_tables_are_named() {
 }
 
 #[test]
-fn nobody_is_split_into_nothing() {
+fn no_drones_give_an_empty_split() {
     let split = ArrivalTable::new(&[], &[1.0, 1.0]).unwrap().split();
     assert_eq!((split.makespan_s, split.queues.len()), (0.0, 2));
     assert_eq!(ArrivalTable::new(&[], &[1.0, 1.0]).unwrap().least_makespan_s(), 0.0);

@@ -1,5 +1,5 @@
-//! Rubbish and hostile frames: nothing that is heard makes a drone panic, and honest drones keep one leader among
-//! themselves, or regain it once the noise is over.
+//! Malformed and hostile frames: no message makes a drone panic. Honest drones keep one leader among themselves, or regain
+//! it once the noise is over.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod swarm;
@@ -14,10 +14,10 @@ use swarm::air::{Air, Swarm};
 use swarm::{DEFAULT, Periods, discord, wall};
 
 const PERIODS: Periods = Periods { dt_s: 0.05, ..DEFAULT };
-/// Honest drones; the id after theirs is the villain's.
+/// Number of honest drones. The next id is the hostile drone's.
 const HONEST: usize = 4;
 
-/// Numbers as they are, at the edges, and beyond all reason.
+/// Usual numbers, limits, and absurd numbers.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         3 => -300.0..300.0,
@@ -58,7 +58,7 @@ fn set() -> impl Strategy<Value = ([ObstacleId; payload::MAX_SET], u32)> {
     (ids, prop_oneof![0..4u32, any::<u32>()]).prop_map(|(ids, count)| (ids.try_into().unwrap(), count))
 }
 
-/// What is no shape becomes a disc.
+/// A shape. Invalid ones are replaced by a disc.
 fn shape() -> impl Strategy<Value = ConvexShape> {
     let disc = (number(), number(), number()).prop_map(|(x, y, r)| ConvexShape::circle(Vec2::new(x, y), r));
     let bar = (number(), number(), number(), number())
@@ -134,7 +134,7 @@ fn arrivals() -> impl Strategy<Value = Arrivals> {
     )
 }
 
-/// A message with fields of its kind, honest ones and others.
+/// A message with honest and hostile fields.
 fn message() -> impl Strategy<Value = Message> {
     let leadership = (instant(), ballot(), 0..8u32, group(), any::<u32>(), drone());
     let passed = (instant(), set());
@@ -160,7 +160,7 @@ fn message() -> impl Strategy<Value = Message> {
     ]
 }
 
-/// A frame that prints as the message a drone takes it for.
+/// A frame that prints as the message it decodes to.
 #[derive(Clone, Copy)]
 struct Noise(Frame);
 
@@ -188,7 +188,7 @@ fn frame() -> impl Strategy<Value = Noise> {
     prop_oneof![6 => message().prop_map(|m| m.encode()), 2 => changed, 1 => random].prop_map(Noise)
 }
 
-/// A swarm in flight whose last drone says nothing by itself, with a wall ahead.
+/// A swarm in flight, with a wall ahead. Its last drone says nothing by itself.
 fn swarm(seed: u64, ticks: u64) -> Swarm {
     let mut swarm = Swarm::new(PERIODS, Air { seed, loss: 0.1, ..Air::default() }, HONEST + 1);
     swarm.kill(HONEST);
@@ -197,7 +197,7 @@ fn swarm(seed: u64, ticks: u64) -> Swarm {
     swarm
 }
 
-/// What a radio hands on of a frame; a frame is said by `source`, whatever it claims.
+/// Delivers a frame as a radio does: its source is `source`, whatever it claims.
 fn hear(swarm: &mut Swarm, source: DroneId, noise: &Noise) {
     let now = swarm.now();
     let Ok(message) = Message::decode(&noise.0) else { return };
@@ -206,7 +206,7 @@ fn hear(swarm: &mut Swarm, source: DroneId, noise: &Noise) {
     }
 }
 
-/// Who obeys a plan that its leader never made.
+/// A drone that obeys a plan that its leader never made.
 fn plan_conflict_seen(swarm: &Swarm) -> Option<String> {
     let leader = |ballot: Ballot| swarm.drones.get(ballot.claimant.index())?.as_ref();
     let drones = swarm.side(0);
@@ -224,7 +224,7 @@ proptest! {
     })]
 
     #[test]
-    fn noise_of_a_member_is_survived(
+    fn the_swarm_survives_noise_from_a_member(
         seed in any::<u64>(), start in 0..120u64, noise in prop::collection::vec((frame(), 0..4u8), 1..120),
     ) {
         let mut swarm = swarm(seed, start);
@@ -246,7 +246,7 @@ proptest! {
     }
 
     #[test]
-    fn a_stranger_is_not_heard(noise in prop::collection::vec(frame(), 1..60), source in HONEST as u32 + 1..) {
+    fn a_drone_outside_the_swarm_is_ignored(noise in prop::collection::vec(frame(), 1..60), source in HONEST as u32 + 1..) {
         let mut noisy = swarm(1, 100);
         let quiet = format!("{:?}", noisy.drones);
         noise.iter().for_each(|frame| hear(&mut noisy, DroneId(source), frame));
@@ -254,7 +254,7 @@ proptest! {
     }
 
     #[test]
-    fn old_frames_said_again_change_no_leader(seed in any::<u64>(), picks in prop::collection::vec(any::<usize>(), 1..200)) {
+    fn replayed_frames_change_no_leader(seed in any::<u64>(), picks in prop::collection::vec(any::<usize>(), 1..200)) {
         let mut swarm = swarm(seed, 0);
         swarm.scenery.clear();
         let mut tape = Vec::new();

@@ -1,4 +1,4 @@
-//! What a drone knows of others' parts.
+//! What a drone knows of the assignments of others.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -13,7 +13,7 @@ use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, Sim
 const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 };
 const STAMP: PlanStamp = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch: 3 };
 
-/// Drone 1 heard the plan past obstacle 0, and of the parts its own alone.
+/// The ledger of drone 1, which heard the plan past obstacle 0 and only its own assignment.
 fn ledger() -> Ledger {
     let mut obstacles = Obstacles::new(4, 40.0);
     let shape = ConvexShape::rectangle(Vec2::new(200.0, 0.0), Vec2::new(10.0, 80.0), 0.0).unwrap();
@@ -46,7 +46,7 @@ fn place_of(ledger: &Ledger, drone: u32) -> Option<(u16, u16)> {
 }
 
 #[test]
-fn a_lost_part_is_known_from_what_its_drone_flies() {
+fn a_lost_assignment_is_recovered_from_the_drones_beacon() {
     let mut ledger = ledger();
     ledger.hear_place(DroneId(2), &beacon(PlanStamp { epoch: 2, ..STAMP }, 5));
     assert_eq!(place_of(&ledger, 2), None, "a place under an older plan is none in this one");

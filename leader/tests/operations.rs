@@ -1,4 +1,4 @@
-//! Whatever happens to a swarm, in whatever order: what must always hold holds, and once it is over the swarm is one.
+//! Random operations on a swarm: the invariants always hold, and once the faults end, the swarm becomes one group.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod swarm;
@@ -8,12 +8,12 @@ use skein_protocol::SimTime;
 use swarm::air::{Air, Swarm};
 use swarm::{DEFAULT, Periods, wall};
 
-/// Coarser than a flight, so that much happens in little time.
+/// Coarser than in flight, so that much happens in few ticks.
 const PERIODS: Periods = Periods { dt_s: 0.05, ..DEFAULT };
-/// Once all is well again and nothing is ahead, the swarm is one after so long, s.
+/// Time within which the swarm becomes one group once there are no faults and no obstacles ahead, s.
 const FAIR_S: f64 = 20.0;
 
-/// Something that happens. Numbers are taken modulo what there is.
+/// An operation. Indices are taken modulo the number of elements.
 #[derive(Clone, Debug)]
 enum Operation {
     /// So many ticks go by.
@@ -106,14 +106,14 @@ fn apply(swarm: &mut Swarm, operation: &Operation) -> Result<(), TestCaseError> 
     Ok(())
 }
 
-/// All faults end; the dead stay dead, the frozen wake.
+/// Ends all faults. Frozen drones wake; dead ones stay dead.
 fn peace(swarm: &mut Swarm) {
     swarm.frozen.fill(false);
     swarm.sides.fill(0);
     swarm.air = Air { seed: swarm.air.seed, ..Air::default() };
 }
 
-/// Flies on until everybody is past everything.
+/// Flies on until all drones have passed all obstacles.
 fn pass(swarm: &mut Swarm) -> Result<(), TestCaseError> {
     let rear = swarm.scenery.iter().map(|(_, shape)| shape.bounds().1.x).fold(f64::NEG_INFINITY, f64::max);
     while swarm.own.iter().any(|own| own.position.x < rear + 25.0) {
@@ -122,7 +122,7 @@ fn pass(swarm: &mut Swarm) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// What must always hold does, and when all is over the swarm is one.
+/// Checks that the invariants hold, and that the swarm becomes one group in the end.
 fn becomes_one(drones: usize, seed: u64, operations: &[Operation]) -> Result<(), TestCaseError> {
     let mut swarm = Swarm::new(PERIODS, Air { seed, ..Air::default() }, drones);
     for operation in operations {
@@ -137,9 +137,9 @@ fn becomes_one(drones: usize, seed: u64, operations: &[Operation]) -> Result<(),
     Ok(())
 }
 
-/// Each of these once left somebody without a leader for good, or for too long.
+/// Each of these once left a drone without a leader for good, or for too long.
 #[test]
-fn what_went_wrong_once() {
+fn courses_that_once_failed_pass() {
     use Operation::*;
     let storm = |loss, delay, jitter| Weather { loss, delay, jitter };
     let courses: [(usize, u64, Vec<Operation>); 10] = [

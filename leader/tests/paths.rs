@@ -1,4 +1,4 @@
-//! Routes and taut strings: golden tables, and properties that hold for any obstacles and positions.
+//! Routes and shortest paths: golden tables, and properties that hold for any obstacles and positions.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -28,7 +28,7 @@ fn lane(routes: &Routes, route: usize, bodies: &[Body]) -> Corridor {
     Corridor::new(&[(routes, route)], bodies, Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0))
 }
 
-/// Gate, exit, and for each route its walls: the path's side, the box around the wall, the number of points to pass.
+/// The gate, the exit, and for each route its walls: the path's side, the bounding box, the number of constraint points.
 fn table(shapes: &[ConvexShape]) -> String {
     let routes = routes(shapes);
     let mut text = format!("gate {:.1} exit {:.1}\n", routes.gate_x_m(), routes.exit_x_m());
@@ -64,7 +64,7 @@ fn a_wide_gap_is_a_route_at_full_distance() {
 }
 
 #[test]
-fn a_gap_below_twice_the_planning_distance_is_halved_for_those_who_fly_through_it() {
+fn a_path_through_a_narrow_gap_leads_through_its_middle() {
     let wanted = "gate 105.0 exit 140.0\n\
         route 0, 32 points: Below (70.0 -70.0)..(130.0 -10.0) Below (80.0 -16.0)..(140.0 44.0)\n\
         route 1, 32 points: Above (73.1 -66.9)..(126.9 -13.1) Below (83.1 -12.9)..(136.9 40.9)\n\
@@ -123,7 +123,7 @@ fn without_obstacles_there_is_one_free_route() {
 }
 
 #[test]
-fn the_string_bends_at_the_corners_and_is_measured_to_the_gate() {
+fn the_path_bends_at_the_corners_and_is_measured_to_the_gate() {
     let routes = routes(&[rectangle(167.0, 0.0, 10.0, 75.0)]);
     let lane = lane(&routes, 1, &[]);
     let pull = lane.pull(Vec2::new(0.0, 0.0), 167.0);
@@ -137,7 +137,7 @@ fn the_string_bends_at_the_corners_and_is_measured_to_the_gate() {
 }
 
 #[test]
-fn past_the_target_the_string_leads_on_along_the_course() {
+fn past_the_target_the_path_leads_on_along_the_course() {
     let routes = routes(&[rectangle(100.0, 0.0, 10.0, 10.0)]);
     let pull = lane(&routes, 0, &[]).pull(Vec2::new(900.0, 40.0), 100.0);
     assert_eq!(pull.direction, Vec2::new(30.0, -40.0) / 50.0);
@@ -145,7 +145,7 @@ fn past_the_target_the_string_leads_on_along_the_course() {
 }
 
 #[test]
-fn a_body_at_a_wall_counts_to_it_and_a_free_one_stays_aside() {
+fn a_body_at_a_wall_becomes_part_of_it_and_a_free_body_keeps_its_side() {
     let routes = routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]);
     let body = |x: f64, y: f64| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 };
     // Half-way along the obstacle the string from nearer than this leads outward.
@@ -168,7 +168,7 @@ fn a_body_at_a_wall_counts_to_it_and_a_free_one_stays_aside() {
 }
 
 #[test]
-fn in_a_gap_a_body_counts_to_the_nearer_wall() {
+fn a_body_in_a_gap_becomes_part_of_the_nearer_wall() {
     let routes = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
     for sign in [-1.0, 1.0] {
         let body = Body { centre_m: Vec2::new(640.0, sign * 35.0), radius_m: 30.0 };
@@ -179,7 +179,7 @@ fn in_a_gap_a_body_counts_to_the_nearer_wall() {
 }
 
 #[test]
-fn bodies_ahead_bar_a_gap_if_they_leave_no_way_beside_them() {
+fn bodies_bar_a_gap_if_they_leave_no_room_beside_them() {
     let routes = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
     let body = |x: f64, y: f64| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 };
     let barred = |bodies: &[Body]| [0, 1, 2].map(|route| routes.is_barred(route, Vec2::new(600.0, 0.0), bodies));
@@ -192,7 +192,7 @@ fn bodies_ahead_bar_a_gap_if_they_leave_no_way_beside_them() {
 }
 
 #[test]
-fn a_lane_past_two_sets_keeps_both() {
+fn a_corridor_past_two_sets_keeps_the_constraints_of_both() {
     let (first, second) = (routes(&[rectangle(100.0, 0.0, 10.0, 40.0)]), routes(&[rectangle(220.0, 0.0, 10.0, 40.0)]));
     let target = Vec2::new(second.exit_x_m() + RUN_OUT_M, 0.0);
     let crossing = Corridor::new(&[(&first, 0), (&second, 1)], &[], target);
@@ -223,7 +223,7 @@ fn mirrored(shape: &ConvexShape) -> ConvexShape {
     ConvexShape::new(&vertices, shape.radius_m).unwrap()
 }
 
-/// Length of the shortest path over constraint points whose legs keep all constraints; `None` if there is none.
+/// Length of the shortest path over constraint points that keeps all constraints. `None` if there is none.
 fn shortest(constraints: &[Constraint], from: Vec2, target: Vec2) -> Option<f64> {
     let ahead: Vec<&Constraint> = constraints.iter().filter(|c| c.x_m > from.x + 1e-6 && c.x_m < target.x).collect();
     let mut nodes = vec![from];
@@ -251,7 +251,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_string_is_the_shortest_path(shapes in shapes(), y in -200.0..200.0, pick in any::<prop::sample::Index>()) {
+    fn no_path_is_shorter(shapes in shapes(), y in -200.0..200.0, pick in any::<prop::sample::Index>()) {
         let routes = routes(&shapes);
         let route = pick.index(routes.count());
         let (from, target) = (Vec2::new(-150.0, y), Vec2::new(routes.exit_x_m() + RUN_OUT_M, 0.0));
@@ -264,7 +264,7 @@ proptest! {
     }
 
     #[test]
-    fn the_string_is_finite_wherever_the_drone_is(
+    fn the_path_is_finite_wherever_the_drone_is(
         shapes in shapes(), (x, y) in (-100.0..400.0, -250.0..250.0), corner in any::<prop::sample::Index>(),
         bodies in prop::collection::vec((-50.0..300.0, -150.0..150.0), 0..4),
     ) {

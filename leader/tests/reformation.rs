@@ -1,4 +1,4 @@
-//! Who takes which slot, by each method, and the bending energy of the thin-plate spline.
+//! Which drone takes which slot, by each method, and the bending energy of the thin-plate spline.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -28,7 +28,7 @@ fn is_matching(taken: &[usize], drones: usize, slots: usize) -> bool {
     taken.len() == drones && sorted.len() == drones && sorted.iter().all(|&slot| slot < slots)
 }
 
-/// Coordinates on a coarse grid among them, so that points coincide or lie on a line.
+/// Some coordinates are on a coarse grid, so that points coincide or lie on a line.
 fn points(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Vec2>> {
     let fine = (-200.0..200.0, -200.0..200.0);
     let coarse = (-2i32..2, -1i32..1).prop_map(|(x, y)| (f64::from(x) * 40.0, f64::from(y) * 40.0));
@@ -96,7 +96,7 @@ proptest! {
     }
 }
 
-/// The formation turned, stretched and bent: the order in which it still is in shape is the drones' own.
+/// The formation turned, stretched and bent. Each drone still fits its own slot best if the order is kept.
 fn disturbed(slots: &[Vec2]) -> Vec<Vec2> {
     let (sin, cos) = 0.7f64.sin_cos();
     let bend = |p: &Vec2| Vec2::new(1.2 * p.x + 0.002 * p.y * p.y, 0.8 * p.y);
@@ -140,7 +140,7 @@ fn greedy_takes_the_closest_pair_first_and_identity_the_order() {
 }
 
 #[test]
-fn what_cannot_be_mapped_is_refused_or_optimal() {
+fn inputs_that_cannot_be_mapped_are_refused_or_assigned_optimally() {
     let slots = Shape::Wedge.slots(201, 35.0);
     assert_eq!(tps::assign(&slots, &slots, 0.0), None);
     let tps = Reformation::Tps { lambda_m2: 0.0 };

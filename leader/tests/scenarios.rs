@@ -1,4 +1,4 @@
-//! The paper's single-obstacle scenarios: what the cost model and the exact grouping forecast for them.
+//! The paper's single-obstacle scenarios: the forecasts of the cost model and the exact grouping.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 

@@ -1,5 +1,5 @@
-//! Leadership in simulated time, over a lossy and slow air: nobody healthy is deposed, the dead are replaced, and what
-//! was apart becomes one.
+//! Leadership in simulated time, over a lossy and slow channel: healthy leaders stay, dead leaders are replaced, and
+//! separated groups become one.
 #![allow(clippy::unwrap_used, clippy::disallowed_macros, reason = "helpers of tests, which print what they found")]
 
 mod swarm;
@@ -34,7 +34,7 @@ fn no_false_election_in_ten_minutes_at_50_percent_loss_and_1_s() {
 }
 
 #[test]
-fn sides_of_a_partition_lead_themselves_and_become_one_within_a_second() {
+fn each_side_of_a_partition_has_a_leader_and_healing_makes_them_one_within_a_second() {
     for seed in 0..20 {
         let mut swarm = Swarm::new(DEFAULT, Air { seed, ..Air::default() }, 8);
         swarm.run(3.0 + 0.1 * seed as f64);
@@ -54,7 +54,7 @@ fn sides_of_a_partition_lead_themselves_and_become_one_within_a_second() {
     }
 }
 
-/// Seconds from the death of the leader, at 40 moments, until all others follow another one; ascending.
+/// Time from the leader's death until all others follow another leader, s, for 40 moments of death; ascending.
 fn failovers(periods: Periods, air: Air) -> Vec<f64> {
     let mut times: Vec<f64> = (0..40)
         .map(|i| {
@@ -92,7 +92,7 @@ fn a_dead_leader_is_replaced() {
 }
 
 #[test]
-fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
+fn a_leader_that_falls_behind_transfers_its_leadership_once_and_without_a_gap() {
     for loss in [0.0, 0.3] {
         let mut swarm = Swarm::new(DEFAULT, Air { seed: 5, loss, ..Air::default() }, 8);
         swarm.run(3.0);
@@ -115,7 +115,7 @@ fn a_leader_that_falls_behind_hands_over_once_and_without_a_gap() {
 }
 
 #[test]
-fn a_leader_whose_sensor_breaks_hands_over_at_once_and_without_a_gap() {
+fn a_leader_with_a_broken_sensor_transfers_its_leadership_at_once_and_without_a_gap() {
     for (loss, limit_s) in [(0.0, 0.1), (0.3, 2.0)] {
         let mut swarm = Swarm::new(DEFAULT, Air { seed: 3, loss, ..Air::default() }, 8);
         swarm.run(3.0);
@@ -146,7 +146,7 @@ fn a_leader_whose_sensor_breaks_hands_over_at_once_and_without_a_gap() {
 }
 
 #[test]
-fn whoever_dies_is_followed_by_one_with_all_sensors() {
+fn a_dead_leader_is_followed_by_a_healthy_drone() {
     let mut swarm = Swarm::new(DEFAULT, Air { seed: 4, ..Air::default() }, 8);
     swarm.run(3.0);
     (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().set_impaired(true));
@@ -161,7 +161,7 @@ fn whoever_dies_is_followed_by_one_with_all_sensors() {
     assert_eq!(leaders, [DroneId(0), DroneId(3)], "nobody else claimed");
 }
 
-/// What is wrong where not everybody hears everybody: each is to follow a leader that it hears itself, or to lead.
+/// What is wrong where drones do not all hear each other. Each must lead, or follow a leader that it hears itself.
 fn unled(swarm: &Swarm) -> Option<String> {
     for (id, leading) in swarm.side(0) {
         let term = leading.term();
@@ -175,7 +175,7 @@ fn unled(swarm: &Swarm) -> Option<String> {
 }
 
 #[test]
-fn along_a_chain_everybody_follows_a_leader_it_hears_and_nobody_is_deposed() {
+fn along_a_chain_each_drone_follows_a_leader_it_hears_and_no_leader_is_replaced() {
     for (drones, reach, loss, seed) in
         [(3, 1, 0.0, 1), (4, 1, 0.0, 2), (5, 1, 0.3, 3), (8, 1, 0.0, 4), (8, 2, 0.3, 5), (8, 3, 0.0, 6)]
     {

@@ -24,6 +24,7 @@ pub mod frame;
 pub mod histogram;
 pub mod ids;
 pub mod link_faults;
+pub mod matching;
 pub mod message;
 pub mod nearby;
 pub mod payload;

@@ -3,6 +3,7 @@
 //! A payload is read from shared memory only through [`crate::Message::decode`] or [`crate::MessageRef::read`], which
 //! check every field. Kinds and phases are integers here and enums everywhere else: see [`crate::wire`].
 
+use crate::Vec2;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::shape::ConvexShape;
 use crate::time::SimTime;
@@ -187,6 +188,18 @@ impl Plan {
     #[must_use]
     pub fn phase(&self) -> Phase {
         Phase::from_wire(self.phase).unwrap_or_default()
+    }
+
+    /// Position (world frame, m) and velocity (m/s) of the anchor at `now`. The anchor moves on from its stamp until it
+    /// reaches the abscissa where it stops.
+    #[must_use]
+    pub fn anchor_at(&self, now: SimTime) -> (Vec2, Vec2) {
+        let (start, velocity) = (Vec2::from(self.anchor_m), Vec2::from(self.anchor_mps));
+        let here = start + velocity * now.since(self.stamp);
+        if velocity.x > 0.0 && here.x >= self.anchor_stop_x_m {
+            return (Vec2::new(self.anchor_stop_x_m.max(start.x), here.y), Vec2::zeros());
+        }
+        (here, velocity)
     }
 }
 

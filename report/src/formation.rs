@@ -1,8 +1,8 @@
 //! How far the living drones are from the target shape, wherever it may stand.
 
-use crate::assign::assign;
 use crate::facts::RunFacts;
 use skein_protocol::Vec2;
+use skein_protocol::matching::least_cost;
 
 /// Up to this many drones the assignment is solved whenever the last one does not close the formation.
 const SOLVE_ALWAYS_MAX: usize = 64;
@@ -111,6 +111,11 @@ impl Closing {
         self.solved_s = Some(t_s);
         fits(&self.slots, &self.slot_of)
     }
+}
+
+/// The slot of each drone, by least total squared distance. At least as many slots as drones.
+fn assign(positions: &[Vec2], slots: &[Vec2]) -> Vec<usize> {
+    least_cost(positions.len(), slots.len(), |drone, slot| (positions[drone] - slots[slot]).norm_squared())
 }
 
 #[cfg(test)]

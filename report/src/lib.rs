@@ -4,7 +4,6 @@
 //! [`plot::write`] draws a flown run from its trace; [`text::summary`] says it to a person.
 
 mod accumulate;
-mod assign;
 mod close;
 mod completion;
 pub mod deviation;

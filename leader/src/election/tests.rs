@@ -1,5 +1,4 @@
 use super::*;
-use skein_protocol::LeadershipKind;
 
 const PARAMS: ElectionParams = ElectionParams { heartbeat_period_s: 0.2, leader_timeout_s: 1.0, wait_s: 0.2 };
 const N: GroupId = GroupId::ALL;
@@ -8,7 +7,7 @@ fn at(seconds: f64) -> SimTime {
     SimTime::from_secs(seconds)
 }
 
-/// One that doubts the air no more.
+/// A drone that has measured its link already: its time-out is the base time-out.
 fn machine(id: u32) -> Election {
     Election {
         adaptive_timeout: AdaptiveTimeout::new(SimTime::ZERO),
@@ -41,7 +40,7 @@ fn claim(drone: &mut Election, from_s: f64, closer: usize) -> (f64, Leadership) 
 }
 
 #[test]
-fn the_closest_claims_first_and_the_next_only_if_it_hears_nothing() {
+fn the_closest_drone_claims_first_and_the_next_one_only_if_it_hears_no_claim() {
     let (first, said) = claim(&mut machine(5), 0.0, 0);
     let mut second = machine(3);
     assert!((0.2..0.24).contains(&first));
@@ -52,25 +51,30 @@ fn the_closest_claims_first_and_the_next_only_if_it_hears_nothing() {
 }
 
 #[test]
-fn whoever_was_started_again_listens_before_it_claims() {
+fn a_restarted_drone_listens_before_it_claims() {
     let again = || Election::new(DroneId(5), 2, PARAMS, at(10.0));
     let (first, _) = claim(&mut again(), 10.0, 0);
     assert!((14.2..14.24).contains(&first), "{first}");
     let mut drone = again();
     sign(&mut drone, 13.9, ballot(1, 0), N, false);
-    assert!(tick(&mut drone, 14.2, 0).is_none() && drone.obeyed() == ballot(1, 0), "not outbid by a later life");
+    assert!(
+        tick(&mut drone, 14.2, 0).is_none() && drone.obeyed() == ballot(1, 0),
+        "a restart does not outbid the leader"
+    );
 }
 
 #[test]
-fn an_air_that_is_not_known_yet_may_lose_every_other_sign() {
+fn an_unknown_link_is_assumed_to_lose_half_of_all_messages() {
     let mut drone = Election::new(DroneId(1), 1, PARAMS, SimTime::ZERO);
-    assert!((4.5..4.7).contains(&drone.patience_s()));
-    (1..=12).for_each(|beat| sign(&mut drone, 0.2 * f64::from(beat), ballot(1, 0), N, false));
-    assert_eq!(drone.patience_s(), PARAMS.leader_timeout_s);
+    assert!((4.5..4.7).contains(&drone.silence_s()));
+    for beat in 1..=12 {
+        sign(&mut drone, 0.2 * f64::from(beat), ballot(1, 0), N, false);
+    }
+    assert_eq!(drone.silence_s(), PARAMS.leader_timeout_s);
 }
 
 #[test]
-fn two_claims_settle_on_the_higher_ballot() {
+fn of_two_claims_the_higher_ballot_wins() {
     let (mut a, mut b) = (machine(1), machine(2));
     let (_, said_a) = claim(&mut a, 0.0, 0);
     let (_, said_b) = claim(&mut b, 0.0, 0);
@@ -81,13 +85,13 @@ fn two_claims_settle_on_the_higher_ballot() {
 }
 
 #[test]
-fn a_silent_leader_is_asked_for_and_replaced_and_steps_down_when_it_wakes() {
+fn a_silent_leader_is_replaced_after_a_pre_vote_and_steps_down_when_it_returns() {
     let (mut old, mut heir) = (machine(1), machine(2));
     let (t, said) = claim(&mut old, 0.0, 0);
     heir.handle(at(t), 0, Input::Heard(said));
-    let (asked, probe) = until_said(&mut heir, t, 0, LeadershipKind::PreVote);
+    let (asked, pre_vote) = until_said(&mut heir, t, 0, LeadershipKind::PreVote);
     assert!(asked >= t + PARAMS.leader_timeout_s - PARAMS.wait_s - 1e-9);
-    assert_eq!((probe.ballot, probe.stamp), (said.ballot, at(t)));
+    assert_eq!((pre_vote.ballot, pre_vote.stamp), (said.ballot, at(t)));
     let (later, next) = claim(&mut heir, asked + 0.02, 0);
     assert!((0.0..0.021).contains(&(later - t - PARAMS.leader_timeout_s + 1e-9)), "{later}");
     assert!(later >= asked + PARAMS.wait_s - 1e-9 && next.ballot > said.ballot);
@@ -96,41 +100,41 @@ fn a_silent_leader_is_asked_for_and_replaced_and_steps_down_when_it_wakes() {
 }
 
 #[test]
-fn whoever_heard_of_the_leader_objects_to_a_claim() {
+fn a_drone_that_heard_the_leader_rejects_a_pre_vote() {
     let (mut leader, mut deaf, mut other) = (machine(1), machine(2), machine(3));
     let (t, said) = claim(&mut leader, 0.0, 0);
     deaf.handle(at(t), 0, Input::Heard(said));
     sign(&mut other, t + 0.7, said.ballot, N, false);
-    let (asked, probe) = until_said(&mut deaf, t, 0, LeadershipKind::PreVote);
-    let objection = other.handle(at(asked), 0, Input::Heard(probe)).expect("it heard of the leader since");
-    assert_eq!((objection.kind(), objection.stamp), (LeadershipKind::PreVoteRejection, at(t + 0.7)));
+    let (asked, pre_vote) = until_said(&mut deaf, t, 0, LeadershipKind::PreVote);
+    let rejection = other.handle(at(asked), 0, Input::Heard(pre_vote)).expect("it has heard the leader since");
+    assert_eq!((rejection.kind(), rejection.stamp), (LeadershipKind::PreVoteRejection, at(t + 0.7)));
     let (mut told, mut untold) = (deaf.clone(), deaf);
-    told.handle(at(asked + 0.02), 0, Input::Heard(objection));
+    told.handle(at(asked + 0.02), 0, Input::Heard(rejection));
     assert!((1..60).all(|i| tick(&mut told, asked + 0.02 + 0.01 * f64::from(i), 0).is_none()));
     assert!(claim(&mut untold, asked, 0).0 < asked + 0.25);
-    // What is no news is not told, nor is anything about another term.
-    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { stamp: at(t + 0.7), ..probe })).is_none());
-    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { ballot: ballot(9, 9), ..probe })).is_none());
-    // The leader itself answers that it lives.
-    assert_eq!(leader.handle(at(asked), 0, Input::Heard(probe)).map(|said| said.stamp), Some(at(asked)));
+    // It does not answer if it knows nothing newer, nor about another term.
+    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { stamp: at(t + 0.7), ..pre_vote })).is_none());
+    assert!(other.handle(at(asked), 0, Input::Heard(Leadership { ballot: ballot(9, 9), ..pre_vote })).is_none());
+    // The leader itself rejects a pre-vote.
+    assert_eq!(leader.handle(at(asked), 0, Input::Heard(pre_vote)).map(|said| said.stamp), Some(at(asked)));
 }
 
 #[test]
-fn an_objection_counts_for_what_it_knows_and_not_for_the_future() {
+fn a_rejection_counts_up_to_its_stamp_and_not_if_it_is_from_the_future() {
     let mut drone = machine(2);
     sign(&mut drone, 0.0, ballot(1, 1), N, false);
-    let objection = |stamp| {
+    let rejection = |stamp| {
         let kind = LeadershipKind::PreVoteRejection.to_wire();
         Input::Heard(Leadership { stamp, ballot: ballot(1, 1), kind, group: N, epoch: 0, heir: DroneId::NONE })
     };
-    drone.handle(at(1.0), 0, objection(at(60.0)));
+    drone.handle(at(1.0), 0, rejection(at(60.0)));
     assert!(!drone.has_leader(at(1.1)));
-    drone.handle(at(1.0), 0, objection(at(0.5)));
+    drone.handle(at(1.0), 0, rejection(at(0.5)));
     assert!(drone.has_leader(at(1.5)) && !drone.has_leader(at(1.6)));
 }
 
 #[test]
-fn heartbeats_and_plans_keep_a_leader_in_office() {
+fn heartbeats_and_plans_show_that_the_leader_lives() {
     let (mut leader, mut member) = (machine(1), machine(2));
     let (mut t, mut said) = claim(&mut leader, 0.0, 3);
     for _ in 0..20 {
@@ -146,18 +150,18 @@ fn heartbeats_and_plans_keep_a_leader_in_office() {
 }
 
 #[test]
-fn a_leader_that_yields_is_followed_by_its_heir_at_once() {
+fn a_leadership_transfer_takes_effect_at_once() {
     let (mut leader, mut heir, mut third) = (machine(1), machine(2), machine(3));
     let (t, said) = claim(&mut leader, 0.0, 0);
     heir.handle(at(t), 0, Input::Heard(said));
     third.handle(at(t), 0, Input::Heard(said));
-    let yields = leader.handle(at(t + 0.1), 0, Input::Yield(DroneId(2))).expect("it leads");
-    assert!(third.handle(at(t + 0.12), 0, Input::Heard(yields)).is_none() && !third.leads());
-    let next = heir.handle(at(t + 0.12), 0, Input::Heard(yields)).expect("the heir claims");
+    let transfer = leader.handle(at(t + 0.1), 0, Input::Transfer(DroneId(2))).expect("it leads");
+    assert!(third.handle(at(t + 0.12), 0, Input::Heard(transfer)).is_none() && !third.leads());
+    let next = heir.handle(at(t + 0.12), 0, Input::Heard(transfer)).expect("the heir claims");
     assert!(heir.leads() && leader.leads());
     leader.handle(at(t + 0.14), 0, Input::Heard(next));
     assert!(!leader.leads() && leader.obeyed() == heir.obeyed());
-    assert!(heir.clone().handle(at(t + 0.2), 0, Input::Heard(yields)).is_none(), "said twice, it is over");
+    assert!(heir.clone().handle(at(t + 0.2), 0, Input::Heard(transfer)).is_none(), "a repeated transfer has no effect");
 }
 
 #[test]
@@ -171,18 +175,18 @@ fn a_term_is_for_the_groups_in_its_scope() {
     sign(&mut drone, 0.3, ballot(2, 4), one, false);
     assert_eq!((drone.obeyed(), drone.scope()), (ballot(2, 4), one));
     sign(&mut drone, 0.4, ballot(4, 7), two, true);
-    assert_eq!((drone.obeyed(), drone.scope()), (ballot(4, 7), two), "an order by name adopts it");
+    assert_eq!((drone.obeyed(), drone.scope()), (ballot(4, 7), two), "an assignment that names the drone wins it over");
     sign(&mut drone, 0.5, ballot(5, 0), N, false);
     assert_eq!((drone.obeyed(), drone.scope()), (ballot(5, 0), N));
 }
 
 #[test]
-fn whoever_missed_the_split_waits_to_be_taken_in_and_leads_no_more() {
+fn a_leader_that_missed_the_split_steps_down_and_waits_to_be_taken_in() {
     let mut leader = machine(1);
     claim(&mut leader, 0.0, 0);
     sign(&mut leader, 0.5, ballot(4, 2), N.child(1), false);
     assert!(!leader.leads());
-    // While it hears the part's leader: when it leads all the same.
+    // When it claims although it hears the leader of a part.
     let until_leads = |leader: &mut Election, from_s: f64| {
         let times_s = (0..100).map(|i| from_s + 0.2 * f64::from(i));
         times_s.into_iter().find(|&now_s| {
@@ -191,19 +195,19 @@ fn whoever_missed_the_split_waits_to_be_taken_in_and_leads_no_more() {
         })
     };
     let mut alone = leader.clone();
-    let waits_s = until_leads(&mut leader, 0.7).expect("it is not taken in for ever");
+    let waits_s = until_leads(&mut leader, 0.7).expect("it does not wait for ever");
     assert!(waits_s > PARTED_TIMEOUTS * PARAMS.leader_timeout_s && leader.obeyed().round > 4, "{waits_s}");
     let left_s = claim(&mut alone, 0.7, 0).0;
-    assert!(left_s < 0.5 * waits_s, "with nobody left it leads itself: {left_s}");
+    assert!(left_s < 0.5 * waits_s, "without any other leader it claims sooner: {left_s}");
 }
 
 #[test]
-fn the_greatest_round_neither_panics_nor_wraps_nor_wins() {
+fn the_greatest_round_does_not_panic_wrap_or_win() {
     let mut drone = machine(1);
     let top = Ballot { round: u32::MAX, incarnation: u32::MAX, claimant: DroneId(9) };
     sign(&mut drone, 0.0, top, N, true);
     assert!(!drone.obeyed().is_some() && claim(&mut drone, 0.0, 0).1.ballot == ballot(1, 1));
-    // Nor by steps: what is as high as may be is soon outbid.
+    // Nor do steps win: the highest round that is accepted is soon outbid.
     for step in 0..5000 {
         sign(&mut drone, 1.0, ballot(1 << (step % 32), 9), N, false);
     }
@@ -213,12 +217,12 @@ fn the_greatest_round_neither_panics_nor_wraps_nor_wins() {
 }
 
 #[test]
-fn a_slow_air_is_given_time_to_answer() {
+fn a_slow_link_gets_more_time_to_answer() {
     let mut drone = machine(1);
     sign(&mut drone, 0.0, ballot(1, 2), N, false);
     let slow = |now_s: f64, drone: &mut Election| drone.handle(at(now_s), 0, Input::Tick { closer: 1, delay_s: 1.0 });
-    assert!(slow(0.4, &mut drone).is_none(), "half of the patience at least");
+    assert!(slow(0.4, &mut drone).is_none(), "not before half of the time-out");
     assert_eq!(slow(0.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::PreVote));
-    assert!(slow(3.4, &mut drone).is_none(), "two ways for the answer, one for a claim of the other");
+    assert!(slow(3.4, &mut drone).is_none(), "two delays for the answer, one for the claim of the other drone");
     assert_eq!(slow(3.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::Claim));
 }

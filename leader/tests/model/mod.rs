@@ -1,14 +1,14 @@
-//! The shipping machine under a model checker: every course of a short mission in which the air, processes and links
-//! do their worst, up to a number of faults.
+//! The machine that flies under a model checker: every course of a short mission, with a bounded number of faults of
+//! messages, processes and links.
 //!
-//! Time goes in steps of one heartbeat. In a step every living drone hears what is due and then acts, as the pilot
-//! does. Between two steps the adversary may lose, delay by a step or double any single message that is due (later ones
-//! overtake a delayed one), kill a drone, start it again with nothing in its memory, cut the swarm in two and heal it.
-//! The time is part of the state and bounded, so nothing has to be abstracted from it: all courses within the bounds
-//! are explored to the end, in whatever order.
+//! Time advances in steps of one heartbeat. In a step, every living drone hears the messages that are due and then acts,
+//! as the pilot does. Between two steps the adversary may lose, double, or delay by a step any single message that is due
+//! (later messages overtake a delayed one). It may kill a drone, restart it with empty memory, partition the swarm and heal
+//! it. Time is part of the state and bounded: all courses within the bounds are explored completely.
 
 use crate::swarm::{Breach, Periods, Watch, discord, disunion, hash, params, step, wall};
-use skein_leader::leading::{Leading, Own};
+use skein_leader::leading::Leading;
+use skein_leader::own_state::OwnState;
 use skein_protocol::{DroneId, GroupId, Message, Phase, SimTime, Vec2};
 use stateright::{Model, Property};
 use std::fmt::Write;
@@ -26,32 +26,32 @@ const PERIODS: Periods = Periods {
     peer_timeout_s: 0.6,
     debounce_s: 0.0,
 };
-/// Faster than real drones, so that a mission is short: 20 m a step.
+/// Faster than real drones, so that a mission is short: 20 m per step.
 const SPEED_MPS: f64 = 100.0;
-/// So many steps after the last fault all must be one again, at the latest.
-const PATIENCE: u32 = 60;
+/// Number of steps after the last fault within which all drones must be one group again.
+const MAX_RECOVERY_STEPS: u32 = 60;
 
-/// What the adversary may still do.
+/// The faults that the adversary may still cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Faults {
-    /// Messages lost, delayed or doubled.
+    /// Number of messages lost, delayed or doubled.
     pub messages: u8,
-    /// Drones killed; each may be started again.
+    /// Number of drones killed. Each may be restarted.
     pub crashes: u8,
-    /// Cuts of the swarm in two; each may be healed.
+    /// Number of partitions of the swarm. Each may be healed.
     pub cuts: u8,
 }
 
-/// A mission of few drones, and what may go wrong.
+/// A mission of few drones, and its faults.
 #[derive(Clone, Debug)]
 pub struct Mission {
-    /// How many drones, in a column, alternately left and right of the course.
+    /// Number of drones, in a column, alternately left and right of the course.
     pub drones: u32,
-    /// Steps explored; what comes after is fair.
+    /// Number of steps with faults. The steps after them have none.
     pub steps: u32,
-    /// Walls ahead: one splits the swarm, a second one is planned for by two leaders jointly.
+    /// Number of walls ahead. The first one splits the swarm; two leaders plan jointly for the second one.
     pub walls: u32,
-    /// The adversary's means.
+    /// The faults of the adversary.
     pub faults: Faults,
 }
 
@@ -60,12 +60,12 @@ pub struct Mission {
 struct Process {
     /// `None`: dead.
     machine: Option<Arc<Leading>>,
-    /// Hash of all the machine remembers.
+    /// Hash of the machine's whole state.
     print: u64,
     incarnation: u32,
 }
 
-/// A message on its way to one drone. The order is that of hearing.
+/// A message on its way to one drone. The order of posts is the order in which they are heard.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 struct Post {
     due: u32,
@@ -75,17 +75,17 @@ struct Post {
     print: u64,
 }
 
-/// Everything there is at one moment.
+/// The whole state at one moment.
 #[derive(Clone, Debug)]
 pub struct State {
     step: u32,
     processes: Vec<Process>,
     posts: Vec<(Post, Arc<Message>)>,
     left: Faults,
-    /// One bit a drone: its side of the cut.
+    /// One bit per drone: its side of the partition.
     cut: Option<u32>,
     watch: Arc<Watch>,
-    /// What must not happen and did.
+    /// The first breach of an invariant.
     pub breach: Option<Breach>,
 }
 
@@ -104,7 +104,7 @@ impl State {
         self.cut.is_none_or(|cut| cut >> a & 1 == cut >> b & 1)
     }
 
-    /// The living, side by side.
+    /// The living drones of each side.
     fn sides(&self) -> Vec<Vec<(DroneId, &Leading)>> {
         let side = |bit: u32| {
             let of_side = move |id: &u32| self.cut.map_or(0, |cut| cut >> id & 1) == bit;
@@ -114,7 +114,7 @@ impl State {
         (0..2).map(side).collect()
     }
 
-    /// The groups that are led, by whoever leads.
+    /// The groups that have a leader.
     fn led(&self) -> Vec<GroupId> {
         let leading = self.processes.iter().filter_map(|p| p.machine.as_ref()).filter(|l| l.is_leader());
         leading.map(|l| l.scope()).collect()
@@ -133,28 +133,28 @@ impl Hash for State {
     }
 }
 
-/// What happens next.
+/// An action of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// All hear and act.
+    /// All drones hear and act.
     Step,
-    /// This message, by its place on the air, is lost.
+    /// The message with this index is lost.
     Lose(usize),
-    /// It comes a step later.
+    /// The message comes a step later.
     Delay(usize),
-    /// It comes now and a step later.
+    /// The message comes now and again a step later.
     Double(usize),
     /// A process dies.
     Kill(u32),
-    /// It is started again.
+    /// A dead process is restarted.
     Restart(u32),
-    /// Two sides do not hear each other any more.
+    /// The swarm is partitioned into two sides that do not hear each other.
     Cut(u32),
-    /// They do again.
+    /// The partition is healed.
     Heal,
 }
 
-/// Hash of all that a machine remembers: of what `derive(Debug)` writes, which leaves out no field.
+/// Hash of a machine's whole state: of the output of `derive(Debug)`, which contains every field.
 fn print_of(machine: &Leading) -> u64 {
     struct Sink(Vec<u8>);
     impl Write for Sink {
@@ -174,13 +174,13 @@ impl Mission {
         Process { print: print_of(&machine), machine: Some(Arc::new(machine)), incarnation }
     }
 
-    fn own(id: u32, step: u32) -> Own {
+    fn own(id: u32, step: u32) -> OwnState {
         let y_m = if id.is_multiple_of(2) { 30.0 } else { -30.0 };
         let x_m = 20.0 - 20.0 * f64::from(id) + SPEED_MPS * PERIODS.dt_s * f64::from(step);
-        Own { tick: u64::from(step), position: Vec2::new(x_m, y_m), velocity: Vec2::new(SPEED_MPS, 0.0) }
+        OwnState { tick: u64::from(step), position: Vec2::new(x_m, y_m), velocity: Vec2::new(SPEED_MPS, 0.0) }
     }
 
-    /// All hear what is due, then all act.
+    /// All drones hear the messages that are due, then all act.
     fn step(&self, state: &mut State) {
         let now = state.now();
         let later = state.posts.partition_point(|(post, _)| post.due <= state.step);
@@ -194,7 +194,7 @@ impl Mission {
             {
                 machine.hear(now, DroneId(post.from), &**message, &mut say);
             }
-            // The first one senses, the others are told.
+            // The first drone senses the walls; the others are told.
             for wall in (0..self.walls).filter(|w| id == 0 && state.step >= 2 + 3 * w) {
                 let (obstacle, shape) = wall_at(wall);
                 machine.sense(now, obstacle, shape);
@@ -217,7 +217,7 @@ impl Mission {
         state.step += 1;
     }
 
-    /// Whether all become one when nothing goes wrong any more: each side for itself, then, healed, the whole swarm.
+    /// Whether all drones become one group once there are no more faults: first each side, then, healed, the whole swarm.
     fn becomes_one(&self, state: &State) -> bool {
         let mut state = state.clone();
         let apart = state.cut.is_none() || self.settles(&mut state);
@@ -227,7 +227,7 @@ impl Mission {
 
     fn settles(&self, state: &mut State) -> bool {
         let exit_m = wall_at(self.walls - 1).1.bounds().1.x + 25.0;
-        (0..PATIENCE).any(|_| {
+        (0..MAX_RECOVERY_STEPS).any(|_| {
             let past = Self::own(self.drones - 1, state.step).position.x > exit_m;
             self.step(state);
             past && state.breach.is_none() && state.sides().iter().all(|side| disunion(side).is_none())
@@ -317,23 +317,23 @@ impl Model for Mission {
 
     fn properties(&self) -> Vec<Property<Self>> {
         vec![
-            Property::always("nobody obeys two assignments under one (ballot, epoch)", |_, s: &State| {
+            Property::always("no drone obeys two assignments under one (ballot, epoch)", |_, s: &State| {
                 !matches!(s.breach, Some(Breach::TwoPlans { .. }))
             }),
-            Property::always("what is obeyed never goes back", |_, s: &State| {
+            Property::always("the stamp that a drone obeys never goes back", |_, s: &State| {
                 !matches!(s.breach, Some(Breach::WentBack { .. } | Breach::NotOfTheTerm { .. }))
             }),
-            Property::always("no two lead under one ballot", |_, s: &State| {
+            Property::always("no two drones lead under one ballot", |_, s: &State| {
                 !matches!(s.breach, Some(Breach::TwoLeaders { .. }))
             }),
-            Property::always("on a fair network all become one", |mission: &Self, s: &State| {
+            Property::always("on a fair network all drones become one group", |mission: &Self, s: &State| {
                 s.step < mission.steps || mission.becomes_one(s)
             }),
             Property::sometimes("two groups have leaders of their own", |_, s: &State| {
                 let led = s.led();
                 (1..=2).all(|number| led.contains(&GroupId::ALL.child(number)))
             }),
-            Property::sometimes("all fly in formation again", |_, s: &State| {
+            Property::sometimes("all drones fly in formation again", |_, s: &State| {
                 let part = |l: &Leading| l.obeyed().is_some_and(|bundle| bundle.plan.phase() == Phase::Reform);
                 let all = s.processes.iter().all(|p| p.machine.as_ref().is_some_and(|l| part(l)));
                 all && s.sides().iter().all(|side| discord(side).is_none())

@@ -1,13 +1,14 @@
-//! A swarm in simulated time, with the air between the drones.
+//! A swarm in simulated time, with a lossy channel between the drones.
 
 use super::{Breach, Periods, SPEED_MPS, Watch, disunion, params, step};
-use skein_leader::leading::{Leading, Own};
+use skein_leader::leading::Leading;
+use skein_leader::own_state::OwnState;
 use skein_protocol::digest::Digest;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, SimTime, Vec2};
 use std::collections::BTreeMap;
 
-/// What the air does to messages; drawn by a keyed hash.
+/// Loss, delay and doubling of messages, drawn by a keyed hash.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Air {
     pub seed: u64,
@@ -31,10 +32,10 @@ impl Air {
     }
 }
 
-/// When due, who said it, running number, to whom.
+/// Tick at which it is due, source, sequence number, destination.
 pub type Post = (u64, usize, u64, usize);
 
-/// Machines, their bodies, and the air between them.
+/// Machines, their motion, and the channel between them.
 #[derive(Clone)]
 pub struct Swarm {
     pub periods: Periods,
@@ -45,7 +46,7 @@ pub struct Swarm {
     /// Alive, but they do nothing and hear nothing.
     pub frozen: Vec<bool>,
     pub incarnations: Vec<u32>,
-    pub own: Vec<Own>,
+    pub own: Vec<OwnState>,
     /// Drones of different sides do not hear each other.
     pub sides: Vec<u8>,
     /// Nor do those whose numbers differ by more: with 1 they are a chain.
@@ -64,7 +65,7 @@ impl Swarm {
     pub fn new(periods: Periods, air: Air, drones: usize) -> Self {
         let own = |i: usize| {
             let position = Vec2::new(-40.0 * i as f64, 7.0 * i as f64 - 3.0 * drones as f64);
-            Own { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0) }
+            OwnState { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0) }
         };
         let machine = |i| Some(Leading::new(&params(&periods, drones as u32, i, 1, SimTime::ZERO)));
         Self {
@@ -111,19 +112,19 @@ impl Swarm {
         }
     }
 
-    /// Messages on the air, the next due first.
+    /// Messages under way, the next due first.
     pub fn posts(&mut self) -> &mut BTreeMap<Post, Message> {
         &mut self.posts
     }
 
-    /// Takes a message off the air: the `index`-th, modulo how many there are.
+    /// Removes the message with this index, modulo their number.
     pub fn take_post(&mut self, index: usize) -> Option<(Post, Message)> {
         let index = index.checked_rem(self.posts.len())?;
         let post = *self.posts.keys().nth(index)?;
         self.posts.remove_entry(&post)
     }
 
-    /// One tick: all hear what is due, then all act.
+    /// One tick: all drones hear the messages that are due, then all act.
     pub fn step(&mut self) -> Result<(), Breach> {
         self.deliver();
         let now = self.now();
@@ -171,14 +172,14 @@ impl Swarm {
         }
     }
 
-    /// Goes on for so long, s.
+    /// Runs for `seconds`.
     pub fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds / self.periods.dt_s).round() as u64 {
             self.step().unwrap();
         }
     }
 
-    /// Goes on until `done` holds; after how long it did, s, or what is wrong if not within `limit_s`.
+    /// Runs until `wrong` returns `None`. Returns how long that took, s, or what is wrong after `limit_s`.
     pub fn until(&mut self, limit_s: f64, wrong: impl Fn(&Self) -> Option<String>) -> Result<f64, String> {
         let start = self.tick;
         loop {
@@ -191,19 +192,19 @@ impl Swarm {
         }
     }
 
-    /// The living and waking drones of one side.
+    /// The drones of one side that are neither dead nor frozen.
     pub fn side(&self, side: u8) -> Vec<(DroneId, &Leading)> {
         let of_side = |&i: &usize| self.sides[i] == side && !self.frozen[i];
         let living = |i: usize| self.drones[i].as_ref().map(|leading| (DroneId(i as u32), leading));
         (0..self.drones.len()).filter(of_side).filter_map(living).collect()
     }
 
-    /// What keeps the drones of a side from being one.
+    /// What keeps the drones of a side from being one group.
     pub fn disunion(&self, side: u8) -> Option<String> {
         disunion(&self.side(side))
     }
 
-    /// Who leads a living drone, and in which term.
+    /// The term that a living drone obeys.
     pub fn term(&self, drone: usize) -> Option<Ballot> {
         self.drones[drone].as_ref().map(|leading| leading.term())
     }

@@ -1,11 +1,13 @@
-//! Machines as the pilot runs them, and what must always hold between them. Shared by the tests of leadership.
+//! Machines as the pilot runs them, and the invariants between them. Shared by the tests of leadership.
 #![allow(dead_code, reason = "each test uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 pub mod air;
 
 use skein_leader::election::ElectionParams;
-use skein_leader::leading::{Leading, LeadingParams, Own};
+use skein_leader::leading::Leading;
+use skein_leader::own_state::OwnState;
+use skein_leader::params::LeadingParams;
 use skein_leader::params::{Destination, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
@@ -31,7 +33,7 @@ pub struct Periods {
     pub debounce_s: f64,
 }
 
-/// Those that a scenario has by default.
+/// The defaults of a scenario.
 pub const DEFAULT: Periods = Periods {
     dt_s: 0.02,
     beacon_s: 0.1,
@@ -43,7 +45,7 @@ pub const DEFAULT: Periods = Periods {
     debounce_s: 0.1,
 };
 
-/// What the machine of drone `me` is told when it starts.
+/// Parameters of the machine of drone `me`.
 pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTime) -> LeadingParams {
     LeadingParams {
         me: DroneId(me),
@@ -76,14 +78,14 @@ pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTim
     }
 }
 
-/// A wall across the course line at `x_m`, with a way past it on either side.
+/// A wall across the course line at `x_m`, with a route past it on either side.
 pub fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
     let shape = ConvexShape::rectangle(Vec2::new(x_m, 0.0), Vec2::new(5.0, 50.0), 0.0).unwrap();
     (ObstacleId(id), shape)
 }
 
-/// What a drone does in a tick after it has heard: the order of the pilot.
-pub fn step(leading: &mut Leading, now: SimTime, own: &Own, say: &mut Vec<Message>) {
+/// A drone's tick after it has heard its messages, in the pilot's order.
+pub fn step(leading: &mut Leading, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
     leading.elect(now, own, say);
     if leading.is_leader() {
         leading.refresh_members(now, own);
@@ -96,32 +98,32 @@ pub fn step(leading: &mut Leading, now: SimTime, own: &Own, say: &mut Vec<Messag
     leading.speak(now, own, &Default::default(), say);
 }
 
-/// What must never happen.
+/// A breach of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Breach {
-    /// Two drones know, or obey, different things under one (ballot, epoch).
+    /// Two drones know, or obey, different plans or assignments under one (ballot, epoch).
     TwoPlans { drone: DroneId, of: DroneId, stamp: PlanStamp },
-    /// What a drone obeys went back within an incarnation.
+    /// The stamp or term that a drone obeys went back within an incarnation.
     WentBack { drone: DroneId, from: (Ballot, PlanStamp), to: (Ballot, PlanStamp) },
-    /// Two drones lead under one ballot, or one under another's.
+    /// Two drones lead under one ballot, or one drone leads under another one's ballot.
     TwoLeaders { drone: DroneId, other: DroneId, ballot: Ballot },
-    /// A plan of a later term is obeyed than the term itself.
+    /// A drone obeys a plan of a later term than its own.
     NotOfTheTerm { drone: DroneId, term: Ballot, stamp: PlanStamp },
 }
 
-/// What must always hold, and what was seen so far.
+/// Checks the invariants against what was seen so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Watch {
     /// Hash of each drone's part in each plan; under [`DroneId::NONE`] the plan's own.
     parts: BTreeMap<(PlanStamp, DroneId), u64>,
-    /// Who led under which ballot.
+    /// The leader of each ballot.
     pub leaders: BTreeMap<Ballot, DroneId>,
-    /// What each incarnation of each drone obeyed last.
+    /// The term and stamp that each incarnation of each drone obeyed last.
     obeyed: BTreeMap<(DroneId, u32), (Ballot, PlanStamp)>,
 }
 
 impl Watch {
-    /// Looks at a drone.
+    /// Checks a drone.
     pub fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
         let (term, stamp) = (leading.term(), leading.stamp());
         let (from, to) = (self.obeyed.insert((drone, incarnation), (term, stamp)).unwrap_or_default(), (term, stamp));
@@ -155,8 +157,7 @@ pub fn hash(bytes: &[u8]) -> u64 {
     digest.value()
 }
 
-/// What is wrong among drones that hear each other, by id: each is to obey the highest term for its group that one of
-/// them leads.
+/// What is wrong among drones that hear each other. Each must obey the highest term for its group that one of them leads.
 pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
     let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.is_leader()).collect();
     for (id, leading) in drones {
@@ -170,7 +171,7 @@ pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
     None
 }
 
-/// What is wrong with drones that hear each other and have nothing ahead: one is to lead, and all to obey one plan for
+/// What is wrong among drones that hear each other and have no obstacle ahead. One must lead, and all must obey one plan for
 /// all of them.
 pub fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
     if let Some(discord) = discord(drones) {

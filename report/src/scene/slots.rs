@@ -43,9 +43,7 @@ impl Slots {
     pub fn of(&self, drone: usize, row: &DroneRow, now: SimTime) -> Option<Vec2> {
         let part = self.parts.get(drone).copied().flatten().filter(|part| part.id == row.obeyed)?;
         let plan = self.plans.get(&part.id).filter(|plan| plan.phase() != Phase::Avoid)?;
-        let since_s = (now.0 - plan.stamp.0) as f64 / 1e9;
-        let mut anchor = Vec2::from(plan.anchor_m) + Vec2::from(plan.anchor_mps) * since_s;
-        anchor.x = anchor.x.min(plan.anchor_stop_x_m.max(plan.anchor_m[0]));
+        let (anchor, _) = plan.anchor_at(now);
         Some(anchor + Vec2::from(part.slot_m))
     }
 }

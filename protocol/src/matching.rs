@@ -1,21 +1,30 @@
-//! Optimal assignment of drones to slots: the Hungarian method with potentials, O(n³).
+//! The exact solution of the assignment problem: the Hungarian method with potentials, O(rows² · columns). Pure, and the
+//! only solver of its kind in the project.
 
-use skein_protocol::Vec2;
-
-/// The slot of each drone, by least total squared distance; ties fall to the lower slot. At least as many slots as
-/// drones.
-pub(crate) fn assign(positions: &[Vec2], slots: &[Vec2]) -> Vec<usize> {
-    let mut matching = Matching::new(slots.len());
-    for row in 0..positions.len() {
-        matching.add(row, &|row, slot| (positions[row] - slots[slot]).norm_squared());
+/// The column of each row, no column twice, so that the sum of the costs is least. Surplus columns stay empty. A tie falls
+/// to the lower column.
+///
+/// # Panics
+/// If there are more rows than columns.
+///
+/// ```
+/// use skein_protocol::matching::least_cost;
+/// let cost = [[4.0, 1.0, 3.0], [2.0, 0.0, 5.0]];
+/// assert_eq!(least_cost(2, 3, |row, column| cost[row][column]), [1, 0]);
+/// ```
+#[must_use]
+pub fn least_cost(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    let mut matching = Matching::new(columns);
+    for row in 0..rows {
+        matching.add(row, &cost);
     }
-    let mut slot_of = vec![0; positions.len()];
-    for (slot, row) in matching.row_of.iter().enumerate() {
+    let mut column_of = vec![0; rows];
+    for (column, row) in matching.row_of.iter().enumerate() {
         if let Some(row) = row {
-            slot_of[*row] = slot;
+            column_of[*row] = column;
         }
     }
-    slot_of
+    column_of
 }
 
 /// A least-cost matching of the rows added so far, and the potentials that prove it.
@@ -106,7 +115,12 @@ impl Search {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Vec2;
     use proptest::prelude::*;
+
+    fn assign(positions: &[Vec2], slots: &[Vec2]) -> Vec<usize> {
+        least_cost(positions.len(), slots.len(), |row, slot| (positions[row] - slots[slot]).norm_squared())
+    }
 
     fn cost(positions: &[Vec2], slots: &[Vec2], slot_of: &[usize]) -> f64 {
         positions.iter().zip(slot_of).map(|(p, &s)| (p - slots[s]).norm_squared()).sum()

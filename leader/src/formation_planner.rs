@@ -1,0 +1,225 @@
+//! Which drone takes which slot of the formation (paper, Algorithm 5).
+
+use crate::draft::draft;
+use crate::geometry::nearest;
+use crate::member::{Member, group_leaders};
+use crate::params::Destination;
+use crate::plan_bundle::PlanBundle;
+use crate::situation::Situation;
+use crate::slots::{self, Reformation};
+use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_MPS, STALLED_S};
+use skein_protocol::payload::{Assignment, NO_ROUTE};
+use skein_protocol::{GroupId, Phase, SimTime, Vec2};
+
+/// Most steps by which the anchor moves on. Obstacles without end do not hold up the leader.
+const MAX_ANCHOR_STEPS: u32 = 10_000;
+
+/// What a leader remembers while the formation closes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FormationPlanner {
+    /// Since when the members differ from those planned for.
+    changed: Option<SimTime>,
+    /// Since when no member has moved although one is not in its slot.
+    stalled: Option<SimTime>,
+    /// Whether the ranks are open.
+    open: bool,
+    /// Whether the formation is built around a member that follows no leader, or that is the only one.
+    pinned: bool,
+}
+
+/// A member that already stands in a slot. Both are indices.
+#[derive(Clone, Copy, Debug)]
+struct Pin {
+    member: usize,
+    slot: usize,
+}
+
+impl FormationPlanner {
+    /// A plan to fly in formation: once all have passed all obstacles, whenever the members change, and when they are
+    /// stuck.
+    pub(crate) fn decide(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
+        let obeyed = s.ledger.obeyed().filter(|bundle| bundle.plan.id.ballot == s.ballot);
+        let passed = !s.ledger.sets().is_empty();
+        let same =
+            obeyed.is_some_and(|bundle| bundle.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
+        if !passed && same {
+            self.changed = None;
+            return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| {
+                let pinned = s.members.iter().any(|m| is_alone(m, s));
+                let open = !pinned && !self.open;
+                *self = Self { open, pinned, ..Self::default() };
+                self.assign(s, bundle.plan.phase())
+            });
+        }
+        let changed = *self.changed.get_or_insert(s.now);
+        if !passed && obeyed.is_some() && s.now.since(changed) < s.params.debounce_s {
+            return None;
+        }
+        *self = Self::default();
+        let avoided = s.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase() != Phase::Cruise);
+        self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
+    }
+
+    /// Whether no member has moved for a while although one is not in its slot, or although the ranks are open.
+    fn is_stuck(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> bool {
+        let anchor = Vec2::from(bundle.plan.anchor_m);
+        let error = |m: &Member| match bundle.parts.get(m.id) {
+            Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
+            None => 0.0,
+        };
+        let worst = s.members.iter().map(error).fold(0.0, f64::max);
+        let still = s.members.iter().all(|m| m.speed_mps < STALLED_MPS);
+        if !still || bundle.plan.phase() != Phase::Reform || (worst <= s.params.arrival_error_m && !self.open) {
+            self.stalled = None;
+            return false;
+        }
+        let since = *self.stalled.get_or_insert(s.now);
+        s.now.since(since) >= STALLED_S
+    }
+
+    /// The plan that assigns the slots. `None` without a slot for every member.
+    fn assign(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
+        let close = s.params.shape.slots(s.members.len(), s.params.spacing_m);
+        let (anchor, pin) = match s.members.iter().position(|m| self.pinned && is_alone(m, s)) {
+            Some(member) => anchor_for(s, &close, phase, member),
+            None => (anchor(s, &close, phase), None),
+        };
+        let shape = if self.open { opened(&close) } else { close };
+        let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
+        let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
+        let taken = assign_pinned(s.params.reformation, positions, places, pin)?;
+        let plan = draft(s, phase, &[], anchor);
+        let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
+        let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
+        let leaders = group_leaders(s.members, &groups, &s.params.destination);
+        let part = |(i, m): (usize, &Member)| Assignment {
+            id: plan.id,
+            scope: s.scope,
+            group: groups[i],
+            drone: m.id,
+            leader: leaders[i],
+            slot_m: shape[taken[i]].into(),
+            arrival_s: 0.0,
+            route: NO_ROUTE,
+            rank: 0,
+            reserved: 0,
+        };
+        Some(PlanBundle { plan, parts: s.members.iter().enumerate().map(part).collect() })
+    }
+}
+
+/// Where the front slot goes: the goal; or the mean position of the members, moved on until it is clear of obstacles and
+/// of dead drones.
+fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
+    if let (Destination::Goal { front_m }, Phase::Reform) = (s.params.destination, phase) {
+        return front_m;
+    }
+    let count = s.members.len().max(1) as f64;
+    let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
+    let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
+    let mut anchor = Vec2::new(x, s.params.course_y_m);
+    let (mut steps, is_blocked) = (0, blocker(s));
+    while phase == Phase::Reform && steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
+        anchor.x += ANCHOR_STEP_M;
+        steps += 1;
+    }
+    anchor
+}
+
+/// A test of whether any slot of a shape is too near to an obstacle or to a dead drone, given the shape and the position
+/// of its front slot.
+fn blocker<'a>(s: &Situation<'a>) -> impl Fn(&[Vec2], Vec2) -> bool + use<'a> {
+    let keep_m = SLOT_BERTH * s.params.safe_distance_m;
+    let clear_m = s.params.routes.planning_distance_m;
+    let shapes: Vec<(Vec<Vec2>, f64)> =
+        s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
+    let silent = s.silent;
+    let blocked = move |slot: Vec2| {
+        silent.iter().any(|dead| (slot - dead).norm() < keep_m)
+            || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
+    };
+    move |shape, front| shape.iter().any(|slot| blocked(slot + front))
+}
+
+/// Where the front slot goes so that a member that follows no leader has a slot, and which slot that is: the one it
+/// stands in, or else the goal's front slot, to which it flies if it hears no other drone.
+fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) -> (Vec2, Option<Pin>) {
+    let (usual, stands) = (anchor(s, shape, phase), s.members[member].position);
+    let off = |slot: &usize| (stands - shape[*slot] - usual).norm();
+    let nearest_of = |slots: &mut dyn Iterator<Item = usize>| slots.min_by(|a, b| off(a).total_cmp(&off(b)));
+    let Destination::Hold { stop_x_m } = s.params.destination else {
+        let here = nearest_of(&mut (0..shape.len())).filter(|slot| off(slot) <= s.params.arrival_error_m);
+        return (usual, Some(Pin { member, slot: here.unwrap_or(0) }));
+    };
+    let is_blocked = blocker(s);
+    // A drone that hears no other, though there were others, may stand in a slot whose front is beyond the stop.
+    let least_x_m = if s.members.len() == 1 && !s.silent.is_empty() { f64::NEG_INFINITY } else { stop_x_m };
+    let free = |slot: &usize| {
+        let (anchor, mut others) = (stands - shape[*slot], shape.to_vec());
+        others.remove(*slot);
+        anchor.x >= least_x_m && !is_blocked(&others, anchor)
+    };
+    match nearest_of(&mut (0..shape.len()).filter(free)) {
+        Some(slot) => (stands - shape[slot], Some(Pin { member, slot })),
+        None => (usual, None),
+    }
+}
+
+/// Whether a member acts on its own: it does not follow this leader, or there is no other drone.
+fn is_alone(member: &Member, s: &Situation<'_>) -> bool {
+    !member.follows || s.members.len() == 1
+}
+
+/// The slot of each member, by index. `None` without a slot for every member.
+fn assign_pinned(
+    method: Reformation,
+    mut positions: Vec<Vec2>,
+    mut places: Vec<Vec2>,
+    pin: Option<Pin>,
+) -> Option<Vec<usize>> {
+    if let Some(Pin { member, slot }) = pin {
+        positions.remove(member);
+        places.remove(slot);
+    }
+    let mut taken = slots::assign_by(method, &positions, &places).ok()?;
+    if let Some(Pin { member, slot }) = pin {
+        for other in taken.iter_mut().filter(|other| **other >= slot) {
+            *other += 1;
+        }
+        taken.insert(member, slot);
+    }
+    Some(taken)
+}
+
+/// The group a member stays in. A member of no part, while others are `split`, joins the part of the nearest of them.
+fn group_of(member: &Member, split: &[&Member]) -> GroupId {
+    if member.group != GroupId::ALL {
+        return member.group;
+    }
+    let near = |m: &Member| (m.position - member.position).norm_squared();
+    split.iter().min_by(|a, b| near(a).total_cmp(&near(b)).then(a.id.cmp(&b.id))).map_or(GroupId::ALL, |m| m.group)
+}
+
+/// The shape, widened about its own centre. A drone that is shut out finds a way in. When the ranks close again, all
+/// drones move in proportion.
+fn opened(shape: &[Vec2]) -> Vec<Vec2> {
+    let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
+    shape.iter().map(|slot| centre + (slot - centre) * OPEN_RANKS).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pinned_member_keeps_its_slot_and_the_others_share_the_rest() {
+        let line = |xs: &[f64]| -> Vec<Vec2> { xs.iter().map(|&x| Vec2::new(x, 0.0)).collect() };
+        let (drones, slots) = (line(&[0.0, 10.0, 20.0]), line(&[0.0, 10.0, 20.0]));
+        let assign = |pin| assign_pinned(Reformation::Optimal, drones.clone(), slots.clone(), pin);
+        assert_eq!(assign(None), Some(vec![0, 1, 2]));
+        assert_eq!(assign(Some(Pin { member: 2, slot: 0 })), Some(vec![1, 2, 0]));
+        assert_eq!(assign(Some(Pin { member: 0, slot: 1 })), Some(vec![1, 0, 2]));
+        let front = Some(Pin { member: 0, slot: 0 });
+        assert_eq!(assign_pinned(Reformation::Optimal, drones, line(&[0.0]), front), None);
+    }
+}

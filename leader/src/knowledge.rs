@@ -1,0 +1,301 @@
+//! What a drone knows of its swarm, and how messages change it: peers, obstacles, plans and terms.
+
+use crate::election::{Election, Input};
+use crate::ledger::Ledger;
+use crate::member::Member;
+use crate::obstacles::Obstacles;
+use crate::own_state::OwnState;
+use crate::params::{LeadingParams, PlannerParams};
+use crate::peers::{Peers, extrapolated};
+use crate::plan_bundle::PlanBundle;
+use crate::tuning::MAX_REJECTIONS;
+use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, ObstacleId, PlanStamp, SimTime, Vec2};
+
+/// What one drone knows of its swarm. The other parts of [`crate::leading::Leading`] read it.
+#[derive(Clone, Debug)]
+pub(crate) struct Knowledge {
+    me: DroneId,
+    drones: u32,
+    incarnation: u32,
+    params: PlannerParams,
+    impaired: bool,
+    peers: Peers,
+    obstacles: Obstacles,
+    ledger: Ledger,
+    election: Election,
+}
+
+impl Knowledge {
+    /// A drone that has just started and has heard nothing.
+    pub(crate) fn new(params: &LeadingParams) -> Self {
+        let reach_m = 2.0 * params.planner.routes.planning_distance_m;
+        Self {
+            me: params.me,
+            drones: params.drones,
+            incarnation: params.incarnation,
+            params: params.planner.clone(),
+            impaired: false,
+            peers: Peers::new(params.drones, params.peer_timeout_s),
+            obstacles: Obstacles::new(params.drones, reach_m),
+            ledger: Ledger::new(params.me, params.drones, params.planner.routes),
+            election: Election::new(params.me, params.incarnation, params.election, params.start),
+        }
+    }
+
+    /// What the drone of `params` would know, if it knew what this one knows and this ledger, and if all drones were one
+    /// group that this drone leads in its [`Self::first_term`].
+    pub(crate) fn of_rollout_member(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
+        let mut other = Self::new(params);
+        other.obstacles = self.obstacles.clone();
+        other.peers = self.peers.clone();
+        other.peers.forget(params.me);
+        other.peers.unite(ledger.stamp());
+        other.ledger = ledger;
+        let (ballot, scope) = (self.first_term(), GroupId::ALL);
+        let leads = Input::Claim(scope);
+        let follows = Input::Sign { ballot, scope, named: true };
+        other.election.handle(now, 0, if params.me == self.me { leads } else { follows });
+        other.join(now);
+        other
+    }
+
+    /// This drone.
+    pub(crate) fn me(&self) -> DroneId {
+        self.me
+    }
+
+    /// Number of this start of its process, from 1.
+    pub(crate) fn incarnation(&self) -> u32 {
+        self.incarnation
+    }
+
+    /// Parameters of planning.
+    pub(crate) fn params(&self) -> &PlannerParams {
+        &self.params
+    }
+
+    /// Whether a sensor of its own is broken.
+    pub(crate) fn is_impaired(&self) -> bool {
+        self.impaired
+    }
+
+    /// The beacons it has heard.
+    pub(crate) fn peers(&self) -> &Peers {
+        &self.peers
+    }
+
+    /// The obstacles it knows.
+    pub(crate) fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
+    /// What it knows of plans.
+    pub(crate) fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// Which term it obeys.
+    pub(crate) fn election(&self) -> &Election {
+        &self.election
+    }
+
+    /// The term in which this drone would lead all drones, had no drone led before.
+    pub(crate) fn first_term(&self) -> Ballot {
+        Ballot { round: 1, incarnation: self.incarnation, claimant: self.me }
+    }
+
+    /// Sort key of claims: distance to the destination, then id.
+    pub(crate) fn claim_key(&self, position: Vec2, id: DroneId) -> (f64, DroneId) {
+        (self.params.destination.distance_m(position), id)
+    }
+
+    /// The term that a peer obeys, by its last beacon.
+    pub(crate) fn term_of(&self, peer: DroneId) -> Ballot {
+        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
+    }
+
+    /// Whether a peer's last beacon says that all its sensors work.
+    pub(crate) fn is_healthy(&self, peer: DroneId) -> bool {
+        self.peers.last(peer).is_some_and(|pose| !pose.is_impaired())
+    }
+
+    /// This drone as a member.
+    pub(crate) fn myself(&self, own: &OwnState) -> Member {
+        let OwnState { position, velocity, .. } = *own;
+        let (speed_mps, group) = (velocity.norm(), self.ledger.group());
+        Member { id: self.me, position, speed_mps, velocity, group, follows: true }
+    }
+
+    /// Living peers, extrapolated to `now`, by id. A peer's group is the one that the obeyed plan, or the plan that split
+    /// this group, puts it in; unless its beacon shows that it is past that plan or will not obey it.
+    pub(crate) fn living_peers(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
+        let plans = [self.ledger.obeyed(), self.ledger.origin()];
+        self.peers.living(now).map(move |(id, pose)| {
+            let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
+            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && hears(plan.ballot);
+            let pending = plans.into_iter().flatten().filter(|bundle| will_obey(&bundle.plan.id));
+            let group = pending.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
+            let group = group.unwrap_or(pose.group);
+            let velocity = Vec2::from(pose.velocity_mps);
+            let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());
+            Member { id, position, speed_mps: velocity.norm(), velocity, group, follows }
+        })
+    }
+
+    /// Number of living drones of the scope that claim before this one: those closer to the destination, and healthy ones
+    /// while this one is impaired. The missing leader is not counted. 0 while there is a leader.
+    pub(crate) fn closer(&self, now: SimTime, own: &OwnState) -> usize {
+        if !self.election.seeks(now) {
+            return 0;
+        }
+        let mine = (self.impaired, self.claim_key(own.position, self.me));
+        let (scope, missing) = (self.election.scope(), self.election.obeyed());
+        let rivals = self
+            .living_peers(now)
+            .filter(|m| !(missing.is_some() && m.id == missing.claimant) && scope.contains(m.group));
+        rivals.filter(|m| (!self.is_healthy(m.id), self.claim_key(m.position, m.id)) < mine).count()
+    }
+
+    /// Whether it leads and hears others, none of which follows it. If this persists, no other drone can hear this one.
+    pub(crate) fn is_unfollowed(&self, now: SimTime) -> bool {
+        let mut peers = self.peers.living(now).peekable();
+        self.election.leads() && peers.peek().is_some() && peers.all(|(_, pose)| pose.term != self.election.obeyed())
+    }
+
+    /// Hears a beacon. Returns whether it shows a plan of this leader's term that this leader never made.
+    pub(crate) fn hear_pose(&mut self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
+        self.peers.hear(now, source, *pose);
+        self.ledger.hear_place(source, pose);
+        let ballot = self.election.obeyed();
+        if pose.leads() && pose.term == ballot && ballot.claimant == source {
+            let scope = self.election.scope();
+            self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
+        }
+        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
+        self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
+    }
+
+    /// Learns of an obstacle. Returns whether it is new.
+    pub(crate) fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
+        let new = self.obstacles.learn(now, id, shape, witness);
+        if new {
+            self.ledger.settle(&self.obstacles);
+            self.join(now);
+        }
+        new
+    }
+
+    /// Hears a message about leadership; returns the answer. Claims and heartbeats count only from the claimant itself.
+    pub(crate) fn hear_leadership(
+        &mut self,
+        now: SimTime,
+        source: DroneId,
+        message: &Leadership,
+    ) -> Option<Leadership> {
+        let relayed = matches!(message.kind(), LeadershipKind::PreVote | LeadershipKind::PreVoteRejection);
+        if message.ballot.claimant.0 >= self.drones || (!relayed && message.ballot.claimant != source) {
+            return None;
+        }
+        let others_reject = || !self.election.leads() && self.lower_living_peers(now, source) >= MAX_REJECTIONS;
+        if message.kind() == LeadershipKind::PreVote && others_reject() {
+            return None;
+        }
+        self.elect(now, Input::Heard(*message))
+    }
+
+    /// Number of living peers with a lower id than this drone, up to [`MAX_REJECTIONS`]: they also answer a pre-vote of
+    /// `source`.
+    fn lower_living_peers(&self, now: SimTime, source: DroneId) -> usize {
+        let lower = self.peers.living(now).take_while(|(id, _)| *id < self.me);
+        lower.filter(|&(id, _)| id != source).take(MAX_REJECTIONS).count()
+    }
+
+    /// Hears a plan.
+    pub(crate) fn hear_plan(&mut self, now: SimTime, source: DroneId, plan: &Plan) {
+        if self.obeys(now, source, Term { ballot: plan.id.ballot, scope: plan.group, named: false }) {
+            self.ledger.hear_plan(plan, &self.obstacles);
+            self.join(now);
+        }
+    }
+
+    /// Hears a drone's assignment.
+    pub(crate) fn hear_assignment(&mut self, now: SimTime, source: DroneId, part: &Assignment) {
+        let named = part.drone == self.me;
+        if self.obeys(now, source, Term { ballot: part.id.ballot, scope: part.scope, named }) {
+            self.ledger.hear_assignment(part, &self.obstacles);
+            self.join(now);
+        }
+    }
+
+    /// Takes note of the term that a message of `source` belongs to. Returns whether this drone obeys it and does not
+    /// lead it.
+    fn obeys(&mut self, now: SimTime, source: DroneId, term: Term) -> bool {
+        let Term { ballot, scope, named } = term;
+        if ballot.claimant.0 >= self.drones {
+            return false;
+        }
+        // A repetition by another drone does not show that the leader lives, nor that there is such a term. A repetition
+        // by a drone that leads another term by now does not show that this term goes on.
+        let over = ballot == self.election.obeyed() && self.term_of(source) > ballot;
+        if ballot.claimant == source && !over {
+            self.election.handle(now, 0, Input::Sign { ballot, scope, named });
+        }
+        ballot == self.election.obeyed() && !self.election.leads()
+    }
+
+    /// Hears which obstacles a drone has passed.
+    pub(crate) fn hear_passed(&mut self, source: DroneId, passed: &Passed) {
+        self.obstacles.hear_passed(source, passed);
+    }
+
+    /// Notes which planned sets this drone has passed, being at `position`.
+    pub(crate) fn note_passed(&mut self, position: Vec2) {
+        for set in self.ledger.sets().iter().filter(|set| position.x >= set.routes.exit_x_m()) {
+            self.obstacles.note_passed(self.me, &set.ids);
+        }
+    }
+
+    /// Notes which planned sets these members have passed.
+    pub(crate) fn note_members_passed(&mut self, members: &[Member]) {
+        for set in self.ledger.sets() {
+            for member in members.iter().filter(|member| member.position.x >= set.routes.exit_x_m()) {
+                self.obstacles.note_passed(member.id, &set.ids);
+            }
+        }
+    }
+
+    /// Sets whether a sensor of its own is broken.
+    pub(crate) fn set_impaired(&mut self, impaired: bool) {
+        self.impaired = impaired;
+    }
+
+    /// Gives the election an input; returns what is to be said.
+    pub(crate) fn elect(&mut self, now: SimTime, input: Input) -> Option<Leadership> {
+        let epoch = self.ledger.stamp().epoch;
+        self.election.handle(now, epoch, input)
+    }
+
+    /// Adopts a plan, whichever leader made it.
+    pub(crate) fn adopt(&mut self, now: SimTime, bundle: PlanBundle) {
+        self.ledger.adopt(bundle, &self.obstacles);
+        self.join(now);
+    }
+
+    /// Tells the election which group this drone is in.
+    fn join(&mut self, now: SimTime) {
+        let group = self.ledger.group();
+        self.election.handle(now, 0, Input::Joined(group));
+    }
+}
+
+/// The term that a message belongs to.
+#[derive(Clone, Copy)]
+struct Term {
+    ballot: Ballot,
+    /// The group that the term is for.
+    scope: GroupId,
+    /// Whether the message names this drone.
+    named: bool,
+}

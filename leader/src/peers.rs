@@ -1,0 +1,199 @@
+//! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
+
+use crate::adaptive_timeout::AdaptiveTimeout;
+use crate::tuning::DELAY_WEIGHT;
+use skein_protocol::payload::Pose;
+use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
+
+/// A beacon that took longer to arrive does not count, s.
+const MAX_DELAY_S: f64 = 60.0;
+
+/// What is known of one peer.
+#[derive(Clone, Copy, Debug)]
+struct Peer {
+    /// The longest silence that is not yet significant, s.
+    silence_s: f64,
+    /// Of its beacons, by their times of arrival.
+    timeout: AdaptiveTimeout,
+    pose: Pose,
+}
+
+impl Peer {
+    fn lives(&self, now: SimTime) -> bool {
+        now.since(self.timeout.last()) <= self.silence_s
+    }
+}
+
+/// The last beacon heard of each peer.
+#[derive(Clone, Debug)]
+pub struct Peers {
+    drones: u32,
+    timeout_s: f64,
+    /// Running mean of the beacons' delay, s.
+    delay_s: f64,
+    /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
+    ids: Vec<DroneId>,
+    /// What is known of each of them, in the same order.
+    last: Vec<Peer>,
+}
+
+impl Peers {
+    /// No peers yet, in a swarm of `drones`. A peer that is silent for longer than `timeout_s`, or on a bad link for much
+    /// longer than usual, counts as gone.
+    #[must_use]
+    pub fn new(drones: u32, timeout_s: f64) -> Self {
+        Self { drones, timeout_s, delay_s: 0.0, ids: Vec::new(), last: Vec::new() }
+    }
+
+    /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
+    /// Age is by simulated time alone, which goes on when a process is restarted.
+    pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
+        let delay_s = now.since(pose.stamp);
+        if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
+            return;
+        }
+        match self.place(source) {
+            Err(place) => {
+                let timeout = AdaptiveTimeout::new(now);
+                let silence_s = timeout.timeout_s(self.timeout_s);
+                self.ids.insert(place, source);
+                self.last.insert(place, Peer { silence_s, timeout, pose });
+            }
+            Ok(place) if pose.stamp > self.last[place].pose.stamp => {
+                let peer = &mut self.last[place];
+                peer.pose = pose;
+                peer.timeout.hear(now, 0.0, peer.silence_s);
+                peer.silence_s = peer.timeout.timeout_s(self.timeout_s);
+                self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
+            }
+            Ok(_) => {}
+        }
+    }
+
+    fn place(&self, peer: DroneId) -> Result<usize, usize> {
+        self.ids.binary_search(&peer)
+    }
+
+    fn get(&self, peer: DroneId) -> Option<&Peer> {
+        self.place(peer).ok().map(|place| &self.last[place])
+    }
+
+    /// How long a beacon takes to arrive, s: a running mean.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
+    }
+
+    /// Forgets a peer.
+    pub fn forget(&mut self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.ids.remove(place);
+            self.last.remove(place);
+        }
+    }
+
+    /// Makes all peers members of one group that obeys this plan.
+    pub fn unite(&mut self, stamp: PlanStamp) {
+        for Peer { pose, .. } in &mut self.last {
+            (pose.group, pose.term, pose.obeyed) = (GroupId::ALL, stamp.ballot, stamp);
+        }
+    }
+
+    /// Whether the peer is not silent for too long.
+    #[must_use]
+    pub fn is_living(&self, peer: DroneId, now: SimTime) -> bool {
+        self.get(peer).is_some_and(|known| known.lives(now))
+    }
+
+    /// The last beacon of a peer, however old.
+    #[must_use]
+    pub fn last(&self, peer: DroneId) -> Option<&Pose> {
+        self.get(peer).map(|known| &known.pose)
+    }
+
+    /// The last beacon of a peer that is not silent for too long.
+    #[must_use]
+    pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {
+        self.get(peer).filter(|known| known.lives(now)).map(|known| &known.pose)
+    }
+
+    /// Peers that are not silent for too long, by id.
+    pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
+        self.known().filter(move |(_, known)| known.lives(now)).map(|(id, known)| (id, &known.pose))
+    }
+
+    /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
+    pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
+        self.known().filter(move |(_, known)| !known.lives(now)).map(|(id, known)| (id, &known.pose))
+    }
+
+    fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
+        self.ids.iter().copied().zip(&self.last)
+    }
+}
+
+/// Where a drone is at `now` if it has kept the velocity of its beacon, world frame, m.
+#[must_use]
+pub fn extrapolated(pose: &Pose, now: SimTime) -> Vec2 {
+    Vec2::from(pose.position_m) + Vec2::from(pose.velocity_mps) * now.since(pose.stamp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn pose(stamp_s: f64, x: f64) -> Pose {
+        Pose {
+            stamp: SimTime::from_secs(stamp_s),
+            position_m: [x, 0.0],
+            velocity_mps: [10.0, 0.0],
+            incarnation: 1,
+            ..Pose::zeroed()
+        }
+    }
+
+    #[test]
+    fn an_older_beacon_that_comes_late_is_ignored() {
+        let mut peers = Peers::new(4, 1.0);
+        let now = SimTime::from_secs(2.0);
+        peers.hear(now, DroneId(1), pose(1.5, 5.0));
+        peers.hear(now, DroneId(1), pose(1.4, 4.0));
+        peers.hear(now, DroneId(1), pose(9.0, 90.0));
+        peers.hear(now, DroneId(7), pose(1.5, 5.0));
+        assert_eq!(peers.last(DroneId(1)).unwrap().position_m[0], 5.0);
+        assert!(peers.last(DroneId(7)).is_none());
+        assert_eq!(extrapolated(peers.last(DroneId(1)).unwrap(), now).x, 10.0);
+    }
+
+    #[test]
+    fn a_silent_peer_is_gone_but_remembered() {
+        let mut peers = Peers::new(4, 1.0);
+        peers.hear(SimTime::ZERO, DroneId(1), pose(0.0, 0.0));
+        assert_eq!(peers.living(SimTime::from_secs(1.0)).count(), 1);
+        assert_eq!(peers.living(SimTime::from_secs(1.1)).count(), 0);
+        assert_eq!(peers.silent(SimTime::from_secs(1.1)).count(), 1);
+    }
+
+    #[test]
+    fn delay_is_not_silence_and_a_lossy_link_has_a_longer_timeout() {
+        let mut peers = Peers::new(4, 0.4);
+        let mut heard = 0.0;
+        for i in 0..2000u32 {
+            // Half of the beacons are lost.
+            heard += 0.1 * f64::from(1 + i.wrapping_mul(0x9e37_79b9).leading_zeros());
+            peers.hear(SimTime::from_secs(heard), DroneId(1), pose(heard - 0.1, 0.0));
+        }
+        assert!(peers.is_living(DroneId(1), SimTime::from_secs(heard + 1.5)));
+        assert!(!peers.is_living(DroneId(1), SimTime::from_secs(heard + 4.0)));
+    }
+
+    #[test]
+    fn a_high_incarnation_does_not_suppress_later_beacons() {
+        let mut peers = Peers::new(4, 1.0);
+        let now = SimTime::from_secs(3.0);
+        peers.hear(now, DroneId(1), Pose { incarnation: u32::MAX, ..pose(1.0, 1.0) });
+        peers.hear(now, DroneId(1), pose(2.0, 2.0));
+        assert_eq!(peers.last(DroneId(1)).unwrap().position_m[0], 2.0);
+    }
+}

@@ -1,0 +1,103 @@
+//! What a leader finds out about an obstacle set before it plans for it.
+
+use crate::cost::{Flight, Trip, shortest, trips};
+use crate::ledger::Ledger;
+use crate::member::Member;
+use crate::plan_exchange;
+use crate::planned_set::PlannedSet;
+use crate::routes::Routes;
+use crate::situation::Situation;
+use skein_protocol::payload::{Arrivals, Assignment};
+use skein_protocol::{DroneId, ObstacleId};
+use std::collections::BTreeMap;
+
+/// The routes past an obstacle set, each member's trip along each of them, and the assignments that members already
+/// have. All lists are in the order of the members.
+pub(crate) struct Survey<'a> {
+    routes: Routes,
+    /// One trip per member and route.
+    trips: Vec<Vec<Trip>>,
+    kept: Vec<Option<&'a Assignment>>,
+}
+
+impl<'a> Survey<'a> {
+    /// Surveys a set. `None` if one of its obstacles is not known.
+    pub(crate) fn new(s: &Situation<'a>, set: &[ObstacleId]) -> Option<Self> {
+        let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
+        let before = s.ledger.sets().iter().find(|p| p.ids == *set);
+        let flight = Flight { speed_mps: s.params.speed_mps, course_y_m: s.params.course_y_m };
+        let member_trips = |m: &Member| trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight);
+        let trips: Vec<Vec<Trip>> = s.members.iter().map(member_trips).collect();
+        let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(m.id))).collect();
+        Some(Self { routes, trips, kept })
+    }
+
+    /// The same survey, with the assignments that members had at an earlier time.
+    pub(crate) fn with_kept(mut self, members: &[Member], kept: &'a BTreeMap<DroneId, Assignment>) -> Self {
+        self.kept = members.iter().map(|m| kept.get(&m.id)).collect();
+        self
+    }
+
+    /// The routes past the set.
+    pub(crate) fn routes(&self) -> &Routes {
+        &self.routes
+    }
+
+    /// The assignments that members already have for the set.
+    pub(crate) fn kept(&self) -> &[Option<&'a Assignment>] {
+        &self.kept
+    }
+
+    /// The places in queues that members already have.
+    pub(crate) fn kept_ranks(&self) -> Vec<Option<u16>> {
+        self.kept.iter().map(|part| part.map(|part| part.rank)).collect()
+    }
+
+    /// Time of each member to the gate along each route, s from now.
+    pub(crate) fn arrivals_s(&self) -> Vec<Vec<f64>> {
+        self.trips.iter().map(|trips| trips.iter().map(|trip| trip.arrival_s).collect()).collect()
+    }
+
+    /// Time of one member to the gate along one route, s from now.
+    pub(crate) fn arrival_s(&self, member: usize, route: usize) -> f64 {
+        self.trips[member][route].arrival_s
+    }
+
+    /// The route of a member that has no choice: it already flies one, or is past the gate, or joins a queue that is
+    /// already flying.
+    pub(crate) fn settled(&self, members: &[Member], i: usize) -> Option<usize> {
+        match self.kept[i] {
+            Some(part) if usize::from(part.route) < self.routes.count() => Some(usize::from(part.route)),
+            _ if members[i].position.x >= self.routes.gate_x_m() => Some(shortest(&self.trips[i])),
+            _ if self.kept.iter().any(Option::is_some) => Some(shortest(&self.trips[i])),
+            _ => None,
+        }
+    }
+
+    /// What other leaders are told about the members: one row per member.
+    pub(crate) fn rows(&self, s: &Situation<'_>, tag: u32) -> Vec<Arrivals> {
+        let row = |i: usize| {
+            let arrivals_s = self.open_arrivals_s(s.members, i);
+            plan_exchange::row(s.now, s.ballot, s.scope, s.members[i].id, tag, &arrivals_s)
+        };
+        (0..s.members.len()).map(row).collect()
+    }
+
+    /// Arrivals of a member, s from now. Infinite on all routes but the settled one, if there is one.
+    fn open_arrivals_s(&self, members: &[Member], i: usize) -> Vec<f64> {
+        let settled = self.settled(members, i);
+        let open = |route: usize| settled.is_none_or(|settled| settled == route);
+        let trips = self.trips[i].iter().enumerate();
+        trips.map(|(route, trip)| if open(route) { trip.arrival_s } else { f64::INFINITY }).collect()
+    }
+}
+
+/// The sets before `routes` that a member still has to leave, with its route past each.
+fn earlier_legs<'a>(ledger: &'a Ledger, member: &Member, routes: &Routes) -> Vec<(&'a Routes, usize)> {
+    let leg = |p: &'a PlannedSet| {
+        let route = usize::from(p.parts.get(member.id)?.route);
+        let ahead = p.routes.gate_x_m() < routes.gate_x_m() && member.position.x < p.routes.exit_x_m();
+        (ahead && route < p.routes.count()).then_some((&p.routes, route))
+    };
+    ledger.sets().iter().filter_map(leg).collect()
+}

@@ -1,0 +1,95 @@
+//! The tuned numbers of this crate. Limits that a type or a wire format imposes stand beside their types.
+//!
+//! "By hand" means that the value was chosen from watching single runs and that no sweep is on record. A number that was
+//! measured names the command that measures it again.
+
+// ---- Adaptive time-outs (`adaptive_timeout.rs`) ----
+
+/// Weight of a new gap in the running means of a source's gaps. No unit. 0.02. By hand.
+pub(crate) const GAP_WEIGHT: f64 = 0.02;
+/// Mean deviation that is assumed for a new source, as a multiple of its first gap. No unit. 1: that of a link which
+/// loses every other message. By calculation.
+pub(crate) const INITIAL_DEVIATION: f64 = 1.0;
+/// A silence is significant from this many mean deviations above the mean gap. No unit. 22: at 50 % loss that is 24
+/// periods, and one silence in ten million is as long. By calculation; `skein bench failover` measures what it costs.
+pub(crate) const TIMEOUT_DEVIATIONS: f64 = 22.0;
+/// Upper bound of an adaptive time-out, in base time-outs. No unit. 12. By hand; `skein bench failover`.
+pub(crate) const MAX_TIMEOUTS: f64 = 12.0;
+
+// ---- Peers (`peers.rs`) ----
+
+/// Weight of a new sample in the running mean of the message delay. No unit. 0.1. By hand.
+pub(crate) const DELAY_WEIGHT: f64 = 0.1;
+
+// ---- Elections (`election.rs`, `leading.rs`) ----
+
+/// Two signs of a leader that are closer than this part of its heartbeat period count as one. No unit. 0.75. By hand.
+pub(crate) const SAME_BEAT: f64 = 0.75;
+/// A drone that was restarted listens for this many leader time-outs before it claims. No unit. 4. By hand;
+/// `skein bench failover`.
+pub(crate) const NEWCOMER_TIMEOUTS: f64 = 4.0;
+/// A drone that its group's split left out waits for this many leader time-outs to be taken in. Then it claims its
+/// group. No unit. 4. By hand.
+pub(crate) const PARTED_TIMEOUTS: f64 = 4.0;
+/// Number of members that reject a pre-vote, besides the leader itself. 4. By hand: enough that one of them is heard.
+pub(crate) const MAX_REJECTIONS: usize = 4;
+/// A leader that has been last in the formation for this long transfers its leadership, s. 3. By hand.
+pub(crate) const BEHIND_S: f64 = 3.0;
+/// A drone that has had no assignment in its leader's newest plan for this long concludes that the leader does not hear
+/// it, s. 4. By hand.
+pub(crate) const LEFT_OUT_S: f64 = 4.0;
+
+// ---- Joint planning (`joint_planner.rs`, `plan_exchange.rs`, `planner.rs`) ----
+
+/// A leader waits this long for the arrivals of other groups and then plans alone, s. The message delay is added twice.
+/// 0.3. By hand; `skein reproduce`.
+pub(crate) const ARRIVALS_TIMEOUT_S: f64 = 0.3;
+/// A leader waits this long for the coordinator's choice, s. The message delay is added twice. 2: the coordinator's
+/// rollouts take one second. By hand; `skein reproduce`.
+pub(crate) const CHOICE_TIMEOUT_S: f64 = 2.0;
+/// The coordinator repeats its choice for this long, s. 1. By hand.
+pub(crate) const ANNOUNCE_S: f64 = 1.0;
+/// Assignments of a new plan may still be under way for this long, s. The message delay is added twice. 1. By hand.
+pub(crate) const ASSIGNMENTS_DUE_S: f64 = 1.0;
+/// While the coordinator runs its rollouts, all fly their shortest paths, or the paper's rule if that saves at least this
+/// share of the last drone's time. No unit. 0.2. Groups that meet before one set are close to it, and a second on the
+/// wrong path cannot be made up for. By hand; `skein reproduce`.
+pub(crate) const INTERIM_RULE_SAVING: f64 = 0.2;
+/// Most groupings that are handed to a rollout, the shortest paths and the rule's among them. 16. By hand: what a second
+/// of rollouts suffices for.
+pub(crate) const MAX_CANDIDATES: usize = 16;
+
+// ---- Formation (`formation_planner.rs`) ----
+
+/// Distance of slots from drones that hover dead, in safe distances. No unit. 1.05. By hand. The pilot's own paths keep
+/// a wider berth.
+pub(crate) const SLOT_BERTH: f64 = 1.05;
+/// Step by which the anchor moves on while a slot is blocked, m. 5. By hand.
+pub(crate) const ANCHOR_STEP_M: f64 = 5.0;
+/// A formation in which a drone cannot reach its slot is widened by this factor. No unit. 1.6. By hand.
+pub(crate) const OPEN_RANKS: f64 = 1.6;
+/// Below this speed a drone counts as stalled, m/s. 0.5. By hand.
+pub(crate) const STALLED_MPS: f64 = 0.5;
+/// A formation in which all drones have been stalled for this long is stuck, s. 3. By hand.
+pub(crate) const STALLED_S: f64 = 3.0;
+
+// ---- Paths (`funnel.rs`) ----
+
+/// Distance of a corridor's target behind the last set's exit, m. 60. By hand; `skein reproduce`.
+pub const RUN_OUT_M: f64 = 60.0;
+/// Least distance of a corridor's target ahead of the drone, m. 30. By hand.
+pub(crate) const LOOK_AHEAD_M: f64 = 30.0;
+
+// ---- Thin-plate matching (`tps.rs`), after Chui and Rangarajan, 2003 ----
+
+/// Initial temperature of the annealing, as a part of the greatest squared distance. No unit. 0.1. Hotter, all drones
+/// would be drawn to the centre, and the spline would forget where they are. By hand.
+pub(crate) const INITIAL_TEMPERATURE: f64 = 0.1;
+/// Final temperature, in the same unit. 1e-5. By hand.
+pub(crate) const FINAL_TEMPERATURE: f64 = 1e-5;
+/// Factor by which the temperature falls. No unit. 0.8. By hand.
+pub(crate) const COOLING: f64 = 0.8;
+/// Most Sinkhorn rounds at one temperature. 20. By hand.
+pub(crate) const SINKHORN_ROUNDS: usize = 20;
+/// Sinkhorn rounds end when no row's scale changes by more than this part of the temperature. No unit. 1e-3. By hand.
+pub(crate) const BALANCED: f64 = 1e-3;
