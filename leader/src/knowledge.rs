@@ -13,7 +13,7 @@ use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, ObstacleId, PlanStamp, SimTime, Vec2};
 
-/// What one drone knows of its swarm. The other parts of [`crate::leading::Leading`] read it.
+/// What one drone knows of its swarm. The other parts of `Leading` read it.
 #[derive(Clone, Debug)]
 pub(crate) struct Knowledge {
     me: DroneId,

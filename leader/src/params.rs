@@ -107,7 +107,7 @@ pub struct PlannerParams {
     pub debounce_s: f64,
 }
 
-/// What [`crate::leading::Leading`] needs to know before it starts.
+/// What `Leading` needs to know before it starts.
 #[derive(Clone, Debug)]
 pub struct LeadingParams {
     /// This drone.
