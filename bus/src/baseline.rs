@@ -1,60 +1,60 @@
-//! The naive floor that benches measure against: raw shared memory, one word that wakes everybody, one counter that
-//! the last one ends. No deaths, no deadlines, no services: nothing that a swarm needs.
+//! The baseline of `skein bench runtime`: raw shared memory, one word that wakes all processes, and one counter of missing
+//! answers. It does without deaths, deadlines and services, which a swarm needs.
 #![allow(unsafe_code)]
 
-use crate::control::{map, unmap};
 use crate::error::BusError;
-use crate::futex;
-use rustix::fs::{MemfdFlags, fstat, ftruncate, memfd_create};
+use crate::futex::{self, SLICE};
+use crate::segment::{Atomics, Segment, SharedArray, open_inherited};
 use skein_protocol::slot::Slot;
-use std::fs::OpenOptions;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
-use std::path::PathBuf;
-use std::ptr::NonNull;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
 
 const STOP: u32 = u32::MAX;
-const SLICE: Duration = Duration::from_millis(100);
 
 #[repr(C, align(128))]
+#[derive(Debug)]
 struct Words {
     tick: AtomicU32,
     /// Drones that have not answered.
     left: AtomicU32,
-    /// Processes that are there.
+    /// Processes that have attached and serve.
     here: AtomicU32,
     drones: u32,
     down_len: u32,
     read_len: u32,
 }
 
-/// A mapped floor.
+// SAFETY: the integers that are not atomics stay as they were when the segment was made; only the atomics change while
+// processes share it.
+unsafe impl Atomics for Words {}
+
+/// A mapped baseline.
 #[derive(Debug)]
 pub struct Baseline {
-    base: NonNull<u8>,
-    len: usize,
-    drones: usize,
-    down_len: usize,
+    words: SharedArray<Words>,
+    slots: SharedArray<Slot>,
+    /// What the world sends in a tick.
+    down: SharedArray<u8>,
     read_len: usize,
     memfd: Option<OwnedFd>,
 }
 
-fn len(drones: usize, down_len: usize) -> usize {
-    size_of::<Words>() + drones * size_of::<Slot>() + down_len
+const SLOTS: usize = size_of::<Words>();
+
+fn down_at(drones: usize) -> usize {
+    SLOTS + drones * size_of::<Slot>()
 }
 
 impl Baseline {
-    /// Makes it: `down_len` bytes go down in a tick, each drone reads `read_len` of them, a [`Slot`] of each comes up.
+    /// Makes a baseline. In each tick, the world writes `down_len` bytes, every drone reads `read_len` of them, and every
+    /// drone writes one [`Slot`].
     ///
     /// # Errors
     /// [`BusError::System`].
     pub fn create(drones: usize, down_len: usize, read_len: usize) -> Result<Self, BusError> {
-        let system = BusError::system;
-        let memfd = memfd_create("skein-floor", MemfdFlags::empty()).map_err(system("make the floor's segment"))?;
-        let len = len(drones, down_len);
-        ftruncate(&memfd, len as u64).map_err(system("size the floor's segment"))?;
-        let base = map(memfd.as_fd(), len)?;
+        let (segment, memfd) = Segment::create("skein-baseline", down_at(drones) + down_len)?;
+        let segment = Arc::new(segment);
         let words = Words {
             tick: AtomicU32::new(0),
             left: AtomicU32::new(0),
@@ -63,29 +63,34 @@ impl Baseline {
             down_len: down_len as u32,
             read_len: read_len.min(down_len) as u32,
         };
-        // SAFETY: the start of a fresh, page-aligned mapping that nobody else has yet.
-        unsafe { base.cast::<Words>().write(words) };
-        Ok(Self { base, len, drones, down_len, read_len: read_len.min(down_len), memfd: Some(memfd) })
+        // SAFETY: the pointer is aligned and into a new mapping, which no other process has yet.
+        unsafe { segment.array::<Words>(0, 1).pointer(0).write(words) };
+        Ok(Self { memfd: Some(memfd), ..Self::over(&segment, drones, down_len, read_len.min(down_len)) })
     }
 
-    /// Maps the floor whose descriptor was inherited under this number.
+    /// Maps the baseline whose descriptor was inherited under this number.
     ///
     /// # Errors
-    /// [`BusError::Io`], [`BusError::System`]; [`BusError::Control`] if it is none.
+    /// [`BusError::Io`], [`BusError::System`]; [`BusError::Control`] if the descriptor is not a baseline's.
     pub fn attach(fd: RawFd) -> Result<Self, BusError> {
-        let path = PathBuf::from(format!("/proc/self/fd/{fd}"));
-        let file = OpenOptions::new().read(true).write(true).open(&path).map_err(BusError::io("open", &path))?;
-        let size = fstat(&file).map_err(BusError::system("look at the floor's segment"))?.st_size as usize;
-        let wrong = || BusError::Control(format!("descriptor {fd} is no floor"));
-        if size < size_of::<Words>() {
+        let (file, size) = open_inherited(fd)?;
+        let wrong = || BusError::Control(format!("descriptor {fd} is not a baseline's"));
+        if size < SLOTS {
             return Err(wrong());
         }
-        let base = map(file.as_fd(), size)?;
-        let mut floor = Self { base, len: size, drones: 0, down_len: 0, read_len: 0, memfd: None };
-        let (drones, down_len, read_len) = (floor.words().drones, floor.words().down_len, floor.words().read_len);
-        (floor.drones, floor.down_len, floor.read_len) = (drones as usize, down_len as usize, read_len as usize);
-        let fits = len(floor.drones, floor.down_len) == size && read_len <= down_len;
-        if fits { Ok(floor) } else { Err(wrong()) }
+        let segment = Arc::new(Segment::map(file.as_fd(), size)?);
+        let words: SharedArray<Words> = segment.array(0, 1);
+        let Words { drones, down_len, read_len, .. } = words.get(0);
+        let (drones, down_len, read_len) = (*drones as usize, *down_len as usize, *read_len as usize);
+        if down_at(drones) + down_len != size || read_len > down_len {
+            return Err(wrong());
+        }
+        Ok(Self::over(&segment, drones, down_len, read_len))
+    }
+
+    fn over(segment: &Arc<Segment>, drones: usize, down_len: usize, read_len: usize) -> Self {
+        let (slots, down) = (segment.array(SLOTS, drones), segment.array(down_at(drones), down_len));
+        Self { words: segment.array(0, 1), slots, down, read_len, memfd: None }
     }
 
     /// Number of the descriptor to hand to children; `None` in a process that attached.
@@ -94,34 +99,23 @@ impl Baseline {
         self.memfd.as_ref().map(AsRawFd::as_raw_fd)
     }
 
-    fn words(&self) -> &Words {
-        // SAFETY: in the mapping, aligned, as long as `self`; its atomics alone change after it was made.
-        unsafe { self.base.cast::<Words>().as_ref() }
-    }
-
-    fn slots(&self) -> NonNull<Slot> {
-        // SAFETY: within the mapping.
-        unsafe { self.base.add(size_of::<Words>()).cast() }
-    }
-
-    fn down(&self) -> NonNull<u8> {
-        // SAFETY: within the mapping.
-        unsafe { self.slots().add(self.drones).cast() }
-    }
-
-    /// Processes that have said that they are there.
+    /// Number of processes that have attached and serve.
     #[must_use]
     pub fn here(&self) -> u32 {
-        self.words().here.load(Ordering::Acquire)
+        self.words.get(0).here.load(Ordering::Acquire)
     }
 
-    /// The world's part of tick `k`: copies `down`, wakes all, waits for all, reads all slots; the sum of what they say.
+    /// Tick `k`, world side: copies `down`, wakes all drones, waits for all of them and reads all slots. Returns the sum of
+    /// what the drones answered.
     pub fn tick(&self, k: u32, down: &[u8]) -> u64 {
-        let words = self.words();
-        let count = down.len().min(self.down_len);
-        // SAFETY: the drones read it only between the store of the tick word and their decrements.
-        unsafe { self.down().as_ptr().copy_from_nonoverlapping(down.as_ptr(), count) };
-        words.left.store(self.drones as u32, Ordering::SeqCst);
+        let words = self.words.get(0);
+        let count = down.len().min(self.down.count());
+        if count > 0 {
+            // SAFETY: `count` bytes are within both. The drones read them only between the store to the tick word and their
+            // decrements, and now all of them have decremented.
+            unsafe { self.down.pointer(0).as_ptr().copy_from_nonoverlapping(down.as_ptr(), count) };
+        }
+        words.left.store(self.slots.count() as u32, Ordering::SeqCst);
         words.tick.store(k + 1, Ordering::SeqCst);
         futex::wake_all(&words.tick);
         loop {
@@ -131,20 +125,23 @@ impl Baseline {
             }
             futex::wait(&words.left, left, SLICE);
         }
-        // SAFETY: every drone has written its slot before its decrement, and waits.
-        (0..self.drones).fold(0, |sum, i| unsafe { self.slots().add(i).read_volatile() }.frames_total.wrapping_add(sum))
+        // SAFETY: every drone has written its slot before its decrement, and now waits.
+        let answer = |drone| unsafe { self.slots.pointer(drone).read_volatile() }.frames_total;
+        (0..self.slots.count()).fold(0, |sum, drone| answer(drone).wrapping_add(sum))
     }
 
-    /// Ends it for all drones.
+    /// Ends the ticks for all drones.
     pub fn close(&self) {
-        self.words().tick.store(STOP, Ordering::SeqCst);
-        futex::wake_all(&self.words().tick);
+        let word = &self.words.get(0).tick;
+        word.store(STOP, Ordering::SeqCst);
+        futex::wake_all(word);
     }
 
-    /// A drone's part until it is closed, or `alive` says that nobody is there: reads its share of what goes down, writes its slot.
+    /// Drone side, until the baseline is closed or `alive` returns false: reads its part of what the world sent and writes
+    /// its slot.
     pub fn serve(&self, drone: usize, alive: impl Fn() -> bool) {
-        let words = self.words();
-        if drone >= self.drones {
+        let words = self.words.get(0);
+        if drone >= self.slots.count() {
             return;
         }
         words.here.fetch_add(1, Ordering::AcqRel);
@@ -162,24 +159,27 @@ impl Baseline {
                 continue;
             }
             last = seen;
-            // SAFETY: the world writes it only while no drone is at work.
-            let down = unsafe { std::slice::from_raw_parts(self.down().as_ptr(), self.down_len) };
-            let first = drone * 8 % (self.down_len - self.read_len + 1);
-            let words_of = down[first..first + self.read_len].chunks_exact(8);
-            let word = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
-            let sum = words_of.fold(0u64, |sum, bytes| word(bytes).wrapping_add(sum));
-            // SAFETY: this drone's own slot, and the world reads it only after the decrement.
-            unsafe { self.slots().add(drone).write_volatile(Slot { frames_total: sum, ..Slot::default() }) };
+            let frames_total = self.read(drone);
+            // SAFETY: the slot is this drone's own, and the world reads it only after the decrement.
+            unsafe { self.slots.pointer(drone).write_volatile(Slot { frames_total, ..Slot::default() }) };
             if words.left.fetch_sub(1, Ordering::SeqCst) == 1 {
                 futex::wake_all(&words.left);
             }
         }
     }
-}
 
-impl Drop for Baseline {
-    fn drop(&mut self) {
-        unmap(self.base, self.len);
+    /// The sum of the words that a drone reads in a tick.
+    fn read(&self, drone: usize) -> u64 {
+        if self.read_len == 0 {
+            return 0;
+        }
+        // SAFETY: the bytes are within the mapping, and the world writes them only while no drone is between the opening of
+        // a tick and its decrement; this one is.
+        let down = unsafe { std::slice::from_raw_parts(self.down.pointer(0).as_ptr(), self.down.count()) };
+        let first = drone * 8 % (down.len() - self.read_len + 1);
+        let words = down[first..first + self.read_len].chunks_exact(8);
+        let word = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
+        words.fold(0u64, |sum, bytes| word(bytes).wrapping_add(sum))
     }
 }
 
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_drone_reads_what_went_down() {
+    fn every_drone_reads_what_the_world_sent() {
         let world = Baseline::create(3, 16, 16).unwrap();
         std::thread::scope(|scope| {
             for drone in 0..3 {

@@ -1,60 +1,32 @@
-//! The control segment: a memfd that every process of a run maps. Wire and clock, not a message path.
+//! The control segment: a memfd that every process of a run maps. It carries the clock and the actuator slots; messages
+//! do not pass through it.
 //!
-//! Laid out as a header, the launcher's and the world's words, the world's hint, the order words, a tick word a core,
-//! then a block a drone: its words, a [`Slot`] and a [`LinkStats`]; each on cache lines of its own. What one process
-//! touches in a tick lies together: after a switch of processes every page of it costs a walk through cold tables.
+//! Layout: a header, the mission's and the world's words, the world's hint, the request words, one tick word per core,
+//! then one block per drone with its words, a [`Slot`] and a [`LinkStats`]. Each part has cache lines of its own.
 #![allow(unsafe_code)]
 
+use crate::barrier::{Barrier, Patience, TickOutcome};
+use crate::drone_block::{DroneBlock, DroneBlocks};
 use crate::error::BusError;
-use crate::stopwatch::{Mark, Stopwatch};
-use rustix::fs::{MemfdFlags, fstat, ftruncate, memfd_create};
-use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+use crate::mission::{MissionState, MissionWords, WorldState};
+use crate::process_request::{ProcessRequest, RequestChannel, RequestWords};
+use crate::segment::{Segment, open_inherited};
+use crate::spec::{ControlSpec, WaitMode};
+use crate::stopwatch::{CounterSpeed, Stopwatch};
+use crate::tick_word::PaddedWord;
+use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
-use std::fs::OpenOptions;
 use std::mem::offset_of;
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
-use std::path::PathBuf;
-use std::ptr::NonNull;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
-/// Raised with every change of the layout, and of `Slot` or `LinkStats`.
+/// Raised with every change of the layout, of `Slot` or of `LinkStats`.
 const LAYOUT: u32 = 5;
-/// Bound on drones and cores that an attached segment may announce.
-const MAX_COUNT: usize = 1 << 16;
-/// Looks before sleeping, if every process has a core of its own.
+/// Looks at a word before sleeping, if every process has a core of its own.
 const SPIN: u32 = 300;
-/// How long a wait lasts before it asks whether the other side still lives.
-pub(crate) const SLICE: Duration = Duration::from_millis(100);
-
-/// In a done word: the drone's process is dead. The other bits stay: they tell the last tick it answered.
-pub(crate) const DEAD: u32 = 1 << 31;
-/// In a tick word: the mission is over.
-pub(crate) const STOP: u32 = u32::MAX;
-
-/// How processes wait for each other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum WaitMode {
-    /// They sleep on a futex.
-    #[default]
-    Block,
-    /// They give up the core and look again: faster for few drones on a quiet machine, ruinous on a busy one.
-    Yield,
-}
-
-/// What a control segment is made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ControlSpec {
-    /// Number of drones, from 1.
-    pub drones: usize,
-    /// Number of tick words, from 1: the cores that drones are pinned to, 1 if they are not pinned.
-    pub cores: usize,
-    /// Drones in a process, from 1: those with ids from a multiple of it on. They share a tick word.
-    pub per_process: usize,
-    /// How processes wait.
-    pub wait: WaitMode,
-}
 
 #[repr(C, align(128))]
 struct Header {
@@ -67,102 +39,51 @@ struct Header {
     per_process: u32,
 }
 
+/// Words that the launcher and the world write.
 #[repr(C, align(128))]
-pub(crate) struct SharedWords {
-    pub(crate) go: AtomicU32,
-    pub(crate) stop: AtomicU32,
-    pub(crate) world_state: AtomicU32,
-    /// System calls of the barrier that the world has made.
-    pub(crate) calls: AtomicU64,
-    /// Nanoseconds a count of the processor's counter, the bits of an `f64`.
-    pub(crate) ns_per_count: AtomicU64,
-}
-
-#[repr(C, align(128))]
-pub(crate) struct OrderWords {
-    pub(crate) asked: AtomicU32,
-    pub(crate) kind: AtomicU32,
-    pub(crate) drone: AtomicU32,
-    pub(crate) tick: AtomicU32,
-    pub(crate) answered: AtomicU32,
-    pub(crate) reply: AtomicU32,
-}
-
-/// A word on cache lines of its own.
-#[repr(C, align(128))]
-pub(crate) struct PaddedWord(pub(crate) AtomicU32);
-
-#[repr(C, align(128))]
-pub(crate) struct DroneWords {
-    /// Last answered tick plus 1, and [`DEAD`].
-    pub(crate) done: AtomicU32,
-    /// First tick that it may answer.
-    pub(crate) resume_from: AtomicU32,
-    /// Incarnation of the process that is ready; 0 if none is.
-    pub(crate) ready: AtomicU32,
-    /// System calls of the barrier that it has made.
-    pub(crate) calls: AtomicU64,
-}
-
-/// What is one drone's.
-#[repr(C, align(128))]
-struct DroneBlock {
-    words: DroneWords,
-    slot: Slot,
-    stats: LinkStats,
-}
-
-/// Where the parts begin, bytes.
-#[derive(Clone, Copy, Debug)]
-struct Layout {
-    ticks: usize,
-    drones: usize,
-    end: usize,
+struct SharedWords {
+    mission: MissionWords,
+    /// System calls that the world has made for the barrier.
+    calls: AtomicU64,
+    /// Nanoseconds per count of the processor's counter: the bits of an `f64`.
+    ns_per_count: AtomicU64,
 }
 
 const SHARED: usize = size_of::<Header>();
 const HINT: usize = SHARED + size_of::<SharedWords>();
-const ORDERS: usize = HINT + size_of::<PaddedWord>();
-const ARRAYS: usize = ORDERS + size_of::<OrderWords>();
+const REQUESTS: usize = HINT + size_of::<PaddedWord>();
+const ARRAYS: usize = REQUESTS + size_of::<RequestWords>();
 
-impl Layout {
-    fn new(drones: usize, cores: usize) -> Self {
-        let blocks = ARRAYS + cores * size_of::<PaddedWord>();
-        Self { ticks: ARRAYS, drones: blocks, end: blocks + drones * size_of::<DroneBlock>() }
-    }
+/// Size of the segment, bytes.
+fn segment_len(spec: &ControlSpec) -> usize {
+    blocks_at(spec) + spec.drones * size_of::<DroneBlock>()
 }
 
-/// The mapped control segment.
+/// Where the drones' blocks begin, bytes.
+fn blocks_at(spec: &ControlSpec) -> usize {
+    ARRAYS + spec.cores * size_of::<PaddedWord>()
+}
+
+/// The mapped control segment: one object for every role in a run. Each method says which process calls it.
 #[derive(Debug)]
 pub struct Control {
-    base: NonNull<u8>,
-    layout: Layout,
     spec: ControlSpec,
-    spin: u32,
+    barrier: Barrier,
+    mission: MissionState,
+    requests: RequestChannel,
+    counter: CounterSpeed,
     /// The memfd, in the process that made it.
     memfd: Option<OwnedFd>,
-    /// When it was made, there, if there is a counter that tells.
-    made: Option<Mark>,
 }
 
-// SAFETY: the mapping stays until drop, and all shared access goes through atomics or through copies of slots and
-// statistics, which the done words order (see `barrier`).
-unsafe impl Send for Control {}
-// SAFETY: as above.
-unsafe impl Sync for Control {}
-
 impl Control {
-    /// Makes the segment: the launcher's part. Children inherit its descriptor, see [`Control::fd`].
+    /// Makes the segment. For the launcher; children inherit the descriptor, see [`Control::fd`].
     ///
     /// # Errors
-    /// [`BusError::Control`] for a number of drones or cores out of range, [`BusError::System`].
+    /// [`BusError::Control`] if a number of drones or cores is out of range, [`BusError::System`].
     pub fn create(spec: ControlSpec) -> Result<Self, BusError> {
-        check_counts(&spec)?;
-        let system = BusError::system;
-        let memfd = memfd_create("skein-control", MemfdFlags::empty()).map_err(system("make the control segment"))?;
-        let layout = Layout::new(spec.drones, spec.cores);
-        ftruncate(&memfd, layout.end as u64).map_err(system("size the control segment"))?;
-        let base = map(memfd.as_fd(), layout.end)?;
+        spec.check()?;
+        let (segment, memfd) = Segment::create("skein-control", segment_len(&spec))?;
         let header = Header {
             magic: MAGIC,
             layout: LAYOUT,
@@ -172,48 +93,63 @@ impl Control {
             spin: spin_for(spec.drones.div_ceil(spec.per_process)),
             per_process: spec.per_process as u32,
         };
-        let control = Self { base, layout, spec, spin: header.spin, memfd: Some(memfd), made: Mark::now() };
-        // SAFETY: `base` is the start of a fresh, page-aligned mapping that holds a header, and nobody else has it yet.
-        unsafe { base.cast::<Header>().write(header) };
-        Ok(control)
+        let spin = header.spin;
+        let segment = Arc::new(segment);
+        // SAFETY: the pointer is aligned and into a new mapping, which no other process has yet.
+        unsafe { segment.array::<Header>(0, 1).pointer(0).write(header) };
+        Ok(Self { memfd: Some(memfd), counter: counter(&segment).started(), ..Self::over(&segment, spec, spin) })
     }
 
-    /// Maps the segment whose descriptor was inherited under this number: everybody else's part.
+    /// Maps the segment whose descriptor was inherited under this number. For every process but the launcher.
     ///
     /// # Errors
     /// [`BusError::Io`] if there is no such descriptor, [`BusError::Control`] if it is not a control segment of this
     /// layout.
     pub fn attach(fd: RawFd) -> Result<Self, BusError> {
-        let path = PathBuf::from(format!("/proc/self/fd/{fd}"));
-        let file = OpenOptions::new().read(true).write(true).open(&path).map_err(BusError::io("open", &path))?;
-        let size = fstat(&file).map_err(BusError::system("look at the control segment"))?.st_size as usize;
+        let (file, size) = open_inherited(fd)?;
         let wrong = |why: String| Err(BusError::Control(format!("descriptor {fd} {why}")));
         if size < ARRAYS {
             return wrong(format!("holds {size} bytes, expected at least {ARRAYS}"));
         }
-        let base = map(file.as_fd(), ARRAYS)?;
-        // SAFETY: `base` starts a mapping of at least a header; its fields are integers, any value is valid.
-        let header = unsafe { base.cast::<Header>().read() };
-        unmap(base, ARRAYS);
+        let head = Arc::new(Segment::map(file.as_fd(), ARRAYS)?);
+        // SAFETY: the pointer is aligned and into the mapping, which `head` keeps. The fields are integers, for which every
+        // bit pattern is valid, and no process changes them after `create`.
+        let header = unsafe { head.array::<Header>(0, 1).pointer(0).read() };
         if (header.magic, header.layout) != (MAGIC, LAYOUT) {
             return wrong(format!(
                 "is not a control segment of layout {LAYOUT}; run launcher and children of one build"
             ));
         }
-        let wait = if header.wait == WaitMode::Yield as u32 { WaitMode::Yield } else { WaitMode::Block };
         let spec = ControlSpec {
             drones: header.drones as usize,
             cores: header.cores as usize,
             per_process: header.per_process as usize,
-            wait,
+            wait: if header.wait == WaitMode::Yield as u32 { WaitMode::Yield } else { WaitMode::Block },
         };
-        check_counts(&spec)?;
-        let layout = Layout::new(spec.drones, spec.cores);
-        if size != layout.end {
-            return wrong(format!("holds {size} bytes, expected {} for {} drones", layout.end, spec.drones));
+        spec.check()?;
+        let expected = segment_len(&spec);
+        if size != expected {
+            return wrong(format!("holds {size} bytes, expected {expected} for {} drones", spec.drones));
         }
-        let base = map(file.as_fd(), layout.end)?;
-        Ok(Self { base, layout, spec, spin: header.spin, memfd: None, made: None })
+        Ok(Self::over(&Arc::new(Segment::map(file.as_fd(), expected)?), spec, header.spin))
+    }
+
+    fn over(segment: &Arc<Segment>, spec: ControlSpec, spin: u32) -> Self {
+        let barrier = Barrier::new(
+            segment.array(ARRAYS, spec.cores),
+            segment.array(HINT, 1),
+            DroneBlocks::new(segment.array(blocks_at(&spec), spec.drones)),
+            segment.array(SHARED + offset_of!(SharedWords, calls), 1),
+            (spec.wait, spin),
+        );
+        Self {
+            spec,
+            barrier,
+            mission: MissionState::new(segment.array(SHARED + offset_of!(SharedWords, mission), 1)),
+            requests: RequestChannel::new(segment.array(REQUESTS, 1)),
+            counter: counter(segment),
+            memfd: None,
+        }
     }
 
     /// Number of the descriptor to hand to children; `None` in a process that attached.
@@ -228,130 +164,208 @@ impl Control {
         self.spec
     }
 
-    /// A copy of a drone's slot. It belongs to tick k if [`Control::wait_done`](crate::barrier) said `Done` for k and
-    /// k + 1 is not yet open.
-    #[must_use]
-    pub fn slot(&self, drone: usize) -> Slot {
-        // SAFETY: see `slot_at`; `Slot` is plain data, the copy is volatile since another process writes it.
-        unsafe { self.slot_at(drone).read_volatile() }
-    }
-
-    /// A copy of what a drone's radio has counted; exact while the drone waits for a tick or is dead.
-    #[must_use]
-    pub fn stats(&self, drone: usize) -> LinkStats {
-        // SAFETY: see `stats_at`; plain data, as above.
-        unsafe { self.stats_at(drone).read_volatile() }
-    }
-
-    /// System calls that the barrier has cost so far: the world's, and those of all drones.
-    #[must_use]
-    pub fn calls(&self) -> [u64; 2] {
-        let drones = (0..self.spec.drones).map(|drone| self.drone(drone).calls.load(Ordering::Relaxed)).sum();
-        [self.shared().calls.load(Ordering::Relaxed), drones]
-    }
-
-    /// What spans of a tick are measured by, once the launcher gave the go.
-    pub(crate) fn stopwatch(&self) -> Stopwatch {
-        Stopwatch::new(f64::from_bits(self.shared().ns_per_count.load(Ordering::Relaxed)))
-    }
-
-    /// The launcher's part: how fast the counter runs it knows from how long the start took.
-    pub(crate) fn gauge_counter(&self) {
-        let speed = self.made.map_or(0.0, |mark| mark.ns_per_count());
-        self.shared().ns_per_count.store(speed.to_bits(), Ordering::Relaxed);
-    }
-
-    /// The tick word's number that a drone waits on; it should be pinned to that core.
+    /// Number of the tick word that a drone waits on. The drone should be pinned to the core of this number.
     #[must_use]
     pub fn core_of(&self, drone: usize) -> usize {
-        drone / self.spec.per_process % self.spec.cores
+        self.spec.core_of(drone)
     }
 
-    pub(crate) fn slot_at(&self, drone: usize) -> NonNull<Slot> {
-        // SAFETY: a part of the block, which lies in the mapping.
-        unsafe { self.block(drone).byte_add(offset_of!(DroneBlock, slot)).cast() }
+    /// Opens tick `k` for all drones. For the world, which runs on core 0 and has already sent the downlink.
+    ///
+    /// # Errors
+    /// [`BusError::Control`] for a tick past 2³¹ − 2.
+    pub fn open_tick(&self, k: Tick) -> Result<(), BusError> {
+        self.barrier.open_tick(k)
     }
 
-    pub(crate) fn stats_at(&self, drone: usize) -> NonNull<LinkStats> {
-        // SAFETY: as in `slot_at`.
-        unsafe { self.block(drone).byte_add(offset_of!(DroneBlock, stats)).cast() }
+    /// Ends the mission for all drones. For the world, and for the launcher after the world's death.
+    pub fn close(&self) {
+        self.barrier.close();
     }
 
-    fn block(&self, drone: usize) -> NonNull<DroneBlock> {
-        self.element(self.layout.drones, drone, self.spec.drones)
+    /// Waits until every drone has answered tick `k`, is dead, or has used up the patience, and writes the result of each
+    /// to `answers`, one entry per drone. Entries that are [`TickOutcome::Absent`] stay as they are. Allocates nothing. For
+    /// the world.
+    ///
+    /// # Errors
+    /// [`BusError::Control`] for a tick past 2³¹ − 2, or if `answers` has not one entry per drone.
+    pub fn wait_done(&self, k: Tick, patience: Patience, answers: &mut [TickOutcome]) -> Result<(), BusError> {
+        self.barrier.wait_done(k, patience, answers)
     }
 
-    pub(crate) fn spin(&self) -> u32 {
-        self.spin
+    /// A copy of a drone's slot. It belongs to tick k if [`Control::wait_done`] returned `Done` for k and k + 1 is not yet
+    /// open.
+    #[must_use]
+    pub fn slot(&self, drone: usize) -> Slot {
+        self.barrier.slot(drone)
     }
 
-    pub(crate) fn shared(&self) -> &SharedWords {
-        // SAFETY: the words lie in the mapping, are aligned, live as long as `self`, and are only touched atomically.
-        unsafe { self.element(SHARED, 0, 1).as_ref() }
+    /// A copy of the counts of a drone's radio; exact while the drone waits for a tick or is dead.
+    #[must_use]
+    pub fn stats(&self, drone: usize) -> LinkStats {
+        self.barrier.stats(drone)
     }
 
-    /// Drone that the world sleeps on, plus 1; 0 if it does not sleep.
-    pub(crate) fn waiting(&self) -> &AtomicU32 {
-        // SAFETY: as in `shared`.
-        let word: &PaddedWord = unsafe { self.element(HINT, 0, 1).as_ref() };
-        &word.0
+    /// System calls that the barrier has cost so far: those of the world, and those of all drones.
+    #[must_use]
+    pub fn calls(&self) -> [u64; 2] {
+        self.barrier.calls()
     }
 
-    pub(crate) fn orders(&self) -> &OrderWords {
-        // SAFETY: as in `shared`.
-        unsafe { self.element(ORDERS, 0, 1).as_ref() }
+    /// Incarnation of the drone's process that is ready to fly; `None` while there is none.
+    #[must_use]
+    pub fn ready(&self, drone: usize) -> Option<u32> {
+        self.barrier.words(drone).ready()
     }
 
-    pub(crate) fn tick_word(&self, core: usize) -> &AtomicU32 {
-        // SAFETY: as in `shared`.
-        let word: &PaddedWord = unsafe { self.element(self.layout.ticks, core, self.spec.cores).as_ref() };
-        &word.0
+    /// Marks a drone whose process is gone (reaped) as dead, and wakes the world if it waits for the drone. For the
+    /// supervisor.
+    pub fn mark_dead(&self, drone: usize) {
+        self.barrier.words(drone).mark_dead();
     }
 
-    pub(crate) fn drone(&self, drone: usize) -> &DroneWords {
-        // SAFETY: as in `shared`; the words are the block's first part.
-        unsafe { self.block(drone).cast::<DroneWords>().as_ref() }
+    /// Whether a drone's process is marked as dead.
+    #[must_use]
+    pub fn is_dead(&self, drone: usize) -> bool {
+        self.barrier.words(drone).is_dead()
     }
 
-    /// Element `index` of the array of `count` at `start`: in the mapping, and aligned, since every part is a multiple
-    /// of the alignment of those after it.
-    fn element<T>(&self, start: usize, index: usize, count: usize) -> NonNull<T> {
-        assert!(index < count, "number {index} is not below {count}");
-        // SAFETY: `start + count * size_of::<T>()` is within the mapping by construction of `Layout`.
-        unsafe { self.base.byte_add(start + index * size_of::<T>()).cast() }
+    /// Removes the mark before a new process is started, which answers from tick `from` on. Until then the world counts
+    /// the drone as [`TickOutcome::Absent`]. For the supervisor.
+    pub fn revive(&self, drone: usize, from: Tick) {
+        self.barrier.words(drone).revive(from);
+    }
+
+    /// Keeps a drone from reading or answering any tick; to be called before SIGSTOP. From then on the world counts the
+    /// drone as [`TickOutcome::Absent`].
+    pub fn freeze(&self, drone: usize) {
+        self.barrier.words(drone).freeze();
+    }
+
+    /// Sets the first tick that a drone may read and answer; to be called before SIGCONT.
+    pub fn set_resume_from(&self, drone: usize, from: Tick) {
+        self.barrier.words(drone).set_resume_from(from);
+    }
+
+    /// Lets the world begin. For the launcher.
+    pub fn give_go(&self) {
+        self.counter.measure();
+        self.mission.give_go();
+    }
+
+    /// Waits for the launcher's go. False if `alive`, asked every 100 ms, returned false, or if a stop was requested. For
+    /// the world.
+    pub fn wait_go(&self, alive: impl FnMut() -> bool) -> bool {
+        self.mission.wait_go(alive)
+    }
+
+    /// Asks the world to end the mission after the current tick. The launcher chooses `reason`, not 0: for example, a
+    /// signal's number.
+    pub fn request_stop(&self, reason: u32) {
+        self.mission.request_stop(reason);
+    }
+
+    /// The reason, if a stop was requested.
+    #[must_use]
+    pub fn stop_requested(&self) -> Option<u32> {
+        self.mission.stop_requested()
+    }
+
+    /// Tells the launcher what the world is doing. For the world.
+    pub fn set_world_state(&self, state: WorldState) {
+        self.mission.set_world_state(state);
+    }
+
+    /// What the world is doing.
+    #[must_use]
+    pub fn world_state(&self) -> WorldState {
+        self.mission.world_state()
+    }
+
+    /// Makes a request and waits, at most `limit`, until the supervisor has carried it out; the supervisor's reply. One
+    /// request at a time. For the world.
+    ///
+    /// # Errors
+    /// [`BusError::NoAnswer`].
+    pub fn request(&self, request: ProcessRequest, limit: Duration) -> Result<u32, BusError> {
+        self.requests.request(request, limit)
+    }
+
+    /// Waits at most `limit` for a request that is not yet answered. For the supervisor.
+    #[must_use]
+    pub fn next_request(&self, limit: Duration) -> Option<ProcessRequest> {
+        self.requests.next(limit)
+    }
+
+    /// Reports that the request is carried out; the world gets `reply`. For the supervisor.
+    pub fn answer_request(&self, reply: u32) {
+        self.requests.answer(reply);
+    }
+
+    pub(crate) fn barrier(&self) -> &Barrier {
+        &self.barrier
+    }
+
+    /// The stopwatch for spans within a tick, once the launcher gave the go.
+    pub(crate) fn stopwatch(&self) -> Stopwatch {
+        self.counter.stopwatch()
     }
 }
 
-impl Drop for Control {
-    fn drop(&mut self) {
-        unmap(self.base, self.layout.end);
-    }
+fn counter(segment: &Arc<Segment>) -> CounterSpeed {
+    CounterSpeed::new(segment.array(SHARED + offset_of!(SharedWords, ns_per_count), 1))
 }
 
-fn check_counts(spec: &ControlSpec) -> Result<(), BusError> {
-    let ControlSpec { drones, cores, per_process, .. } = *spec;
-    if [drones, cores, per_process].iter().all(|count| (1..=MAX_COUNT).contains(count)) {
-        return Ok(());
-    }
-    let counts = format!("{drones}, {cores} and {per_process}");
-    Err(BusError::Control(format!("expected 1 to {MAX_COUNT} drones, cores and drones a process, not {counts}")))
-}
-
-/// Spinning pays only while the world and all drones have a core of their own. Asked by the launcher, before anybody is
-/// pinned and sees but one core.
+/// Spinning pays only while the world and all drones have a core of their own. To be called in the launcher before any
+/// process is pinned: a pinned one sees only one core.
 fn spin_for(drones: usize) -> u32 {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     if drones < cores { SPIN } else { 0 }
 }
 
-pub(crate) fn map(fd: BorrowedFd<'_>, len: usize) -> Result<NonNull<u8>, BusError> {
-    // SAFETY: a fresh mapping at an address of the kernel's choice touches no other memory.
-    let base = unsafe { mmap(std::ptr::null_mut(), len, ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED, fd, 0) };
-    let base = base.map_err(BusError::system("map the control segment"))?;
-    NonNull::new(base.cast()).ok_or_else(|| BusError::Control("was mapped at address 0".to_owned()))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process_request::RequestKind;
+    use skein_protocol::DroneId;
 
-pub(crate) fn unmap(base: NonNull<u8>, len: usize) {
-    // SAFETY: the callers made this mapping with this length, and drop every pointer into it. It cannot fail for that.
-    let _ = unsafe { munmap(base.as_ptr().cast(), len) };
+    fn control() -> Control {
+        Control::create(ControlSpec { drones: 2, cores: 1, per_process: 1, wait: WaitMode::Block }).unwrap()
+    }
+
+    #[test]
+    fn a_request_is_carried_out_once_and_answered() {
+        let launcher = control();
+        let world = Control::attach(launcher.fd().unwrap()).unwrap();
+        let restart = ProcessRequest { kind: RequestKind::Restart, drone: DroneId(1), tick: 70 };
+        let supervisor = std::thread::spawn(move || {
+            let mut seen = Vec::new();
+            while seen.len() < 2 {
+                if let Some(request) = launcher.next_request(Duration::from_millis(50)) {
+                    seen.push(request);
+                    launcher.answer_request(seen.len() as u32 + 6);
+                }
+            }
+            assert_eq!(launcher.next_request(Duration::ZERO), None);
+            seen
+        });
+        assert_eq!(world.request(restart, Duration::from_secs(5)).unwrap(), 7);
+        let kill = ProcessRequest { kind: RequestKind::Kill, ..restart };
+        assert_eq!(world.request(kill, Duration::from_secs(5)).unwrap(), 8);
+        assert_eq!(supervisor.join().unwrap(), [restart, kill]);
+    }
+
+    #[test]
+    fn without_a_supervisor_the_world_gives_up_after_the_limit() {
+        let kill = ProcessRequest { kind: RequestKind::Kill, drone: DroneId(0), tick: 3 };
+        let error = control().request(kill, Duration::from_millis(20)).unwrap_err();
+        assert!(matches!(error, BusError::NoAnswer { .. }), "{error}");
+    }
+
+    #[test]
+    fn the_layout_is_that_of_its_number() {
+        assert_eq!((SHARED, HINT, REQUESTS, ARRAYS), (128, 256, 384, 512));
+        assert_eq!(offset_of!(SharedWords, calls), 16);
+        assert_eq!(offset_of!(SharedWords, ns_per_count), 24);
+    }
 }

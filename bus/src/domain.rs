@@ -1,4 +1,4 @@
-//! Where a run's shared things live: one folder a run, a lock its launcher holds, a prefix of its own in shared memory.
+//! Where a run keeps its shared files: a folder, a lock that the launcher holds, and a prefix of its own in shared memory.
 
 use crate::error::BusError;
 use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
@@ -12,28 +12,28 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Where POSIX shared memory has its names.
+/// Where POSIX shared memory has its files.
 const SHARED_MEMORY: &str = "/dev/shm";
-/// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher lives.
+/// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher is alive.
 const LOCK: &str = "lock";
-/// So often the root is made anew because somebody took it away meanwhile.
+/// Maximum number of attempts to make the root, which another process may remove at any time.
 const MAX_TRIES: u32 = 100;
-/// Longest path of a run's folder, bytes: iceoryx2 appends up to 140 to it and allows 255.
+/// Maximum length of the path of a run's folder, bytes: iceoryx2 appends up to 140 bytes and allows 255.
 const MAX_FOLDER: usize = 112;
-/// Longest label that is kept, bytes.
+/// Maximum length of a label, bytes; the rest is cut.
 const MAX_LABEL: usize = 24;
 
-/// A run's place: a folder, and a prefix in shared memory.
+/// The domain of a run: a folder, and a prefix in shared memory. No other run sees its services.
 #[derive(Debug)]
 pub struct Domain {
     path: PathBuf,
     prefix: String,
     config: Config,
-    /// Held by the launcher alone, for its life; the system lets go of it however the launcher ends.
+    /// Held by the launcher as long as it is alive; the system releases it however the launcher ends.
     lock: Option<File>,
 }
 
-/// What a cleaning removed.
+/// What [`clean`] removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cleaned {
     /// Folders of dead runs.
@@ -42,31 +42,29 @@ pub struct Cleaned {
     pub files: usize,
 }
 
-/// The folder of all runs of this user, which is there as long as one of them is: `$XDG_RUNTIME_DIR/skein`, else `/dev/shm/skein-<uid>`. Mode 0700,
-/// owned by this user. In memory: a run makes a dozen files a drone, and on a disk that is most of what a start costs.
-///
-/// # Errors
-/// [`BusError::Folder`] if somebody else owns it or others may enter it.
-pub fn root() -> Result<PathBuf, BusError> {
+/// The folder of all runs of this user: `$XDG_RUNTIME_DIR/skein`, or `/dev/shm/skein-<uid>` if that variable is not set.
+/// It has mode 0700, belongs to this user, and exists while at least one run does. It is in memory because a run makes a
+/// dozen files per drone; on a disk, they would dominate the time of a start.
+#[must_use]
+pub fn root() -> PathBuf {
     let uid = rustix::process::geteuid().as_raw();
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|dir| dir.is_absolute());
     let own = |dir: &PathBuf| fs::metadata(dir).is_ok_and(|meta| meta.is_dir() && meta.uid() == uid);
-    let root = match runtime.filter(own) {
+    match runtime.filter(own) {
         Some(dir) => dir.join("skein"),
         None => Path::new(SHARED_MEMORY).join(format!("skein-{uid}")),
-    };
-    Ok(root)
+    }
 }
 
-/// Removes what dead runs of this user left behind, and nothing else. Safe beside living runs and other cleanings.
+/// Removes what dead runs of this user left behind, and nothing else. Safe while other runs fly and other processes clean.
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
 pub fn clean() -> Result<Cleaned, BusError> {
-    clean_in(&root()?)
+    clean_in(&root())
 }
 
-/// [`clean`], with another root.
+/// As [`clean`], with another root.
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
@@ -74,8 +72,8 @@ pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
     let guard = lock_root(root)?;
     let mut cleaned = Cleaned::default();
     for (path, prefix) in runs(root)? {
-        // The lock is held until the folder is gone. A run without a lock file died before it had one: those who make
-        // runs hold the root's lock meanwhile, as we do now.
+        // The lock is held until the folder is gone. A run without a lock file died before it had one: a launcher holds the
+        // root's lock, which this process holds now, until its run has a lock file.
         let Some(_lock) = take_lock(&path.join(LOCK))? else { continue };
         cleaned.files += remove_run(&path, &prefix)?;
         cleaned.runs += 1;
@@ -84,15 +82,15 @@ pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
     Ok(cleaned)
 }
 
-/// Folders of this user's living runs, to [`Domain::join`].
+/// Folders of this user's living runs, for [`Domain::join`].
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
 pub fn living() -> Result<Vec<PathBuf>, BusError> {
-    living_in(&root()?)
+    living_in(&root())
 }
 
-/// [`living`], with another root.
+/// As [`living`], with another root.
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
@@ -109,15 +107,15 @@ pub fn living_in(root: &Path) -> Result<Vec<PathBuf>, BusError> {
 }
 
 impl Domain {
-    /// Makes a folder for a new run and locks it: the launcher's part. `label` is for people, in the folder's name.
+    /// Makes a folder for a new run and locks it. For the launcher. `label` becomes part of the folder's name, for people.
     ///
     /// # Errors
     /// [`BusError::Io`], [`BusError::Folder`].
     pub fn create(label: &str) -> Result<Self, BusError> {
-        Self::create_in(&root()?, label)
+        Self::create_in(&root(), label)
     }
 
-    /// [`Domain::create`], with another root.
+    /// As [`Domain::create`], with another root.
     ///
     /// # Errors
     /// [`BusError::Io`], [`BusError::Folder`].
@@ -132,7 +130,7 @@ impl Domain {
         Ok(Self { path, prefix, config, lock: Some(lock) })
     }
 
-    /// Joins the run in this folder: everybody else's part. Leaves it alone when dropped.
+    /// Joins the run in this folder. For every process but the launcher. Dropping it removes nothing.
     ///
     /// # Errors
     /// [`BusError::Folder`] if it is not a run's folder of this user.
@@ -148,7 +146,7 @@ impl Domain {
         &self.path
     }
 
-    /// What the run's names in shared memory begin with.
+    /// Prefix of the run's names in shared memory.
     #[must_use]
     pub fn prefix(&self) -> &str {
         &self.prefix
@@ -160,12 +158,12 @@ impl Domain {
 }
 
 impl Drop for Domain {
-    /// The launcher removes the run: its children are dead by then. The lock goes last.
+    /// In the launcher: removes the run, whose children are dead by then. The lock is released last.
     fn drop(&mut self) {
         if self.lock.is_none() {
             return;
         }
-        // Beside a cleaning, each would trip over what the other removes.
+        // Without the root's lock, this and a cleaning would fail over files that the other has removed.
         let root = self.path.parent().unwrap_or(Path::new("/"));
         let guard = lock_root(root);
         if let Err(error) = remove_run(&self.path, &self.prefix) {
@@ -177,7 +175,7 @@ impl Drop for Domain {
     }
 }
 
-/// `<pid>_<time>_<count>`: unique, and never the beginning of another one once a `_` follows.
+/// `<pid>_<time>_<count>`: unique, and with a `_` appended never the beginning of another tag.
 fn unique_tag() -> String {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -208,11 +206,11 @@ fn settings(path: &Path) -> Result<(String, Config), BusError> {
     global.prefix =
         FileName::new(prefix.as_bytes()).map_err(|_| folder("its name has characters that are not plain"))?;
     global.set_root_path(&IoxPath::new(bytes).map_err(|_| folder("its path has characters that are not plain"))?);
-    // Scans make start-up quadratic in the number of drones; `clean_dead_nodes` does it once, before a restart.
+    // These scans would make the start quadratic in the number of drones; `clean_dead_nodes` scans once, before a restart.
     global.service.cleanup_dead_nodes_on_open = false;
     global.node.cleanup_dead_nodes_on_creation = false;
     global.node.cleanup_dead_nodes_on_destruction = false;
-    // A thousand processes that start on two cores keep each other waiting for longer than the default of a second.
+    // A thousand processes that start on two cores delay each other by more than the default of one second.
     global.creation_timeout = Duration::from_secs(10);
     Ok((prefix, config))
 }
@@ -224,7 +222,7 @@ fn private_folder(path: &Path) -> Result<(), BusError> {
     }
 }
 
-/// A real folder (no link), of this user, closed to others.
+/// Checks that the path is a folder (no link) of this user that other users may not enter.
 fn check_private(path: &Path) -> Result<(), BusError> {
     let meta = fs::symlink_metadata(path).map_err(BusError::io("look at", path))?;
     let uid = rustix::process::geteuid().as_raw();
@@ -265,18 +263,18 @@ fn lock_root(root: &Path) -> Result<File, BusError> {
     }
 }
 
-/// Takes the root away if nothing but its lock is in it, so that nothing stays in memory; lets go of the lock. Who waits for it
-/// finds that it is gone, and makes a new one.
+/// Removes the root if it holds nothing but its lock, so that nothing stays in memory, and releases the lock. A process
+/// that waits for the lock finds that the root is gone and makes a new one.
 fn leave(root: &Path, lock: File) {
     let only_lock = |entries: fs::ReadDir| entries.flatten().all(|entry| entry.file_name() == LOCK);
     if fs::read_dir(root).is_ok_and(only_lock) {
-        // Whatever is left is in nobody's way.
+        // If this fails, the files that stay do no harm.
         let _ = fs::remove_file(root.join(LOCK)).and_then(|()| fs::remove_dir(root));
     }
     drop(lock);
 }
 
-/// The lock of a dead run; `None` if its launcher lives. The caller holds the root's lock.
+/// The lock of a dead run; `None` if its launcher is alive. The caller holds the root's lock.
 fn take_lock(path: &Path) -> Result<Option<File>, BusError> {
     let lock = open_lock(path)?;
     match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
@@ -286,7 +284,7 @@ fn take_lock(path: &Path) -> Result<Option<File>, BusError> {
     }
 }
 
-/// Folders of runs and their prefixes.
+/// The folders of all runs, and their prefixes.
 fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root).map_err(BusError::io("list", root))? {
@@ -303,7 +301,7 @@ fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
     Ok(found)
 }
 
-/// Removes a run's files in shared memory, then its folder: if it is cut short, the folder still tells the prefix.
+/// Removes a run's files in shared memory, then its folder. If this is interrupted, the folder still tells the prefix.
 fn remove_run(path: &Path, prefix: &str) -> Result<usize, BusError> {
     let shared = Path::new(SHARED_MEMORY);
     let uid = rustix::process::geteuid().as_raw();
@@ -323,7 +321,7 @@ fn begins_with(name: &OsStr, prefix: &str) -> bool {
     name.as_bytes().starts_with(prefix.as_bytes())
 }
 
-/// Somebody was faster: what we want is so.
+/// Success also if the file was already gone.
 fn gone(result: std::io::Result<()>) -> std::io::Result<()> {
     match result {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),

@@ -1,20 +1,20 @@
-//! What can go wrong between processes.
+//! Errors of the bus.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why the bus failed: what, where, and what to try.
+/// Why the bus failed, where, and what to try.
 #[derive(Debug, Error)]
 pub enum BusError {
-    /// The operating system refused something.
+    /// The operating system refused a file operation.
     #[error("cannot {what} {}: {source}", path.display())]
     Io {
         /// What was tried, as a verb.
         what: &'static str,
-        /// On what.
+        /// The file or folder.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
     /// A folder of the domain is not what it must be.
@@ -28,22 +28,22 @@ pub enum BusError {
     /// The control segment is not what it must be.
     #[error("control segment: {0}")]
     Control(String),
-    /// The operating system refused something that has no path.
+    /// The operating system refused a call that has no path.
     #[error("cannot {what}: {source}")]
     System {
         /// What was tried, as a verb.
         what: &'static str,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
     /// A node, service or port could not be made or opened.
     #[error("cannot {what} `{service}`: {cause}; {hint}")]
     Service {
-        /// What was tried, as a verb and a kind of port.
+        /// What was tried: a verb and a kind of port.
         what: &'static str,
         /// Name of the service or node.
         service: String,
-        /// iceoryx2's name for it.
+        /// iceoryx2's error.
         cause: String,
         /// What to try.
         hint: &'static str,
@@ -55,12 +55,13 @@ pub enum BusError {
         what: &'static str,
         /// Name of the service.
         service: String,
-        /// iceoryx2's name for it.
+        /// iceoryx2's error.
         cause: String,
         /// What to try.
         hint: &'static str,
     },
-    /// A port lost, or never got, its connection to another one: samples would be lost without a word. For good.
+    /// A port lost its connection to another port or never had one, so that samples would be lost silently. Every later call
+    /// on the port fails, too.
     #[error(
         "a connection of `{service}` could not be made or is corrupted, samples are lost; raise the limit of open files (`ulimit -n`) or free space in /dev/shm"
     )]
@@ -74,12 +75,12 @@ pub enum BusError {
         /// Name of the service.
         service: String,
     },
-    /// The peer at the other end of the control segment is gone.
-    #[error("nobody answered within {limit_s} s: {what}")]
+    /// The other side did not answer.
+    #[error("no answer within {limit_s} s: {what}")]
     NoAnswer {
-        /// What was asked.
+        /// What was requested.
         what: String,
-        /// How long was waited, s.
+        /// Time waited, s.
         limit_s: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! What a process asks of its machine: a core of its own, and enough file descriptors.
+//! What a process needs from its machine: a core, and enough file descriptors.
 
 use crate::error::BusError;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -7,10 +7,10 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 /// Whether processes are pinned to cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PinMode {
-    /// Process i runs on core i modulo the number of cores that it may use.
+    /// Process i runs on core i modulo the number of cores it may use.
     #[default]
     Auto,
-    /// The system's scheduler decides.
+    /// The system's scheduler chooses the cores.
     Off,
 }
 
@@ -22,8 +22,8 @@ pub fn allowed_cores() -> Result<usize, BusError> {
     Ok(cores(&affinity()?).count())
 }
 
-/// Pins the calling thread, and the threads and processes it starts from now on, to core `index` modulo the cores that
-/// it may use. Nothing with [`PinMode::Off`].
+/// Pins the calling thread, and the threads and processes that it starts from now on, to core `index` modulo the number
+/// of cores it may use. Does nothing with [`PinMode::Off`].
 ///
 /// # Errors
 /// [`BusError::System`].
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pinned_to_one_of_the_allowed_cores() {
+    fn a_pinned_thread_has_one_of_the_allowed_cores() {
         std::thread::spawn(|| {
             let before = allowed_cores().unwrap();
             pin_to_core(5, PinMode::Off).unwrap();
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn the_soft_limit_becomes_the_hard_one() {
+    fn the_soft_limit_is_raised_to_the_hard_limit() {
         let limit = raise_file_limit().unwrap();
         let now = getrlimit(Resource::Nofile);
         assert_eq!(now.current, now.maximum);

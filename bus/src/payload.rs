@@ -1,19 +1,19 @@
-//! What crosses in iceoryx2 samples. Every layout has a name with a version: a service is refused to whoever comes with
-//! another one.
+//! Layouts of iceoryx2 samples. Every layout has a name with a version; a process with another version cannot open the
+//! service.
 #![allow(unsafe_code)]
 
 use iceoryx2::prelude::ZeroCopySend;
 use skein_protocol::frame::Frame;
 use std::fmt;
 
-// The names below carry the version of the protocol's payloads: raise both together. Senses and records have changed
-// once more than what drones say.
+// The names below carry the version of the protocol's payloads: raise both together. Downlinks and records have changed
+// once more than frames.
 const _: () = assert!(skein_protocol::payload::VERSION == 2);
 
-/// Eight bytes of a byte stream; which stream is told by the type.
+/// Eight bytes of a byte stream. The type tells the streams apart.
 ///
 /// # Safety
-/// Only for `repr(transparent)` wrappers of `u64`.
+/// The type is a `repr(transparent)` wrapper of `u64`.
 pub unsafe trait Word: ZeroCopySend + fmt::Debug + Copy + 'static {}
 
 /// Eight bytes of a downlink.
@@ -26,31 +26,31 @@ pub struct DownWord(u64);
 #[derive(Clone, Copy, Debug)]
 pub struct RecordWord(u64);
 
-// SAFETY: an integer, self-contained and of one layout.
+// SAFETY: a `repr(transparent)` integer: it has no pointers, and the same layout in every process.
 unsafe impl ZeroCopySend for DownWord {
     unsafe fn type_name() -> &'static str {
         "skein.downlink.v3"
     }
 }
 
-// SAFETY: an integer, self-contained and of one layout.
+// SAFETY: a `repr(transparent)` integer: it has no pointers, and the same layout in every process.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
         "skein.record.v3"
     }
 }
 
-// SAFETY: transparent over u64.
+// SAFETY: `repr(transparent)` over `u64`.
 unsafe impl Word for DownWord {}
-// SAFETY: transparent over u64.
+// SAFETY: `repr(transparent)` over `u64`.
 unsafe impl Word for RecordWord {}
 
-/// A frame as it is published; `Frame` itself belongs to a crate that knows no iceoryx2.
+/// A frame as it is published. `Frame` itself belongs to a crate that does not know iceoryx2.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug)]
 pub struct WireFrame(pub(crate) Frame);
 
-// SAFETY: `Frame` is plain `repr(C)` data without padding or pointers.
+// SAFETY: transparent over `Frame`, which is plain `repr(C)` data without padding or pointers.
 unsafe impl ZeroCopySend for WireFrame {
     unsafe fn type_name() -> &'static str {
         "skein.frame.v2"

@@ -1,20 +1,20 @@
-//! Ports: what a process holds to send and receive.
+//! Ports: the objects by which a process sends and receives.
 //!
-//! A subscriber is joined to a publisher when each has looked for the other: in its next `send` or `receive`, or in
-//! `connect`. Until then a publisher's samples wait in the subscriber's buffer, what does not fit is lost without an
-//! error, and if the publisher goes all is lost. So: everybody makes ports, then everybody calls `connect`, then the
-//! mission begins; and publishers stay until their last sample is received.
+//! A subscriber is connected to a publisher once each has looked for the other: in its next `send` or `receive`, or in
+//! `connect`. Until then, the publisher's samples wait in the subscriber's buffer. Samples that do not fit are lost without
+//! an error, and if the publisher ends, all are lost. Therefore: all processes make their ports, then all call `connect`,
+//! then the mission begins; and a publisher stays until its last sample is received.
 #![allow(unsafe_code)]
 
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame, Word};
-use crate::services::Factory;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{LoanError, ReceiveError, SendError};
 use iceoryx2::prelude::{PortFactory as _, ZeroCopySend, ipc};
 use iceoryx2::sample::Sample;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use skein_protocol::Tick;
 use skein_protocol::frame::Frame;
 use std::fmt::Debug;
@@ -22,23 +22,27 @@ use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What the world sends in a tick, to all drones.
+/// Sends the downlink of a tick from the world to all drones.
 pub type DownlinkPublisher = StreamPublisher<DownWord>;
-/// What a drone hears the world by.
+/// Receives the downlink, in a drone or an observer.
 pub type DownlinkSubscriber = StreamSubscriber<DownWord>;
-/// What the recorder and observers hear the world by.
+/// Receives the record, in the recorder or an observer.
 pub type RecordSubscriber = StreamSubscriber<RecordWord>;
 
 /// What the world does when the recorder's buffer is full.
 pub enum RecordPolicy {
-    /// Waits for the recorder as long as the function says that it lives: for lockstep.
+    /// Waits for the recorder as long as the function returns true (the recorder is alive). For lockstep.
     Wait(Box<dyn Fn() -> bool + Send>),
-    /// Drops the sample and counts it, see [`RecordPublisher::dropped`]: for the wall clock.
+    /// Drops the sample and counts it, see [`RecordPublisher::dropped`]. For the wall clock.
     Drop,
 }
 
-/// Set by the degradation handlers. Without them iceoryx2 loses samples with no error, at the latest when the limit of
-/// open files is reached; and even with them it tells only once, and not while a port is made.
+/// An open service of `P` with the user header `H`.
+pub(crate) type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
+
+/// Whether a port has lost a connection. The degradation handlers set it: without them, iceoryx2 loses samples without an
+/// error, at the latest when the limit of open files is reached. Even with them, it reports the loss only once, and not
+/// while a port is made.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Health(Arc<AtomicBool>);
 
@@ -71,13 +75,13 @@ impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + Default> Sende
             .map_err(|error| self.transfer("connect", error.to_string(), "raise the limit of open files (`ulimit -n`)"))
     }
 
-    /// Loans `len` elements, has them filled in place, and sends; the number of receivers.
+    /// Loans `len` elements, lets `fill` write them in place, and sends them. Returns the number of receivers.
     fn send(&self, header: H, len: usize, fill: impl FnOnce(&mut [MaybeUninit<P>])) -> Result<usize, BusError> {
         self.health.check(&self.service)?;
         let mut sample = self.port.loan_slice_uninit(len).map_err(|error| self.refused(error))?;
         *sample.user_header_mut() = header;
         fill(sample.payload_mut());
-        // SAFETY: `P` is plain data without invalid values, and the memory is a mapped file: every byte has a value.
+        // SAFETY: `P` is plain data without invalid values, and the memory is a mapped file, where every byte has a value.
         let sent = unsafe { sample.assume_init() }.send();
         self.health.check(&self.service)?;
         sent.map_err(|error| match error {
@@ -130,23 +134,24 @@ impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug> Receiver<P, H> 
 pub struct StreamPublisher<W: Word>(pub(crate) Sender<W, StreamHeader>);
 
 impl<W: Word> StreamPublisher<W> {
-    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    /// Connects to the ports at the other end, see [`crate::ports`]. Otherwise the next call does so, within a tick.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn connect(&self) -> Result<(), BusError> {
         self.0.connect()
     }
 
-    /// Loans `byte_len` bytes (8-aligned), has `fill` write them in place, and sends them under `tick`. What `fill`
-    /// leaves alone holds old bytes. Returns the number of receivers.
+    /// Loans `byte_len` bytes (8-aligned), lets `fill` write them in place, and sends them under `tick`. Bytes that `fill`
+    /// does not write keep old values. Returns the number of receivers.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn send(&self, tick: Tick, byte_len: usize, fill: impl FnOnce(&mut [u8])) -> Result<usize, BusError> {
         let header = StreamHeader { tick, byte_len: byte_len as u64 };
         self.0.send(header, byte_len.div_ceil(size_of::<u64>()), |words| {
-            // SAFETY: a `Word` is eight plain bytes, all of which have a value in the mapped file they lie in.
+            // SAFETY: a `Word` is eight plain bytes, and in a mapped file every byte has a value. The slice covers the loaned
+            // words, which are borrowed mutably.
             let bytes = unsafe { std::slice::from_raw_parts_mut(words.as_mut_ptr().cast::<u8>(), size_of_val(words)) };
             bytes[byte_len..].fill(0);
             fill(&mut bytes[..byte_len]);
@@ -159,24 +164,24 @@ impl<W: Word> StreamPublisher<W> {
 pub struct StreamSubscriber<W: Word>(pub(crate) Receiver<W, StreamHeader>);
 
 impl<W: Word> StreamSubscriber<W> {
-    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    /// Connects to the ports at the other end, see [`crate::ports`]. Otherwise the next call does so, within a tick.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn connect(&self) -> Result<(), BusError> {
         self.0.connect()
     }
 
-    /// The oldest sample not yet received. At most two are held at a time; drop what is read.
+    /// The oldest sample that is not yet received. A subscriber can hold two samples at a time: drop what is read.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn receive(&self) -> Result<Option<StreamSample<W>>, BusError> {
         Ok(self.0.receive()?.map(StreamSample))
     }
 
-    /// The sample of this tick; older ones are dropped, and so is a newer one, for which `None` is said as if there
-    /// were none.
+    /// The sample of this tick. Older samples are dropped. If the next one is newer, it is dropped too, and the result is
+    /// `None`.
     ///
     /// # Errors
     /// As [`StreamSubscriber::receive`].
@@ -190,7 +195,7 @@ impl<W: Word> StreamSubscriber<W> {
     }
 }
 
-/// A received byte stream, read in place; given back when dropped.
+/// A received byte stream, read in place and returned to the publisher when dropped.
 pub struct StreamSample<W: Word>(Sample<ipc::Service, [W], StreamHeader>);
 
 impl<W: Word> StreamSample<W> {
@@ -204,10 +209,11 @@ impl<W: Word> StreamSample<W> {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         let words = self.0.payload();
-        // Another process wrote the length: never beyond the payload.
+        // Another process wrote the length, so it is limited to the payload.
         let len = usize::try_from(self.0.user_header().byte_len)
             .map_or(size_of_val(words), |len| len.min(size_of_val(words)));
-        // SAFETY: a `Word` is eight plain bytes, and the sample is ours until dropped.
+        // SAFETY: a `Word` is eight plain bytes, `len` is at most the size of the payload, and the publisher does not write the
+        // sample before it is dropped.
         unsafe { std::slice::from_raw_parts(words.as_ptr().cast::<u8>(), len) }
     }
 }
@@ -217,56 +223,57 @@ impl<W: Word> StreamSample<W> {
 pub struct UplinkPublisher(pub(crate) Sender<WireFrame, UplinkHeader>);
 
 impl UplinkPublisher {
-    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    /// Connects to the ports at the other end, see [`crate::ports`]. Otherwise the next call does so, within a tick.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn connect(&self) -> Result<(), BusError> {
         self.0.connect()
     }
 
-    /// Loans `count` frames, has `fill` write them all in place, and sends them. At most once a tick.
+    /// Loans `count` frames, lets `fill` write them all in place, and sends them. To be called at most once per tick.
     ///
     /// # Errors
-    /// [`BusError::Full`] if the world has not drained the eight samples before, [`BusError::Degraded`] for good once a
+    /// [`BusError::Full`] if the world has not received the eight samples before, [`BusError::Degraded`] for good once a
     /// connection failed, [`BusError::Transfer`].
     pub fn send(&self, header: UplinkHeader, count: usize, fill: impl FnOnce(&mut [Frame])) -> Result<(), BusError> {
         self.0.send(header, count, |frames| {
-            // SAFETY: `WireFrame` is transparent over `Frame`, which is plain data; every byte has a value in the file.
+            // SAFETY: `WireFrame` is transparent over `Frame`, which is plain data, and in a mapped file every byte has a value.
+            // The slice covers the loaned frames, which are borrowed mutably.
             fill(unsafe { std::slice::from_raw_parts_mut(frames.as_mut_ptr().cast::<Frame>(), frames.len()) });
         })?;
         Ok(())
     }
 }
 
-/// Receives the frames of a shard's drones: the world's.
+/// Receives the frames of a shard's drones, in the world.
 #[derive(Debug)]
 pub struct UplinkSubscriber(pub(crate) Receiver<WireFrame, UplinkHeader>);
 
 impl UplinkSubscriber {
-    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    /// Connects to the ports at the other end, see [`crate::ports`]. Otherwise the next call does so, within a tick.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn connect(&self) -> Result<(), BusError> {
         self.0.connect()
     }
 
-    /// The next sample of any drone of the shard, each drone's in order. To be called as often as samples are expected:
-    /// each call looks through the shard's drones from the first.
+    /// The next sample of any drone of the shard; the samples of one drone are in order. Call it as often as samples are
+    /// expected: each call looks through the shard's drones from the first one on.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn receive(&self) -> Result<Option<UplinkSample>, BusError> {
         Ok(self.0.receive()?.map(UplinkSample))
     }
 }
 
-/// Frames of one drone and tick, read in place; given back when dropped.
+/// Frames of one drone and tick, read in place and returned to the publisher when dropped.
 pub struct UplinkSample(Sample<ipc::Service, [WireFrame], UplinkHeader>);
 
 impl UplinkSample {
-    /// Who sent them, and when.
+    /// The source and the tick.
     #[must_use]
     pub fn header(&self) -> UplinkHeader {
         *self.0.user_header()
@@ -276,12 +283,12 @@ impl UplinkSample {
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
         let frames = self.0.payload();
-        // SAFETY: `WireFrame` is transparent over `Frame`.
+        // SAFETY: `WireFrame` is transparent over `Frame`; the publisher does not write the sample before it is dropped.
         unsafe { std::slice::from_raw_parts(frames.as_ptr().cast::<Frame>(), frames.len()) }
     }
 }
 
-/// Sends the record.
+/// Sends the record to the recorder.
 #[derive(Debug)]
 pub struct RecordPublisher {
     pub(crate) stream: StreamPublisher<RecordWord>,
@@ -289,15 +296,15 @@ pub struct RecordPublisher {
 }
 
 impl RecordPublisher {
-    /// Looks for the ports at the other end, see [`crate::ports`]; else the next call does, in the midst of a tick.
+    /// Connects to the ports at the other end, see [`crate::ports`]. Otherwise the next call does so, within a tick.
     ///
     /// # Errors
-    /// [`BusError::Degraded`] for good once a connection failed, [`BusError::Transfer`].
+    /// [`BusError::Degraded`] from the first failed connection on, [`BusError::Transfer`].
     pub fn connect(&self) -> Result<(), BusError> {
         self.stream.connect()
     }
 
-    /// As [`StreamPublisher::send`]; waits for the recorder or not, by the policy.
+    /// As [`StreamPublisher::send`]. Whether it waits for the recorder depends on the policy.
     ///
     /// # Errors
     /// As [`StreamPublisher::send`].
@@ -305,7 +312,7 @@ impl RecordPublisher {
         self.stream.send(tick, byte_len, fill)
     }
 
-    /// Samples that the recorder has missed because its buffer was full.
+    /// Number of samples that were dropped because the recorder's buffer was full.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
@@ -320,13 +327,13 @@ pub struct WatchPublisher {
 }
 
 impl WatchPublisher {
-    /// Whether anybody watches; asked in every tick, so that a run nobody watches pays nothing.
+    /// Whether at least one observer watches. Asked in every tick, so that a run without observers sends nothing.
     #[must_use]
     pub fn watched(&self) -> bool {
         self.service.dynamic_config().number_of_subscribers() > 0
     }
 
-    /// As [`StreamPublisher::send`]; never waits.
+    /// As [`StreamPublisher::send`]. It never waits.
     ///
     /// # Errors
     /// As [`StreamPublisher::send`].

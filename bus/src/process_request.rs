@@ -1,48 +1,71 @@
 //! What the world asks of the supervisor at an exact tick: to kill, freeze, resume or restart a drone's process.
+#![allow(unsafe_code)]
 
-use crate::control::{Control, SLICE};
 use crate::error::BusError;
-use crate::futex;
+use crate::futex::{self, SLICE};
+use crate::segment::{Atomics, SharedArray};
 use skein_protocol::{DroneId, Tick};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-/// What is to be done to a drone's process.
+/// What the supervisor is to do to a drone's process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum RequestKind {
-    /// SIGKILL, and reap it.
+    /// Send SIGKILL, and reap the process.
     Kill = 1,
-    /// SIGSTOP.
+    /// Send SIGSTOP.
     Freeze = 2,
-    /// SIGCONT.
+    /// Send SIGCONT.
     Resume = 3,
-    /// A new process for a dead one.
+    /// Start a new process for a dead one.
     Restart = 4,
 }
 
-/// One order.
+/// One request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProcessRequest {
-    /// What.
+    /// What to do.
     pub kind: RequestKind,
-    /// To whom.
+    /// The drone.
     pub drone: DroneId,
-    /// In which tick; for [`RequestKind::Resume`] and [`RequestKind::Restart`], the first tick it is to answer.
+    /// The tick of the request. For [`RequestKind::Resume`] and [`RequestKind::Restart`]: the first tick that the drone is
+    /// to answer.
     pub tick: Tick,
 }
 
-impl Control {
-    /// The world's part: gives an order and waits, at most `limit`, until the supervisor has carried it out. The value
-    /// is the supervisor's reply. One order at a time.
-    ///
-    /// # Errors
-    /// [`BusError::NoAnswer`].
-    pub fn give_order(&self, order: ProcessRequest, limit: Duration) -> Result<u32, BusError> {
-        let words = self.orders();
-        words.kind.store(order.kind as u32, Ordering::Relaxed);
-        words.drone.store(order.drone.0, Ordering::Relaxed);
-        words.tick.store(u32::try_from(order.tick).unwrap_or(u32::MAX), Ordering::Relaxed);
+/// The shared words.
+#[repr(C, align(128))]
+#[derive(Debug)]
+pub(crate) struct RequestWords {
+    /// Number of the last request.
+    asked: AtomicU32,
+    kind: AtomicU32,
+    drone: AtomicU32,
+    tick: AtomicU32,
+    /// Number of the last request that was carried out.
+    answered: AtomicU32,
+    reply: AtomicU32,
+}
+
+// SAFETY: atomics and padding.
+unsafe impl Atomics for RequestWords {}
+
+/// The channel between the world and the supervisor. It holds one request at a time.
+#[derive(Debug)]
+pub(crate) struct RequestChannel(SharedArray<RequestWords>);
+
+impl RequestChannel {
+    pub(crate) fn new(words: SharedArray<RequestWords>) -> Self {
+        Self(words)
+    }
+
+    /// See [`crate::Control::request`].
+    pub(crate) fn request(&self, request: ProcessRequest, limit: Duration) -> Result<u32, BusError> {
+        let words = self.0.get(0);
+        words.kind.store(request.kind as u32, Ordering::Relaxed);
+        words.drone.store(request.drone.0, Ordering::Relaxed);
+        words.tick.store(u32::try_from(request.tick).unwrap_or(u32::MAX), Ordering::Relaxed);
         let number = words.asked.load(Ordering::Relaxed).wrapping_add(1);
         words.asked.store(number, Ordering::Release);
         futex::wake_all(&words.asked);
@@ -54,16 +77,15 @@ impl Control {
             }
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                return Err(BusError::NoAnswer { what: format!("{order:?}"), limit_s: limit.as_secs_f64() });
+                return Err(BusError::NoAnswer { what: format!("{request:?}"), limit_s: limit.as_secs_f64() });
             }
             futex::wait(&words.answered, answered, left.min(SLICE));
         }
     }
 
-    /// The supervisor's part: waits at most `limit` for an order that is not yet answered.
-    #[must_use]
-    pub fn next_order(&self, limit: Duration) -> Option<ProcessRequest> {
-        let words = self.orders();
+    /// See [`crate::Control::next_request`].
+    pub(crate) fn next(&self, limit: Duration) -> Option<ProcessRequest> {
+        let words = self.0.get(0);
         let answered = words.answered.load(Ordering::Relaxed);
         let mut asked = words.asked.load(Ordering::Acquire);
         if asked == answered {
@@ -83,50 +105,11 @@ impl Control {
         Some(ProcessRequest { kind, drone: DroneId(words.drone.load(Ordering::Relaxed)), tick })
     }
 
-    /// The supervisor's part: the order is carried out. `reply` is handed to the world.
-    pub fn answer_order(&self, reply: u32) {
-        let words = self.orders();
+    /// See [`crate::Control::answer_request`].
+    pub(crate) fn answer(&self, reply: u32) {
+        let words = self.0.get(0);
         words.reply.store(reply, Ordering::Relaxed);
         words.answered.store(words.asked.load(Ordering::Relaxed), Ordering::Release);
         futex::wake_all(&words.answered);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::control::{ControlSpec, WaitMode};
-
-    fn control() -> Control {
-        Control::create(ControlSpec { drones: 2, cores: 1, per_process: 1, wait: WaitMode::Block }).unwrap()
-    }
-
-    #[test]
-    fn an_order_is_carried_out_once_and_answered() {
-        let launcher = control();
-        let world = Control::attach(launcher.fd().unwrap()).unwrap();
-        let order = ProcessRequest { kind: RequestKind::Restart, drone: DroneId(1), tick: 70 };
-        let supervisor = std::thread::spawn(move || {
-            let mut seen = Vec::new();
-            while seen.len() < 2 {
-                if let Some(order) = launcher.next_order(Duration::from_millis(50)) {
-                    seen.push(order);
-                    launcher.answer_order(seen.len() as u32 + 6);
-                }
-            }
-            assert_eq!(launcher.next_order(Duration::ZERO), None);
-            seen
-        });
-        assert_eq!(world.give_order(order, Duration::from_secs(5)).unwrap(), 7);
-        let kill = ProcessRequest { kind: RequestKind::Kill, ..order };
-        assert_eq!(world.give_order(kill, Duration::from_secs(5)).unwrap(), 8);
-        assert_eq!(supervisor.join().unwrap(), [order, kill]);
-    }
-
-    #[test]
-    fn without_a_supervisor_the_world_does_not_wait_for_ever() {
-        let order = ProcessRequest { kind: RequestKind::Kill, drone: DroneId(0), tick: 3 };
-        let error = control().give_order(order, Duration::from_millis(20)).unwrap_err();
-        assert!(matches!(error, BusError::NoAnswer { .. }), "{error}");
     }
 }

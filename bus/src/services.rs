@@ -1,11 +1,11 @@
-//! The run's services: made by the launcher with every limit set, opened by everybody else.
+//! The run's services: the launcher makes them and sets every limit; all other processes open them.
 
 use crate::domain::Domain;
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame};
 use crate::ports::{
-    DownlinkPublisher, DownlinkSubscriber, Health, Receiver, RecordPolicy, RecordPublisher, RecordSubscriber, Sender,
-    StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber, WatchPublisher,
+    DownlinkPublisher, DownlinkSubscriber, Factory, Health, Receiver, RecordPolicy, RecordPublisher, RecordSubscriber,
+    Sender, StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber, WatchPublisher,
 };
 use iceoryx2::port::{BackpressureAction, BackpressureInfo, DegradationAction};
 use iceoryx2::prelude::{
@@ -13,45 +13,43 @@ use iceoryx2::prelude::{
     PortFactory as _, ServiceName, SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use skein_protocol::downlink::{DownlinkHeader, SensesHeader};
 use skein_protocol::record::{DroneRow, RecordHeader};
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Drones on one uplink service: draining is quadratic in the number of its publishers.
+/// Drones per uplink service. Receiving takes time quadratic in the number of a service's publishers.
 pub const SHARD_DRONES: usize = 32;
 
-/// Free places a service, for restarted drones whose dead node is not yet cleaned, and for observers.
+/// Spare places per service, for restarted drones whose dead node is not yet cleaned, and for observers.
 const SPARE: usize = 4;
-/// Samples that wait in a subscriber's buffer.
+/// Size of a subscriber's buffer, samples.
 const BUFFER: usize = 8;
-/// An observer's buffer: a second at 50 Hz and more.
+/// Size of an observer's buffer, samples: more than a second at 50 Hz.
 const WATCH_BUFFER: usize = 64;
-/// The recorder's buffer, in records and in rows of records: it looks every millisecond, and a few drones that yield
-/// make a hundred ticks in that.
+/// Size of the recorder's buffer: least and greatest number of records. It looks every millisecond; in this time, a few
+/// drones that wait by yielding fly a hundred ticks.
 const RECORD_BUFFER: [usize; 2] = [64, 512];
+/// Size of the recorder's buffer, rows of records.
 const RECORD_ROWS: usize = 8192;
-/// Samples that a subscriber holds at a time.
+/// Samples that a subscriber can hold at a time.
 const BORROWED: usize = 2;
-/// Chunks of the downlink's data segment beside those in the buffers, which all hold the same newest samples. If more
-/// were needed iceoryx2 0.10 would make a segment larger than its own counters cover, and panic: so many subscribers may
-/// have died or been frozen while each held an older sample. Its own worst case is gigabytes at 1000 drones. Services
-/// that do not overflow get that worst case, since their buffers hold different samples.
+/// Chunks of the downlink's data segment in addition to those in the buffers, which all hold the same newest samples. So
+/// many subscribers may have died or been frozen while each held an older sample. If more were needed, iceoryx2 0.10 would
+/// make a segment that is larger than its own counters cover, and panic. Its own worst case is gigabytes at 1000 drones.
+/// Services that do not overflow get that worst case, because their buffers hold different samples.
 const HELD_CHUNKS: usize = 120;
-/// Frames that an uplink sample has room for before its segment grows.
+/// Frames that fit into an uplink sample before its segment grows.
 const UPLINK_FRAMES: usize = 16;
-/// Room for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
+/// Space for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
 const DOWNLINK_ROOM: usize = 448;
-/// Observers at a time.
+/// Maximum number of observers at a time.
 const OBSERVERS: usize = 8;
 
 const DOWNLINK: &str = "skein/downlink";
 const RECORD: &str = "skein/record";
 const WATCH: &str = "skein/watch";
-
-pub(crate) type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
 
 /// Limits of one service.
 #[derive(Clone, Copy)]
@@ -63,13 +61,13 @@ struct Limits {
     overflow: bool,
 }
 
-/// The services of a run, as one process sees them. Its ports stay on the thread that made them. In the launcher, to be
-/// dropped, ports included, before the [`Domain`], which removes their files.
+/// The services of a run, as one process sees them. Its ports must stay on the thread that made them. In the launcher, the
+/// services and their ports must be dropped before the [`Domain`], which removes their files.
 #[derive(Debug)]
 pub struct Services {
     node: Node<ipc::Service>,
     drones: usize,
-    /// A service lives as long as somebody has it open: the launcher, all its life.
+    /// In the launcher: keeps all services open. A service exists as long as at least one process has it open.
     _kept: Option<Kept>,
 }
 
@@ -88,8 +86,8 @@ pub fn shards(drones: usize) -> usize {
 }
 
 impl Services {
-    /// Makes all services of a run: the launcher's part. Of `drones` drones `per_process` share a process, and its
-    /// uplink. `name` is the node's, for people.
+    /// Makes all services of a run. For the launcher. `per_process` drones share a process and its uplink. `name` is the
+    /// node's name, for people.
     ///
     /// # Errors
     /// [`BusError::Service`].
@@ -106,7 +104,7 @@ impl Services {
         Ok(Self { node, drones, _kept: Some(kept) })
     }
 
-    /// Joins the run's services: everybody else's part. Each is opened with its first port.
+    /// Joins the run's services. For every process but the launcher. Each service is opened with its first port.
     ///
     /// # Errors
     /// [`BusError::Service`].
@@ -114,7 +112,7 @@ impl Services {
         Ok(Self { node: node(domain, name)?, drones, _kept: None })
     }
 
-    /// The world's: senses and air.
+    /// Sends senses and frames. For the world.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -124,8 +122,8 @@ impl Services {
         Ok(StreamPublisher(self.sender(DOWNLINK, room, |_| BackpressureAction::DiscardData)?))
     }
 
-    /// A drone's, or an observer's. A subscriber hears what is sent after it was made, and never holds up the world: if
-    /// its buffer of eight is full it loses the oldest.
+    /// Receives senses and frames. For a drone or an observer. It gets the samples that are sent after it was made and never
+    /// delays the world: if its buffer of eight is full, it loses the oldest sample.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -133,7 +131,7 @@ impl Services {
         Ok(StreamSubscriber(self.receiver(DOWNLINK)?))
     }
 
-    /// A drone's.
+    /// Sends frames. For a drone.
     ///
     /// # Errors
     /// [`BusError::Service`], also for a drone that is not in the swarm; [`BusError::Degraded`].
@@ -142,8 +140,8 @@ impl Services {
         Ok(UplinkPublisher(self.sender(&name, UPLINK_FRAMES, |_| BackpressureAction::DiscardDataAndFail)?))
     }
 
-    /// The world's, one a shard, see [`shards`]. Nobody else's: a reader that does not drain makes the drones' sends
-    /// fail. Observers find all frames on the downlink.
+    /// Receives frames. For the world, one per shard, see [`shards`]. Not for observers: if a subscriber does not receive, the
+    /// drones' sends fail. Observers find all frames in the downlink.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -151,7 +149,7 @@ impl Services {
         Ok(UplinkSubscriber(self.receiver(&uplink_name(shard))?))
     }
 
-    /// The world's.
+    /// Sends the record. For the world.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -161,7 +159,7 @@ impl Services {
         Ok(RecordPublisher { stream: StreamPublisher(self.sender(RECORD, self.record_room(), handler)?), dropped })
     }
 
-    /// The recorder's: the launcher's, and nobody else's, since the world may wait for it.
+    /// Receives the record. For the recorder in the launcher only, because the world may wait for it.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -169,7 +167,7 @@ impl Services {
         Ok(StreamSubscriber(self.receiver(RECORD)?))
     }
 
-    /// The world's, for observers.
+    /// Sends the record to observers. For the world.
     ///
     /// # Errors
     /// [`BusError::Service`], [`BusError::Degraded`].
@@ -188,13 +186,13 @@ impl Services {
         Ok(StreamSubscriber(self.receiver(WATCH)?))
     }
 
-    /// Words of a record without many frames.
+    /// Number of words in a record with few frames.
     fn record_room(&self) -> usize {
         (size_of::<RecordHeader>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>()
     }
 
-    /// Opens a service and makes a publisher whose first segment has `room` elements a sample. `on_full` says what
-    /// happens when a subscriber's buffer is full, unless the service overflows.
+    /// Opens a service and makes a publisher. Its first segment has `room` elements per sample. `on_full` decides what to do
+    /// when a subscriber's buffer is full, unless the service overflows.
     fn sender<P, H, F>(&self, name: &str, room: usize, on_full: F) -> Result<Sender<P, H>, BusError>
     where
         P: ZeroCopySend + Debug + 'static,
@@ -261,14 +259,14 @@ fn downlink_limits(drones: usize) -> Limits {
     Limits { publishers: 1 + 1, subscribers, nodes: subscribers + 2, buffer: BUFFER, overflow: true }
 }
 
-/// A second subscriber is for a second world; observers have no business here.
+/// The second subscriber is for a second world; observers do not subscribe here.
 fn uplink_limits(per_process: usize) -> Limits {
     let publishers = SHARD_DRONES + SPARE;
     let buffer = BUFFER * per_process.clamp(1, SHARD_DRONES);
     Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer, overflow: false }
 }
 
-/// A second subscriber is for a second launcher.
+/// The second subscriber is for a second launcher.
 fn record_limits(drones: usize) -> Limits {
     let buffer = (RECORD_ROWS / drones.max(1)).clamp(RECORD_BUFFER[0], RECORD_BUFFER[1]);
     Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer, overflow: false }
@@ -278,7 +276,7 @@ fn watch_limits() -> Limits {
     Limits { publishers: 1 + 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: WATCH_BUFFER, overflow: true }
 }
 
-/// What happens when the recorder's buffer is full.
+/// Decides what to do when the recorder's buffer is full.
 fn record_handler(policy: RecordPolicy, dropped: Arc<AtomicU64>) -> impl Fn(&BackpressureInfo) -> BackpressureAction {
     move |_| match &policy {
         RecordPolicy::Wait(alive) if alive() => BackpressureAction::Retry,
@@ -336,7 +334,7 @@ fn failed<E: Display>(what: &'static str, service: &str) -> impl FnOnce(E) -> Bu
 fn hint(cause: &str) -> &'static str {
     let hints = [
         ("IncompatibleTypes", "its payload has another type or version: use one build for launcher and children"),
-        ("DoesNotExist", "the run has no such service: is its launcher still alive, is the drone of this swarm?"),
+        ("DoesNotExist", "the run has no such service: is its launcher still alive, and is the drone in this swarm?"),
         ("Exceeds", "all its places are taken: clean dead nodes before a restart, close observers"),
         ("AlreadyExists", "it belongs to a running swarm: use a domain of its own"),
     ];
@@ -344,17 +342,17 @@ fn hint(cause: &str) -> &'static str {
     known.map_or("see the limit of open files (`ulimit -n`) and the free space in /dev/shm", |(_, hint)| hint)
 }
 
-/// What became of the nodes of dead processes.
+/// Result of [`clean_dead_nodes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeadNodes {
-    /// Cleaned: their places are free again.
+    /// Nodes that were removed; their places are free again.
     pub removed: usize,
-    /// Could not be cleaned; perhaps another process was at it.
+    /// Nodes that could not be removed, perhaps because another process was removing them.
     pub failed: usize,
 }
 
-/// Gives back what processes killed in this run had: to be called before a drone is restarted, outside of a tick (2 to
-/// 130 ms).
+/// Frees the resources of processes that were killed in this run. To be called before a drone is restarted, between two
+/// ticks; it takes 2 to 130 ms.
 ///
 /// # Errors
 /// [`BusError::Service`].

@@ -213,7 +213,7 @@ impl Supervisor<'_, '_, '_> {
     /// What the world asks for in a tick. The reply to a restart is the new incarnation, to all else 1; 0 if there is no
     /// such process.
     fn carry_out_orders(&mut self) {
-        let Some(ProcessRequest { kind, drone, tick }) = self.control.next_order(Duration::ZERO) else { return };
+        let Some(ProcessRequest { kind, drone, tick }) = self.control.next_request(Duration::ZERO) else { return };
         let reply = match kind {
             RequestKind::Kill => u32::from(self.kill(drone)),
             RequestKind::Freeze => {
@@ -229,7 +229,7 @@ impl Supervisor<'_, '_, '_> {
                 0
             }),
         };
-        self.control.answer_order(reply);
+        self.control.answer_request(reply);
     }
 
     fn kill(&mut self, drone: DroneId) -> bool {

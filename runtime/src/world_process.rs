@@ -155,7 +155,7 @@ impl WorldServer {
             ProcessCommand::Restart(id, _) => (RequestKind::Restart, id),
         };
         let limit = if kind == RequestKind::Restart { RESTART_LIMIT } else { ORDER_LIMIT };
-        let reply = self.control.give_order(ProcessRequest { kind, drone: id, tick: self.world.tick() }, limit)?;
+        let reply = self.control.request(ProcessRequest { kind, drone: id, tick: self.world.tick() }, limit)?;
         let drone = id.index();
         match order {
             // Whoever is gone already is as dead as can be.
@@ -191,7 +191,7 @@ impl WorldServer {
                 TickOutcome::Dead => self.mark_dead(drone),
                 TickOutcome::Hung => {
                     let order = ProcessRequest { kind: RequestKind::Kill, drone: id, tick: self.world.tick() };
-                    self.control.give_order(order, ORDER_LIMIT)?;
+                    self.control.request(order, ORDER_LIMIT)?;
                     self.world.mark_dead(id, FaultKind::Hung, false, "it did not answer for 5 s and was killed");
                 }
                 // Stopped, and killed by somebody else meanwhile.
