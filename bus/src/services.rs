@@ -177,8 +177,8 @@ impl Services {
         Ok(WatchPublisher { stream, service })
     }
 
-    /// An observer's: the record of each tick from now on. It never holds up the world: if its buffer of 64 is full it
-    /// loses the oldest.
+    /// Receives the record of each tick from now on. For an observer. It never delays the world: if its buffer of 64 is full, it
+    /// loses the oldest sample.
     ///
     /// # Errors
     /// [`BusError::Service`], also if there are eight observers already; [`BusError::Degraded`].

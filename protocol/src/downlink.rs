@@ -4,11 +4,11 @@
 //! shapes of the obstacles somebody senses, then every frame sent in the tick before, and where each was sent.
 
 use crate::Vec2;
+use crate::drop_reason::DropReason;
 use crate::frame::AirFrame;
 use crate::ids::{DroneId, ObstacleId};
 use crate::link_faults::LinkFaults;
 use crate::nearby::{FrameCell, FrameIndex, Locality, NearbyFrames};
-use crate::radio::DropReason;
 use crate::shape::ConvexShape;
 use crate::time::{SimTime, Tick};
 use crate::wire::BrokenSensors;

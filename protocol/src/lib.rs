@@ -1,23 +1,49 @@
-//! What drones say to each other, and in which form it crosses a process border.
+//! What drones say to each other, and in which form it crosses the border of a process.
 //!
-//! Pure: no clock, thread, socket or operating-system randomness. SI units, angles in radians, world frame ENU with
-//! x along the flight direction and y to its left.
+//! The main types:
 //!
-//! | module | what |
-//! |---|---|
-//! | [`ids`], [`time`] | names of drones, groups, terms; simulated time |
-//! | [`message`], [`payload`], [`frame`] | what is said; its layout; the checked frame that carries it |
-//! | [`radio`] | whether and when a frame is heard: a pure, keyed function |
-//! | [`sides`] | who is cut off from whom by script |
-//! | [`downlink`], [`slot`] | what the world tells the drones in a tick; what a drone's actuators answer |
-//! | [`histogram`] | mean and quantiles of what is counted in equal steps |
-//! | [`nearby`] | the frames of a tick by where they were sent |
-//! | [`record`] | what the world tells the recorder |
-//! | [`formation`], [`shape`], [`energy`] | target shapes; obstacle shapes; power of flight |
-//! | [`thin_plate`] | the spline between two point sets and its bending energy |
+//! - [`Message`] is one message; [`message::Topic`] names its kind. [`Message::encode`] makes a [`frame::Frame`] of fixed
+//!   size, and [`Message::decode`] checks every field of a frame that another process wrote.
+//! - [`payload`] has the layouts of the messages, and [`wire`] the enums behind their integers ([`LeadershipKind`],
+//!   [`Phase`], [`ArrivalsKind`]).
+//! - [`ids`] and [`time`] name drones, groups, terms, plans and instants of simulated time.
+//! - [`radio::Radio`] decides whether and when a receiver hears a frame. It is a pure function of the frame, the link and a
+//!   seed; it has no generator that processes would have to share.
+//! - [`downlink`] is what the world sends to all drones in a tick, [`slot`] is what each drone answers, and [`record`] is
+//!   what the world sends to the recorder.
+//! - [`formation`], [`shape`], [`energy`], [`thin_plate`] and [`digest`] are mathematics that several crates share.
+//!
+//! This crate is pure: it has no clock, thread, socket, file, or randomness of the operating system. It does not know how
+//! frames move between processes, how a leader is elected, or how a drone flies. Units are SI, angles are in radians, and
+//! the world frame is ENU with x along the flight direction and y to its left.
+//!
+//! ```
+//! use skein_protocol::message::DecodeError;
+//! use skein_protocol::payload::Leadership;
+//! use skein_protocol::radio::{Delivery, Link, Radio};
+//! use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec2};
+//!
+//! let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(3) };
+//! let kind = LeadershipKind::Claim.to_wire();
+//! let claim =
+//!     Leadership { stamp: SimTime::ZERO, ballot, kind, group: GroupId::ALL, epoch: 0, heir: DroneId::NONE };
+//! let frame = Message::Leadership(claim).encode();
+//! let Ok(Message::Leadership(heard)) = Message::decode(&frame) else { panic!("a valid frame is decoded") };
+//! assert_eq!(heard.kind(), LeadershipKind::Claim);
+//!
+//! // A number that stands for no kind is refused at the border.
+//! let strange = Message::Leadership(Leadership { kind: 9, ..claim }).encode();
+//! assert_eq!(Message::decode(&strange), Err(DecodeError::Field("kind of leadership")));
+//!
+//! // The default radio is ideal: each frame is heard once and without delay.
+//! let link = Link { source: DroneId(3), destination: DroneId(4), topic: frame.kind, sequence: 0 };
+//! let delivery = Radio::default().outcome(link, Vec2::new(1000.0, 0.0), SimTime::ZERO);
+//! assert_eq!(delivery, Delivery::Deliver { due: SimTime::ZERO, again: None });
+//! ```
 
 pub mod digest;
 pub mod downlink;
+mod drop_reason;
 pub mod energy;
 pub mod formation;
 pub mod frame;

@@ -1,6 +1,6 @@
 //! Which side of each partition a drone is on, and whether its radio works: what cuts the air by script.
 
-use crate::radio::DropReason;
+use crate::drop_reason::DropReason;
 use bytemuck::{Pod, Zeroable};
 
 /// Partitions that can be told apart.

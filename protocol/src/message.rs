@@ -264,3 +264,51 @@ fn read<T: Pod>(frame: &Frame) -> Result<&T, DecodeError> {
     }
     Ok(bytemuck::from_bytes(&frame.payload[..size_of::<T>()]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec2;
+    use crate::ids::{DroneId, ObstacleId};
+    use crate::shape::ConvexShape;
+    use proptest::prelude::*;
+
+    fn obstacle() -> Message {
+        let shape = ConvexShape::rectangle(Vec2::new(1.0, 2.0), Vec2::new(3.0, 4.0), 0.1).unwrap();
+        Message::Obstacle(Obstacle { shape, id: ObstacleId(7), witness: DroneId(2) })
+    }
+
+    #[test]
+    fn a_message_survives_the_wire() {
+        assert_eq!(Message::decode(&obstacle().encode()), Ok(obstacle()));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_frame_is_named() {
+        let good = obstacle().encode();
+        assert_eq!(Message::decode(&Frame { kind: 99, ..good }), Err(DecodeError::Kind(99)));
+        assert_eq!(Message::decode(&Frame { version: 9, ..good }), Err(DecodeError::Version(9)));
+        assert_eq!(Message::decode(&Frame { len: 8, ..good }), Err(DecodeError::Length(8, size_of::<Obstacle>())));
+        let mut nan = good;
+        nan.payload[..8].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert_eq!(Message::decode(&nan), Err(DecodeError::Field("shape")));
+        let mut far = good;
+        far.payload[..8].copy_from_slice(&1e10f64.to_le_bytes());
+        assert_eq!(Message::decode(&far), Err(DecodeError::Field("shape")));
+        let group = crate::GroupId([0, 0, 3, 0, 0, 0, 0, 0]);
+        let lost = Message::Assignment(payload::Assignment { group, ..bytemuck::Zeroable::zeroed() });
+        assert_eq!(Message::decode(&lost.encode()), Err(DecodeError::Field("group")));
+    }
+
+    proptest! {
+        #[test]
+        fn rubbish_never_panics(kind in 0u16..9, len in 0u32..400, bytes in prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)) {
+            let mut frame = Frame { kind, version: payload::VERSION, len, payload: [0; FRAME_PAYLOAD] };
+            frame.payload.copy_from_slice(&bytes);
+            if let Ok(message) = Message::decode(&frame) {
+                let again = message.encode();
+                prop_assert_eq!(&again.payload[..len as usize], &frame.payload[..len as usize]);
+            }
+        }
+    }
+}

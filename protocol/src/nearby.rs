@@ -2,10 +2,9 @@
 //! depends on who is near, not on how many there are.
 
 use crate::Vec2;
-use crate::frame::AirFrame;
+use crate::frame::{AirFrame, NEVER_TRANSMITTED};
 use crate::link_faults::LinkFaults;
 use crate::message::Topic;
-use crate::radio::NEVER_TRANSMITTED;
 use bytemuck::{Pod, Zeroable};
 
 /// Up to so many frames it is cheaper to look at all of them.

@@ -1,9 +1,9 @@
 //! What the world tells the recorder: a row a drone and tick, every frame, and events.
 
+use crate::drop_reason::DROP_REASONS;
 use crate::frame::AirFrame;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::link_faults::LinkFaults;
-use crate::radio::DROP_REASONS;
 use crate::time::{SimTime, Tick};
 use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};

@@ -1,8 +1,8 @@
 //! What a drone hands back in a tick: its actuators' command, what it obeys, and the tick's tally. Wire and clock, not
 //! a message path: no other drone reads it.
 
+use crate::drop_reason::DROP_REASONS;
 use crate::ids::{Ballot, GroupId, PlanStamp};
-use crate::radio::DROP_REASONS;
 use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};
 

@@ -1,7 +1,7 @@
 //! Losses that come together: Gilbert and Elliott's two states in continuous time, without a memory.
 
-use super::Link;
 use super::key::KeyedRng;
+use super::link::Link;
 use crate::ids::DroneId;
 use crate::time::SimTime;
 use serde::{Deserialize, Serialize};

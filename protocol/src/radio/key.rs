@@ -1,7 +1,7 @@
 //! Random numbers that depend on a key and on nothing else: no generator is shared, so it does not matter who asks first.
 //! Logarithms and powers are libm's, so that no bit depends on a platform's mathematics.
 
-use super::Link;
+use super::link::Link;
 use crate::ids::DroneId;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 

@@ -4,14 +4,20 @@
 
 mod burst;
 mod channel_model;
+mod delivery;
 mod key;
+mod link;
 mod rule;
 mod shared_channel;
 
+pub use crate::drop_reason::{DROP_REASONS, DropReason};
+pub use crate::frame::NEVER_TRANSMITTED;
 pub use burst::{BLOCK_BURSTS, Burst, BurstScope};
 pub use channel_model::{ChannelModel, Delay, DelayModel, Range};
+pub use delivery::Delivery;
+pub use link::Link;
 pub use rule::Rule;
-pub use shared_channel::{ChannelQueue, NEVER_TRANSMITTED, SharedChannel};
+pub use shared_channel::{ChannelQueue, SharedChannel};
 
 use crate::Vec2;
 use crate::frame::AirFrame;
@@ -22,36 +28,6 @@ use crate::record::RecordView;
 use crate::time::SimTime;
 use key::KeyedRng;
 use serde::{Deserialize, Serialize};
-
-/// Number of [`DropReason`]s.
-pub const DROP_REASONS: usize = 7;
-
-/// Why a frame was not heard.
-#[repr(usize)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DropReason {
-    /// Lost on its own.
-    Loss = 0,
-    /// Lost in a burst.
-    Burst = 1,
-    /// Out of range.
-    Range = 2,
-    /// Between two sides of a partition.
-    Partition = 3,
-    /// The receiver is deaf, or the sender mute.
-    Deaf = 4,
-    /// It could not be decoded.
-    Malformed = 5,
-    /// It would have waited too long for the channel.
-    Queue = 6,
-}
-
-impl DropReason {
-    /// All reasons, in the order of their counters.
-    pub const ALL: [Self; DROP_REASONS] =
-        [Self::Loss, Self::Burst, Self::Range, Self::Partition, Self::Deaf, Self::Malformed, Self::Queue];
-}
 
 /// What the air does to frames between any two drones. The default is ideal: nothing is lost, a frame takes one tick.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -77,47 +53,6 @@ pub struct ReceiverChannels {
     receiver: DroneId,
     /// A rule's place; `None`: it depends on who sends.
     places: [Option<u16>; Topic::ALL.len()],
-}
-
-/// Which frame, from whom, to whom.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Link {
-    /// Who sent it.
-    pub source: DroneId,
-    /// Whose radio asks.
-    pub destination: DroneId,
-    /// The frame's kind as it stands on the wire.
-    pub topic: u16,
-    /// Running number of the source's frames.
-    pub sequence: u32,
-}
-
-impl Link {
-    /// A frame and one of its receivers.
-    #[must_use]
-    pub fn of(frame: &AirFrame, destination: DroneId) -> Self {
-        Self { source: frame.source, destination, topic: frame.frame.kind, sequence: frame.sequence }
-    }
-
-    /// The topic, if the kind is known.
-    #[must_use]
-    pub fn topic(&self) -> Option<Topic> {
-        Topic::from_wire(self.topic)
-    }
-}
-
-/// What becomes of a frame at one receiver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Delivery {
-    /// Not heard.
-    Drop(DropReason),
-    /// Heard.
-    Deliver {
-        /// In the first tick at or after this instant.
-        due: SimTime,
-        /// And once more, not before that, in the first tick at or after this one.
-        again: Option<SimTime>,
-    },
 }
 
 impl Radio {

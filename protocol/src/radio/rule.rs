@@ -1,6 +1,7 @@
 //! Another air for some topics, some senders, some receivers.
 
-use super::{ChannelModel, Link};
+use super::channel_model::ChannelModel;
+use super::link::Link;
 use crate::ids::DroneId;
 use crate::message::Topic;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,8 @@
 //! The bandwidth that all drones share: frames queue for the channel before they are on the air.
 
-use crate::frame::{AirFrame, FRAME_PAYLOAD};
+use crate::frame::{AirFrame, FRAME_PAYLOAD, NEVER_TRANSMITTED};
 use crate::time::SimTime;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
-
-/// [`AirFrame::queue_ns`] of a frame that never was on the air: it would have waited longer than the limit.
-pub const NEVER_TRANSMITTED: u64 = u64::MAX;
 
 /// Bytes of a frame before its payload: kind, version, length.
 const HEAD_BYTES: u64 = 8;
