@@ -132,7 +132,7 @@ fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
     }
     drones[0].1.send(header, 1, |frames| frames.fill(frame(0))).unwrap();
     let error = services.uplink_publisher(64).unwrap_err();
-    assert!(error.to_string().contains("of this swarm?"), "{error}");
+    assert!(error.to_string().contains("in this swarm?"), "{error}");
 }
 
 /// Records of a single drone's run that wait for the recorder.
