@@ -36,7 +36,7 @@ fn a_report_replays_offline() {
     place.fly("s2-right", &["--runtime", "inline", "--out", "out", "--set", "radio.loss=0.2"]);
     browser.open(&format!("file://{}", place.join("out/report.html").display()));
     browser.wait("player.story.samples.length > 100 && document.querySelectorAll('#selected option').length === 9");
-    assert!(browser.value("document.querySelector('.verdict').textContent").as_str().unwrap().starts_with("reached"));
+    assert!(browser.value("document.querySelector('.outcome').textContent").as_str().unwrap().starts_with("reached"));
 
     pictured(&mut browser);
     let start = browser.value(SEEN);
@@ -120,7 +120,7 @@ fn a_live_swarm_is_seen_flying() {
     let still = browser.value("player.t");
     browser.wait(&format!("player.story.end > {still} + 1"));
     assert_eq!(browser.value("player.t"), still, "a paused view goes on");
-    browser.wait("document.getElementById('verdict').textContent.includes('ended')");
+    browser.wait("document.getElementById('status').textContent.includes('ended')");
     let done = flight.finish();
     assert_eq!(done.code, Some(0), "{done:?}");
     assert_eq!(browser.errors, Vec::<String>::new());

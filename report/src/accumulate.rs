@@ -1,6 +1,7 @@
-//! The summary, tick by tick.
+//! Builds the summary of a run from its records, tick by tick.
 
 use crate::completion::RunCompletion;
+use crate::energy::EnergyMarks;
 use crate::error::TickError;
 use crate::facts::RunFacts;
 use crate::formation::{self, Closing};
@@ -8,20 +9,15 @@ use crate::leading::Leading;
 use crate::metrics::SwarmMetrics;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
-use crate::summary::{Dropped, Energy, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
+use crate::summary::{Dropped, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
 use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
-use skein_protocol::{Phase, SimTime, Vec2};
+use skein_protocol::{DroneId, Phase, Vec2};
 
 /// Time between two samples of the swarm metrics, s.
-const SAMPLE_S: f64 = 0.1;
+const METRICS_PERIOD_S: f64 = 0.1;
 
-/// An instant in seconds, rounded once: 60 ms are 0.06, not 0.060000000000000005.
-pub(crate) fn seconds(time: SimTime) -> f64 {
-    time.0 as f64 / 1e9
-}
-
-/// Everything about a run that its summary tells.
+/// Accumulates everything that the summary of a run contains.
 pub(crate) struct Accumulator {
     facts: RunFacts,
     stages: Stages,
@@ -36,12 +32,15 @@ pub(crate) struct Accumulator {
     faults: Vec<FaultEntry>,
     end: Option<End>,
     counts: Counts,
+    /// The rows of the last tick.
     last: Vec<DroneRow>,
+    /// Positions of the living drones in the last tick, m.
     positions: Vec<Vec2>,
+    /// Their velocities, m/s.
     velocities: Vec<Vec2>,
 }
 
-/// How far the record has come, and what it counts by itself.
+/// The last tick of the record, and what can be counted without the end event.
 #[derive(Default)]
 struct Counts {
     tick: Option<u64>,
@@ -53,14 +52,7 @@ struct Counts {
     late: u64,
 }
 
-/// Energies at the moments that matter.
-#[derive(Default)]
-struct EnergyMarks {
-    at_detection: Option<Vec<f64>>,
-    until_passed: Option<f64>,
-    detection_to_pass: Option<f64>,
-}
-
+/// The end event.
 struct End {
     t_s: f64,
     outcome: Outcome,
@@ -69,7 +61,7 @@ struct End {
 }
 
 impl Accumulator {
-    pub fn new(facts: RunFacts) -> Self {
+    pub(crate) fn new(facts: RunFacts) -> Self {
         Self {
             stages: Stages::new(&facts),
             leading: Leading::default(),
@@ -90,8 +82,11 @@ impl Accumulator {
         }
     }
 
-    /// Takes one record and its events. The last record may repeat the rows of the one before.
-    pub fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), TickError> {
+    /// Takes one record and its events. The last record of a run may repeat the rows of the record before it.
+    ///
+    /// # Errors
+    /// [`TickError::Rows`] if the record does not have one row per drone.
+    pub(crate) fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), TickError> {
         let tick = record.head.tick;
         let fresh = !record.rows.is_empty() && self.counts.tick.is_none_or(|last| tick > last);
         if fresh && record.rows.len() != self.facts.drones as usize {
@@ -101,21 +96,23 @@ impl Accumulator {
         self.counts.digest = Some(record.head.digest);
         self.counts.lost += u64::from(record.head.lost);
         if fresh {
-            self.stages.hear(record.frames);
+            self.stages.take_frames(record.frames);
         }
-        events.iter().for_each(|event| self.event(event.clone(), record.rows));
+        for event in events {
+            self.take_event(event.clone(), record.rows);
+        }
         if fresh {
             self.counts.sent += record.frames.len() as u64;
-            self.rows(tick, seconds(record.head.now), record.rows);
+            self.take_rows(tick, record.head.now.secs(), record.rows);
         } else if record.head.lost > 0 {
-            // The last ticks were lost, and only the mission's end got through.
+            // The last ticks were lost; only the end of the mission was recorded.
             self.counts.tick = self.counts.tick.max(Some(tick));
-            self.counts.t_s = self.counts.t_s.max(seconds(record.head.now));
+            self.counts.t_s = self.counts.t_s.max(record.head.now.secs());
         }
         Ok(())
     }
 
-    fn event(&mut self, event: RunEvent, rows: &[DroneRow]) {
+    fn take_event(&mut self, event: RunEvent, rows: &[DroneRow]) {
         let t_s = event.t_s;
         match event.what {
             EventKind::Detected { stage, .. } => {
@@ -130,13 +127,13 @@ impl Accumulator {
                 }
             }
             EventKind::Leader { group, ballot, leader, leads: true } => {
-                self.leading.elected(t_s, group, ballot, leader)
+                self.leading.elected(t_s, group, ballot, leader);
             }
             EventKind::Fault { kind, target, scheduled, detail } => {
                 if let (true, Some(row)) = (kind.stops_process(), self.last.get(target.index())) {
                     self.leading.died(t_s, row);
                 }
-                let target = (target != skein_protocol::DroneId::NONE).then_some(target.0);
+                let target = (target != DroneId::NONE).then_some(target.0);
                 self.faults.push(FaultEntry { t_s, kind, target, scheduled, detail });
             }
             EventKind::Violation { kind, drones, value_m } => {
@@ -145,7 +142,8 @@ impl Accumulator {
             EventKind::End { outcome, reason, totals } => {
                 self.end = Some(End { t_s, outcome, reason, totals: *totals });
             }
-            // What was decided shows in the frames, laying down in the rows, and that a fault is over in the events.
+            // Decisions are read from the frames, the end of a leadership from the rows. The summary does not report
+            // the end of a fault.
             EventKind::Leader { .. }
             | EventKind::Grouping { .. }
             | EventKind::Assigned { .. }
@@ -153,7 +151,7 @@ impl Accumulator {
         }
     }
 
-    fn rows(&mut self, tick: u64, t_s: f64, rows: &[DroneRow]) {
+    fn take_rows(&mut self, tick: u64, t_s: f64, rows: &[DroneRow]) {
         let dt_s = self.counts.tick.map_or(self.facts.dt_s, |_| t_s - self.counts.t_s);
         (self.counts.tick, self.counts.t_s) = (Some(tick), t_s);
         for row in rows {
@@ -163,11 +161,11 @@ impl Accumulator {
                 self.steps.take(row.step_ns);
             }
         }
-        self.stages.take(rows);
+        self.stages.take_rows(rows);
         self.leading.take(t_s, dt_s, rows, self.facts.radio_range_m);
         self.vicinity.take(rows, dt_s);
         self.gather_living(rows);
-        if tick.is_multiple_of((SAMPLE_S / self.facts.dt_s).round().max(1.0) as u64) {
+        if tick.is_multiple_of((METRICS_PERIOD_S / self.facts.dt_s).round().max(1.0) as u64) {
             self.metrics.take(&self.positions, &self.velocities);
         }
         self.reform(t_s, rows);
@@ -193,18 +191,19 @@ impl Accumulator {
         if self.reform_start_s.is_some() && living.all(reforms) {
             self.closing.take(&self.facts, t_s, &self.positions);
         } else {
-            self.closing.open();
+            self.closing.reopen();
         }
     }
 
-    /// The summary of what was taken.
-    pub fn finish(self, completion: &RunCompletion) -> Summary {
+    /// The summary of all records taken.
+    pub(crate) fn finish(self, completion: &RunCompletion) -> Summary {
         let error = formation::error(&self.facts, &self.positions);
         let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick + 1), self.counts.t_s);
         let wall_s =
             self.end.as_ref().map(|end| end.totals.wall_s).or(completion.wall_s).filter(|wall_s| *wall_s > 0.0);
         let steps = ticks as f64 * f64::from(self.facts.drones);
         let totals = self.end.as_ref().map(|end| &end.totals);
+        let leading = self.leading.finish();
         Summary {
             schema: SUMMARY_SCHEMA.to_owned(),
             drones: self.facts.drones,
@@ -220,15 +219,15 @@ impl Accumulator {
             reason: self.end.as_ref().map(|end| end.reason.clone()),
             mission_s: self.end.as_ref().map_or(sim_s, |end| end.t_s),
             reform_start_s: self.reform_start_s,
-            reform_end_s: self.closing.since_s,
+            reform_end_s: self.closing.since_s(),
             formation_error_m: error.as_ref().map(|error| error.largest_m),
             formation_rmse_m: error.as_ref().map(|error| error.rmse_m),
             mean_distance_error_m: error.and_then(|error| error.mean_distance_m),
             energy_j: self.energy.finish(&self.last, self.stages.any()),
-            min_separation_m: self.vicinity.separation_m,
-            min_clearance_m: self.vicinity.clearance_m,
+            min_separation_m: self.vicinity.separation_m(),
+            min_clearance_m: self.vicinity.clearance_m(),
             metrics: self.metrics.means(),
-            elections: self.leading.elections(),
+            elections: leading.elections,
             messages: messages(&self.counts, totals),
             deadline_misses: totals.map_or(self.counts.late, |totals| totals.deadline_misses),
             lateness_us: totals.and_then(|totals| lateness(&totals.lateness_s)),
@@ -237,9 +236,9 @@ impl Accumulator {
             lost_ticks: self.counts.lost,
             digest: self.counts.digest.map(|digest| format!("{digest:016x}")),
             stages: self.stages.finish(),
-            leaders: self.leading.entries,
-            split_brain_s: self.leading.split_brain_s,
-            failover_s: self.leading.failover_s,
+            leaders: leading.entries,
+            split_brain_s: leading.split_brain_s,
+            failover_s: leading.failover_s,
             violations: self.violations,
             faults: self.faults,
             scenario: self.facts.scenario,
@@ -251,45 +250,12 @@ impl Accumulator {
     }
 }
 
-impl EnergyMarks {
-    /// The first tick of the mission has no rows before it: nothing was used yet.
-    fn detected(&mut self, rows: &[DroneRow], drones: u32) {
-        let before = if rows.is_empty() { vec![0.0; drones as usize] } else { energies(rows) };
-        self.at_detection = Some(before);
-    }
-
-    fn passed(&mut self, rows: &[DroneRow]) {
-        self.until_passed = Some(living_sum(rows, energies(rows)));
-        self.detection_to_pass = self.at_detection.as_ref().map(|before| {
-            let since = rows.iter().zip(before).map(|(row, before)| row.energy_j - before);
-            living_sum(rows, since.collect())
-        });
-    }
-
-    fn finish(self, rows: &[DroneRow], stages: bool) -> Energy {
-        Energy {
-            total: living_sum(rows, energies(rows)),
-            until_passed: self.until_passed.filter(|_| stages),
-            detection_to_pass: self.detection_to_pass.filter(|_| stages),
-            per_drone: energies(rows),
-        }
-    }
-}
-
-fn energies(rows: &[DroneRow]) -> Vec<f64> {
-    rows.iter().map(|row| row.energy_j).collect()
-}
-
-fn living_sum(rows: &[DroneRow], values: Vec<f64>) -> f64 {
-    rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
-}
-
 fn lateness(late_s: &Percentiles) -> Option<StepTimes> {
     let us = |s: Option<f64>| s.map(|s| s * 1e6);
     Some(StepTimes { p50: us(late_s.p50)?, p99: us(late_s.p99)?, max: us(late_s.max)? })
 }
 
-/// What the world counted; without its last word, what the record shows.
+/// The counters of the end event; without one, what the record shows.
 fn messages(counts: &Counts, totals: Option<&Totals>) -> Messages {
     let Some(totals) = totals else {
         let (dropped, delay_s, age_s) = Default::default();

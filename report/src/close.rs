@@ -1,9 +1,9 @@
-//! Pairs of points that are close to each other, without looking at all pairs.
+//! Pairs of points that are close to each other, found without a test of all pairs.
 
 use skein_protocol::Vec2;
 
-/// Points kept sorted along the axis on which they are spread farther. Kept from tick to tick, it is nearly sorted
-/// already.
+/// Sweep along the axis on which the points extend farther. The order is kept from tick to tick, so that sorting is
+/// cheap.
 #[derive(Default)]
 pub(crate) struct Sweep {
     order: Vec<usize>,
@@ -11,8 +11,8 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    /// The least distance of two points; `None` if there are fewer.
-    pub fn least_distance(&mut self, points: &[Vec2]) -> Option<f64> {
+    /// The least distance of two points, m; `None` for fewer than two points.
+    pub(crate) fn least_distance(&mut self, points: &[Vec2]) -> Option<f64> {
         self.sort(points);
         let mut least = f64::INFINITY;
         for (place, &a) in self.order.iter().enumerate() {
@@ -27,8 +27,9 @@ impl Sweep {
         least.is_finite().then(|| least.sqrt())
     }
 
-    /// Calls `pair` for each pair of points closer than `reach` (`None`: for each pair), with their squared distance.
-    pub fn pairs(&mut self, points: &[Vec2], reach: Option<f64>, mut pair: impl FnMut(usize, usize, f64)) {
+    /// Calls `pair` with the indices and the squared distance of each pair of points closer than `reach`, or of all
+    /// pairs if `reach` is `None`.
+    pub(crate) fn pairs(&mut self, points: &[Vec2], reach: Option<f64>, mut pair: impl FnMut(usize, usize, f64)) {
         self.sort(points);
         let limit = reach.map_or(f64::INFINITY, |reach| reach * reach);
         for (place, &a) in self.order.iter().enumerate() {
@@ -49,8 +50,8 @@ impl Sweep {
         if self.order.len() != points.len() {
             self.order = (0..points.len()).collect();
         }
-        let nothing = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-        let (low, high) = points.iter().fold(nothing, |(low, high), p| (low.inf(p), high.sup(p)));
+        let empty = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+        let (low, high) = points.iter().fold(empty, |(low, high), p| (low.inf(p), high.sup(p)));
         self.axis = usize::from((high - low).y > (high - low).x);
         let axis = self.axis;
         self.order.sort_by(|&a, &b| points[a][axis].total_cmp(&points[b][axis]));
@@ -64,7 +65,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn equals_looking_at_all_pairs(
+        fn the_result_equals_that_of_a_test_of_all_pairs(
             points in prop::collection::vec((-9.0..9.0, -3.0..3.0).prop_map(|(x, y)| Vec2::new(x, y)), 0..30),
             reach in 0.0..12.0f64,
         ) {

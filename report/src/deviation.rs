@@ -1,57 +1,63 @@
-//! How far the swarm is from its target shape, moment by moment: the paper's disturbance, and the bending energy of E6.
+//! How far the swarm is from its target shape over time: the paper's formation disturbance (R5), and the bending energy
+//! of its equation E6.
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
+use crate::files::FORMATION;
 use crate::formation::{centred, error, slots};
 use skein_protocol::Vec2;
 use skein_protocol::thin_plate::ThinPlate;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Name of the file in a run's folder.
-pub(crate) const FILE: &str = "formation.csv";
 const HEADER: &str = "t_s,disturbance_m,largest_m,bending";
-/// Between two samples, s.
-const EVERY_S: f64 = 0.1;
-/// The same above [`FEW`] drones, where the best assignment takes longer.
-const RARELY_S: f64 = 1.0;
-const FEW: usize = 64;
-/// Above so many drones assignment and spline take seconds a sample: nothing is measured.
+/// Time between two samples, s.
+const PERIOD_S: f64 = 0.1;
+/// Time between two samples of a swarm of more than [`SMALL_SWARM_MAX`] drones, s: the assignment takes longer.
+const LARGE_SWARM_PERIOD_S: f64 = 1.0;
+/// Largest number of drones that are sampled every [`PERIOD_S`].
+const SMALL_SWARM_MAX: usize = 64;
+/// Largest number of drones that are sampled at all: above, assignment and spline take seconds per sample.
 const DRONES_MAX: usize = 200;
 
-/// The swarm against its target shape at a moment, after the best translation and assignment.
+/// Deviation of the swarm from its target shape at one time, after the best translation and assignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeDeviation {
-    /// When, s.
+    /// Time, s.
     pub t_s: f64,
-    /// Root of the mean square distance of drones to their slots, m.
+    /// Root of the mean squared distance of the drones to their slots, m.
     pub disturbance_m: f64,
-    /// Greatest distance, m.
+    /// Greatest distance of a drone to its slot, m.
     pub largest_m: f64,
-    /// ∬(f_xx² + 2 f_xy² + f_yy²) dx dy of the thin-plate spline f that takes each slot to its drone (λ = 0: exactly);
-    /// dimensionless, 0 for any affine image of the shape.
+    /// Bending energy ∬(f_xx² + 2 f_xy² + f_yy²) dx dy of the thin-plate spline f that maps each slot exactly to its drone
+    /// (λ = 0); dimensionless, 0 for any affine image of the shape.
     pub bending: f64,
 }
 
-/// Samples a mission.
+/// Samples the deviation over a mission.
 #[derive(Default)]
 pub(crate) struct DeviationSampler {
-    /// For this number of drones: the slots about their mean, and splines over them.
+    /// The slots relative to their mean, and the splines over them, for the current number of drones.
     plate: Option<(Vec<Vec2>, ThinPlate)>,
-    bin: Option<i64>,
-    /// So far.
-    pub samples: Vec<ShapeDeviation>,
+    /// Number of the period of the last sample.
+    period: Option<i64>,
+    samples: Vec<ShapeDeviation>,
 }
 
 impl DeviationSampler {
-    /// Takes the living drones' positions of a tick; not every tick becomes a sample.
-    pub fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
+    /// The samples so far.
+    pub(crate) fn samples(&self) -> &[ShapeDeviation] {
+        &self.samples
+    }
+
+    /// Takes the positions of the living drones in a tick, and makes a sample of them if one is due.
+    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
         if positions.len() < 2 || positions.len() > DRONES_MAX {
             return;
         }
-        let every_s = if positions.len() > FEW { RARELY_S } else { EVERY_S };
+        let every_s = if positions.len() > SMALL_SWARM_MAX { LARGE_SWARM_PERIOD_S } else { PERIOD_S };
         let now = (t_s / every_s + 1e-6).floor() as i64;
-        if self.bin.replace(now) != Some(now) {
+        if self.period.replace(now) != Some(now) {
             let sample = self.measure(facts, t_s, positions);
             self.samples.extend(sample);
         }
@@ -67,29 +73,31 @@ impl DeviationSampler {
         let found = error(facts, positions)?;
         let positions = centred(positions.to_vec());
         let mut images = vec![Vec2::zeros(); slots.len()];
-        positions.iter().zip(&found.slot_of).for_each(|(position, &slot)| images[slot] = *position);
+        for (position, &slot) in positions.iter().zip(&found.slot_of) {
+            images[slot] = *position;
+        }
         let bending = plate.fit(&images)?.energy(&images).bending;
         Some(ShapeDeviation { t_s, disturbance_m: found.rmse_m, largest_m: found.largest_m, bending })
     }
 }
 
-/// Writes formation.csv: a line a sample.
+/// Writes formation.csv, one line per sample.
 pub(crate) fn write(folder: &Path, samples: &[ShapeDeviation]) -> Result<(), ReportError> {
     let mut csv = format!("{HEADER}\n");
     for ShapeDeviation { t_s, disturbance_m, largest_m, bending } in samples {
         // Writing to a string cannot fail.
         let _ = writeln!(csv, "{t_s},{disturbance_m:.6},{largest_m:.6},{bending:.6}");
     }
-    let path = folder.join(FILE);
+    let path = folder.join(FORMATION);
     std::fs::write(&path, csv).map_err(ReportError::io(&path))
 }
 
-/// Reads the formation.csv that a report left in this folder.
+/// Reads formation.csv of a run's folder, which [`crate::plot::write`] writes.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Content`] if it is none.
+/// [`ReportError::Io`], or [`ReportError::Content`] if a line is not as expected.
 pub fn read(folder: &Path) -> Result<Vec<ShapeDeviation>, ReportError> {
-    let path = folder.join(FILE);
+    let path = folder.join(FORMATION);
     let text = std::fs::read_to_string(&path).map_err(ReportError::io(&path))?;
     let content = |found: String| ReportError::Content { path: path.clone(), expected: HEADER, found };
     let mut lines = text.lines();
@@ -118,11 +126,11 @@ mod tests {
     fn measured(positions: &[Vec2]) -> ShapeDeviation {
         let mut deviations = DeviationSampler::default();
         deviations.take(&facts(8), 1.0, positions);
-        deviations.samples[0]
+        deviations.samples()[0]
     }
 
     #[test]
-    fn the_moved_shape_is_undisturbed_and_a_stretched_one_does_not_bend() {
+    fn a_translated_shape_is_undisturbed_and_a_stretched_shape_does_not_bend() {
         let moved = measured(&flown(8, |slot| slot + Vec2::new(300.0, -20.0)));
         assert!(moved.disturbance_m < 1e-9 && moved.bending < 1e-9, "{moved:?}");
         let stretched = measured(&flown(8, |slot| Vec2::new(slot.x, 1.2 * slot.y)));
@@ -130,15 +138,15 @@ mod tests {
     }
 
     #[test]
-    fn a_swarm_torn_apart_in_the_middle_is_disturbed_and_bends() {
+    fn a_swarm_that_is_torn_apart_is_disturbed_and_bends() {
         let torn = measured(&flown(8, |slot| slot + Vec2::new(0.0, if slot.y < -1.0 { -100.0 } else { 0.0 })));
-        // Three of eight drones went 100 m: mean square 100² · 3/8 · 5/8 about the mean.
+        // Three of eight drones moved by 100 m: the variance is 100² · 3/8 · 5/8.
         assert!((torn.disturbance_m - 100.0 * (15.0f64 / 64.0).sqrt()).abs() < 1e-6, "{torn:?}");
         assert!(torn.largest_m > 62.0 && torn.bending > 1.0, "{torn:?}");
     }
 
     #[test]
-    fn samples_are_as_far_apart_as_the_swarm_is_large_and_survive_the_file() {
+    fn large_swarms_are_sampled_less_often_and_samples_survive_the_file() {
         for (count, expected) in [(8, 10), (65, 2), (201, 0), (1, 0)] {
             let mut deviations = DeviationSampler::default();
             (0..50).for_each(|tick| {

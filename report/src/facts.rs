@@ -1,6 +1,6 @@
-//! What is known of a run before it starts, and the record stream does not carry.
+//! What is known of a run before it starts and is not in its record.
 
-use crate::scene::SceneFacts;
+use crate::scene_facts::SceneFacts;
 use serde::{Deserialize, Serialize};
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -11,9 +11,9 @@ use skein_protocol::shape::ConvexShape;
 pub struct RunFacts {
     /// The scenario's name; names the run's folder.
     pub scenario: String,
-    /// How drones were grouped, as on the command line.
+    /// The strategy by which drones are grouped, as on the command line.
     pub strategy: String,
-    /// Key of everything random.
+    /// Seed of all random values.
     pub seed: u64,
     /// `processes` or `inline`.
     pub runtime: String,
@@ -23,30 +23,30 @@ pub struct RunFacts {
     pub drones: u32,
     /// Length of a tick, s.
     pub dt_s: f64,
-    /// The formation.
+    /// The target shape of the formation.
     pub shape: Shape,
-    /// Its spacing, m.
+    /// Spacing of the formation, m.
     pub spacing_m: f64,
     /// Where the mission ends.
     pub end: MissionEnd,
     /// Ordinate of the line along which the formation's front slot flies, m.
     pub course_y_m: f64,
-    /// Least distance of two bodies, m.
+    /// Least distance that two bodies must keep, m.
     pub safe_distance_m: f64,
-    /// Least distance of a body to an obstacle, m.
+    /// Least distance that a body must keep to an obstacle, m.
     pub clearance_m: f64,
     /// Distance that paths keep from obstacles, m. Obstacles closer than twice this in flight direction are one set.
     pub planning_distance_m: f64,
     /// Largest slot error of a closed formation, m.
     pub arrival_error_m: f64,
-    /// Greatest distance at which drones hear each other, m; `None`: no limit.
+    /// Radio range, m; `None` if it has no limit.
     pub radio_range_m: Option<f64>,
-    /// How long a dead drone stays a body once it stands still, s; `None`: for good, it hovers.
+    /// How long a dead drone remains a body after it has come to rest, s; `None` if it hovers forever.
     pub landing_s: Option<f64>,
-    /// The obstacles; an obstacle's id is its place.
+    /// The obstacles; the id of an obstacle is its index.
     #[serde(with = "outlines")]
     pub obstacles: Vec<ConvexShape>,
-    /// What a picture of it shows beside the drones.
+    /// What the recording and the page draw beside the drones.
     #[serde(default)]
     pub scene: SceneFacts,
 }
@@ -55,26 +55,26 @@ pub struct RunFacts {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MissionEnd {
-    /// Wherever the formation is closed again.
+    /// At the place where the formation closes again.
     Hold,
     /// In fixed slots.
     Goal {
-        /// Where the front slot is, m.
+        /// Position of the front slot, m.
         front_m: [f64; 2],
     },
 }
 
-/// Obstacles that are passed together: one stage of the mission.
+/// Obstacles that the swarm passes together: one stage of the mission.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ObstacleSet {
-    /// Ascending.
+    /// The ids of its obstacles, ascending.
     pub obstacles: Vec<u32>,
-    /// Mean centre abscissa, m: a drone beyond it has passed the set.
+    /// Mean abscissa of the obstacles' centres, m. A drone beyond it has passed the set.
     pub gate_x_m: f64,
 }
 
 impl RunFacts {
-    /// Obstacles clustered by their extents in flight direction, in flight order.
+    /// The obstacle sets in flight order: obstacles clustered by their extents in flight direction.
     pub(crate) fn sets(&self) -> Vec<ObstacleSet> {
         let bounds: Vec<(Vec2, Vec2)> = self.obstacles.iter().map(ConvexShape::bounds).collect();
         let mut order: Vec<usize> = (0..bounds.len()).collect();
@@ -99,7 +99,7 @@ impl RunFacts {
     }
 }
 
-/// Outlines as people write them: vertices and a rounding radius.
+/// JSON form of the obstacles: vertices and a rounding radius.
 mod outlines {
     use super::{ConvexShape, Vec2};
     use serde::de::Error;
@@ -111,7 +111,7 @@ mod outlines {
         radius_m: f64,
     }
 
-    pub fn serialize<S: Serializer>(shapes: &[ConvexShape], to: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(shapes: &[ConvexShape], to: S) -> Result<S::Ok, S::Error> {
         to.collect_seq(
             shapes.iter().map(|shape| Outline {
                 vertices_m: shape.vertices().map(Into::into).collect(),
@@ -120,7 +120,7 @@ mod outlines {
         )
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<ConvexShape>, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<ConvexShape>, D::Error> {
         let shape = |outline: Outline| {
             let vertices: Vec<Vec2> = outline.vertices_m.into_iter().map(Vec2::from).collect();
             ConvexShape::new(&vertices, outline.radius_m).map_err(D::Error::custom)
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn facts_survive_json_and_bad_outlines_are_refused() {
+    fn facts_survive_json_and_invalid_outlines_are_refused() {
         let facts = RunFacts { obstacles: vec![block(1.0, 2.0)], ..facts(3) };
         let json = serde_json::to_string(&facts).unwrap();
         assert_eq!(serde_json::from_str::<RunFacts>(&json).unwrap(), facts);

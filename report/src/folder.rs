@@ -1,7 +1,8 @@
-//! A run's folder: made once, never over something else; and the JSON files in it.
+//! The folder of a run, which never replaces anything but a run, and the JSON files in it.
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
+use crate::files::{self, MANIFEST, PLOTS, PROCESSES, SUMMARY};
 use crate::summary::Summary;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -9,47 +10,32 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-const MANIFEST: &str = "manifest.json";
-const PROCESSES: &str = "processes.json";
-const SUMMARY: &str = "summary.json";
-const PLOTS: &str = "plots";
 const MANIFEST_SCHEMA: &str = "skein-manifest/1";
-/// Files that a run leaves in its folder, beside its plots.
-const OWN_FILES: [&str; 9] = [
-    MANIFEST,
-    PROCESSES,
-    SUMMARY,
-    "events.jsonl",
-    "trace.csv",
-    crate::deviation::FILE,
-    "run.mcap",
-    "report.html",
-    crate::spool::FILE,
-];
 
-/// What a run was: enough to fly it again and to draw it.
+/// Describes a run completely: enough to fly it again and to draw it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Name and version of this layout; set by [`Manifest::new`].
     pub schema: String,
-    /// The scenario as resolved, every key with its value.
+    /// The resolved scenario: every key with its value.
     pub scenario: serde_json::Value,
-    /// Key of everything random.
+    /// Seed of all random values.
     pub seed: u64,
-    /// How drones were grouped.
+    /// The strategy by which drones were grouped.
     pub strategy: String,
-    /// Of Skein.
+    /// Version of Skein.
     pub version: String,
-    /// Of Skein's source, if known.
+    /// Commit of Skein's source, if known.
     pub commit: Option<String>,
     /// Operating system and architecture.
     pub platform: String,
-    /// The run as it was ordered.
+    /// What is known of the run before it starts.
     pub facts: RunFacts,
 }
 
 impl Manifest {
-    /// The manifest of a run; strategy and seed are the facts'.
+    /// The manifest of a run with these facts, strategy and seed included. `scenario` is the resolved scenario, `version`
+    /// and `commit` are those of Skein.
     #[must_use]
     pub fn new(facts: RunFacts, scenario: serde_json::Value, version: &str, commit: Option<String>) -> Self {
         Self {
@@ -65,35 +51,35 @@ impl Manifest {
     }
 }
 
-/// What a process is in a run.
+/// The role of a process in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Starts the others.
+    /// Starts and supervises the other processes, and records.
     Launcher,
-    /// Physics and air.
+    /// Simulates physics and the radio channel.
     World,
-    /// One drone.
+    /// Flies one drone.
     Drone,
 }
 
 /// A process of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProcessEntry {
-    /// What it is.
+    /// Its role.
     pub role: Role,
-    /// The drone's number; null for the others.
+    /// The number of the drone; null for other roles.
     pub id: Option<u32>,
-    /// Of the operating system.
+    /// Process id.
     pub pid: u32,
 }
 
-/// A run's folder.
+/// The folder of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunFolder(PathBuf);
 
 impl RunFolder {
-    /// Makes `<root>/<scenario>-<number>`, with the next free number from 1. Two runs that ask at once get two folders.
+    /// Creates `<root>/<scenario>-<number>` with the next free number, from 1. Concurrent runs get different folders.
     ///
     /// # Errors
     /// [`ReportError::Io`].
@@ -112,11 +98,11 @@ impl RunFolder {
         }
     }
 
-    /// Makes the folder `path`. One that exists is refused; with `force`, the run in it is removed first: Skein's own
-    /// files and nothing else.
+    /// Creates the folder `path`. An existing folder is refused; with `force`, the files of the run in it are removed
+    /// first, and no other files.
     ///
     /// # Errors
-    /// [`ReportError::Exists`], [`ReportError::NotARun`] for a folder that is neither empty nor a run's, or
+    /// [`ReportError::Exists`], [`ReportError::NotARun`] for a folder that is neither empty nor of a run, or
     /// [`ReportError::Io`].
     pub fn at(path: &Path, force: bool) -> Result<Self, ReportError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -138,7 +124,7 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// The folder of a run that was flown.
+    /// Opens the folder of a recorded run.
     ///
     /// # Errors
     /// [`ReportError::NotARun`] if it holds no manifest of a run.
@@ -153,7 +139,7 @@ impl RunFolder {
         }
     }
 
-    /// Where it is.
+    /// Path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.0
@@ -170,7 +156,7 @@ impl RunFolder {
     /// Reads manifest.json.
     ///
     /// # Errors
-    /// [`ReportError::Io`], or [`ReportError::Content`] if it is another version's.
+    /// [`ReportError::Io`], or [`ReportError::Content`] for a manifest of another version of Skein.
     pub fn read_manifest(&self) -> Result<Manifest, ReportError> {
         self.read_json(MANIFEST, "the manifest of a run by this version of Skein")
     }
@@ -199,14 +185,14 @@ impl RunFolder {
         self.read_json(SUMMARY, "the summary of a run by this version of Skein")
     }
 
-    /// The folder of its plots, made if it is missing.
+    /// Path of the folder for plots, which is created if it is missing.
     pub(crate) fn plots(&self) -> Result<PathBuf, ReportError> {
         let path = self.0.join(PLOTS);
         fs::create_dir_all(&path).map_err(ReportError::io(&path))?;
         Ok(path)
     }
 
-    /// Written beside and renamed: a reader finds the whole file or none.
+    /// Writes a file under another name and renames it, so that a reader finds the whole file or none.
     fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), ReportError> {
         let (path, beside) = (self.0.join(name), self.0.join(format!(".{name}.part")));
         let mut bytes = serde_json::to_vec_pretty(value).map_err(|error| ReportError::io(&path)(error.into()))?;
@@ -225,12 +211,13 @@ impl RunFolder {
         })
     }
 
+    /// Removes the files of the run.
     fn clear(&self) -> Result<(), ReportError> {
         let plots = self.0.join(PLOTS);
-        // A link in the place of the plots' folder would lead out of the run.
+        // If `plots` were a symbolic link, this would remove files outside of the run.
         let own_plots = fs::symlink_metadata(&plots).is_ok_and(|meta| meta.is_dir());
-        let plot_files = crate::plot::FILES.iter().filter(|_| own_plots).map(|name| plots.join(name));
-        for path in OWN_FILES.iter().map(|name| self.0.join(name)).chain(plot_files) {
+        let plot_files = files::PLOT_FILES.iter().filter(|_| own_plots).map(|name| plots.join(name));
+        for path in files::ALL.iter().map(|name| self.0.join(name)).chain(plot_files) {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => return Err(ReportError::io(&path)(error)),
                 _ => {}
@@ -240,7 +227,7 @@ impl RunFolder {
     }
 }
 
-/// The greatest number taken for `stem`; 0 if none.
+/// The greatest number that a folder `<stem>-<number>` has; 0 if there is none.
 fn last_number(root: &Path, stem: &str) -> Result<u64, ReportError> {
     let mut last = 0;
     for entry in fs::read_dir(root).map_err(ReportError::io(root))? {
@@ -262,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_taken_once_by_runs_side_by_side() {
+    fn concurrent_runs_get_different_numbers() {
         let root = tempfile::tempdir().unwrap();
         let take = || (0..20).map(|_| RunFolder::numbered(root.path(), "s1").unwrap()).collect::<Vec<_>>();
         let folders = std::thread::scope(|scope| {
@@ -298,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn force_touches_no_folder_that_is_not_a_runs() {
+    fn force_changes_no_folder_that_is_not_of_a_run() {
         let root = tempfile::tempdir().unwrap();
         for manifest in ["{\"name\": \"web app\"}", "rubbish"] {
             fs::write(root.path().join(MANIFEST), manifest).unwrap();
@@ -314,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn files_survive_the_disk() {
+    fn written_files_read_back() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
         folder.write_manifest(&manifest()).unwrap();

@@ -1,28 +1,30 @@
-//! How far the living drones are from the target shape, wherever it may stand.
+//! How far the living drones are from the target shape, after the best translation and assignment.
 
 use crate::facts::RunFacts;
 use skein_protocol::Vec2;
 use skein_protocol::matching::least_cost;
 
-/// Up to this many drones the assignment is solved whenever the last one does not close the formation.
+/// Largest number of drones for which the assignment is solved in every tick in which the last assignment does not close
+/// the formation. Chosen by hand.
 const SOLVE_ALWAYS_MAX: usize = 64;
-/// Above, at most once in this time, s.
-const SOLVE_EVERY_S: f64 = 1.0;
+/// Above [`SOLVE_ALWAYS_MAX`] drones, least time between two solutions, s. Chosen by hand.
+const SOLVE_PERIOD_S: f64 = 1.0;
 
 /// The error of a formation after the best translation and assignment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FormationError {
-    /// Of the drone farthest from its slot, m.
+    /// Distance to its slot of the drone farthest from it, m.
     pub largest_m: f64,
-    /// Root of the mean square, m.
+    /// Root of the mean squared distance, m.
     pub rmse_m: f64,
-    /// Mean distance between drones, less the slots', absolute, m; `None` for fewer than two.
+    /// Absolute difference between the mean distance of the drones and that of the slots, m; `None` for fewer than two
+    /// drones.
     pub mean_distance_m: Option<f64>,
-    /// The slot of each drone.
+    /// The slot of each drone, by index.
     pub slot_of: Vec<usize>,
 }
 
-/// The error of drones at these positions; `None` without drones, or if the shape has too few slots.
+/// The error of drones at these positions, m. `None` without drones, or if the shape has too few slots.
 pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationError> {
     let slots = slots(facts, positions.len())?;
     let positions = centred(positions.to_vec());
@@ -37,17 +39,19 @@ pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationErr
     })
 }
 
-/// The slots of `count` drones about their mean. The translation that is best in the least squares sense takes mean
-/// to mean, whatever the assignment.
+/// The slots of `count` drones relative to their mean, m. The best translation in the least-squares sense maps the mean
+/// of the drones to the mean of the slots, whatever the assignment.
 pub(crate) fn slots(facts: &RunFacts, count: usize) -> Option<Vec<Vec2>> {
     let slots = facts.shape.slots(count, facts.spacing_m);
     (count > 0 && slots.len() == count).then(|| centred(slots))
 }
 
-/// The points about their mean.
+/// The points relative to their mean.
 pub(crate) fn centred(mut points: Vec<Vec2>) -> Vec<Vec2> {
     let mean = points.iter().sum::<Vec2>() / points.len() as f64;
-    points.iter_mut().for_each(|point| *point -= mean);
+    for point in &mut points {
+        *point -= mean;
+    }
     points
 }
 
@@ -62,32 +66,39 @@ pub(crate) fn mean_distance(points: &[Vec2]) -> f64 {
     sum / pairs.max(1) as f64
 }
 
-/// When the formation was closed for good.
+/// Finds the time from which the formation stayed closed.
 #[derive(Default)]
 pub(crate) struct Closing {
-    /// First time of the stretch, up to now, in which it has been closed, s.
-    pub since_s: Option<f64>,
+    since_s: Option<f64>,
+    /// Slots of the living drones, relative to their mean, m.
     slots: Vec<Vec2>,
+    /// The last assignment.
     slot_of: Vec<usize>,
+    /// When it was solved, s.
     solved_s: Option<f64>,
 }
 
 impl Closing {
-    /// The formation is not being closed now.
-    pub fn open(&mut self) {
+    /// Start of the current period in which the formation is closed, s; `None` if it is open.
+    pub(crate) fn since_s(&self) -> Option<f64> {
+        self.since_s
+    }
+
+    /// Notes that the formation is open.
+    pub(crate) fn reopen(&mut self) {
         self.since_s = None;
     }
 
-    /// Takes the living drones' positions while all of them reform.
-    pub fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
+    /// Takes the positions of the living drones in a tick in which all of them reform.
+    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
         if self.closed(facts, t_s, positions) {
             self.since_s.get_or_insert(t_s);
         } else {
-            self.open();
+            self.reopen();
         }
     }
 
-    /// Whether each drone is near enough to a slot of its own. The last assignment is tried before it is solved anew.
+    /// Whether each drone is close enough to its slot. Tries the last assignment before it solves a new one.
     fn closed(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> bool {
         if self.slots.len() != positions.len() {
             self.slots = slots(facts, positions.len()).unwrap_or_default();
@@ -103,7 +114,7 @@ impl Closing {
         if self.solved_s.is_some() && fits(&self.slots, &self.slot_of) {
             return true;
         }
-        let due = self.solved_s.is_none_or(|solved_s| t_s - solved_s >= SOLVE_EVERY_S);
+        let due = self.solved_s.is_none_or(|solved_s| t_s - solved_s >= SOLVE_PERIOD_S);
         if positions.len() > SOLVE_ALWAYS_MAX && !due {
             return false;
         }
@@ -123,7 +134,7 @@ mod tests {
     use super::*;
     use crate::testing::facts;
 
-    /// The slots, moved, in another order, and each drone of them off by what `off` says.
+    /// The slots, translated and permuted, with drone `i` displaced by `off(i)`.
     fn near_slots(count: usize, off: impl Fn(usize) -> Vec2) -> Vec<Vec2> {
         let slots = facts(8).shape.slots(count, 35.0);
         (0..count).map(|i| slots[(i * 3 + 1) % count] + Vec2::new(900.0, -40.0) + off(i)).collect()
@@ -136,14 +147,14 @@ mod tests {
     }
 
     #[test]
-    fn one_drone_astray_moves_the_mean_too() {
+    fn one_displaced_drone_moves_the_mean_too() {
         let error = error(&facts(8), &near_slots(8, |i| Vec2::new(if i == 2 { 8.0 } else { 0.0 }, 0.0))).unwrap();
         assert!((error.largest_m - 7.0).abs() < 1e-9, "{error:?}");
         assert!((error.rmse_m - (56.0f64 / 8.0).sqrt()).abs() < 1e-9, "{error:?}");
     }
 
     #[test]
-    fn the_living_close_up() {
+    fn the_error_is_defined_for_any_number_of_living_drones() {
         assert!(error(&facts(8), &[]).is_none());
         let alone = error(&facts(8), &[Vec2::new(3.0, 3.0)]).unwrap();
         assert_eq!((alone.largest_m, alone.mean_distance_m), (0.0, None));
@@ -154,18 +165,18 @@ mod tests {
     }
 
     #[test]
-    fn closed_means_closed_until_the_end() {
+    fn closing_starts_again_after_the_formation_was_open() {
         for count in [8, 80] {
             let facts = facts(count as u32);
             let mut closing = Closing::default();
             let wide = |i: usize| Vec2::new(if i == 0 { 3.0 } else { 0.0 }, 0.0);
             closing.take(&facts, 1.0, &near_slots(count, |_| Vec2::zeros()));
-            assert_eq!(closing.since_s, Some(1.0));
+            assert_eq!(closing.since_s(), Some(1.0));
             closing.take(&facts, 2.0, &near_slots(count, wide));
-            assert_eq!(closing.since_s, None);
+            assert_eq!(closing.since_s(), None);
             closing.take(&facts, 3.0, &near_slots(count, |_| Vec2::zeros()));
             closing.take(&facts, 4.0, &near_slots(count, |_| Vec2::zeros()));
-            assert_eq!(closing.since_s, Some(3.0));
+            assert_eq!(closing.since_s(), Some(3.0));
         }
     }
 }

@@ -1,57 +1,73 @@
-//! Who led, when two led at once, and how long a group was without a leader after its leader's death.
+//! Which drones led, for how long two led the same group, and how long a group had no leader after its leader died.
 
 use crate::summary::{LeaderEntry, Term};
 use skein_protocol::record::DroneRow;
 use skein_protocol::{Ballot, DroneId, GroupId, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Leadership over a mission.
+/// Follows leadership over a mission.
 #[derive(Default)]
 pub(crate) struct Leading {
-    /// Who took up leading.
-    pub entries: Vec<LeaderEntry>,
-    /// Time with two leaders in radio range of each other of whom one should follow the other, s: they lead the same
-    /// group, or the later term is for a group that holds the other leader's own.
-    pub split_brain_s: f64,
-    /// For each death of a leader, the time until another one led its group, s.
-    pub failover_s: Vec<Option<f64>>,
+    entries: Vec<LeaderEntry>,
+    split_brain_s: f64,
+    failover_s: Vec<Option<f64>>,
     ballots: BTreeSet<Term>,
     orphans: Vec<Orphan>,
+    /// The group that each leader leads, and the leader, in the tick that was taken last.
     leaders: Vec<(GroupId, usize)>,
-    /// The last term that each drone took up.
+    /// The last term in which each drone became a leader.
     terms: BTreeMap<DroneId, Ballot>,
+}
+
+/// What the summary reports about leadership.
+pub(crate) struct LeadershipSummary {
+    /// Number of different ballots that led.
+    pub elections: u32,
+    /// Which drones became leaders.
+    pub entries: Vec<LeaderEntry>,
+    /// Time in which two leaders were in radio range of each other although one had to follow the other, s: both lead
+    /// the same group, or the later term is for a group that contains the other leader's own group.
+    pub split_brain_s: f64,
+    /// For each death of a leader, the time until another drone led its group, s; `None` if none ever did.
+    pub failover_s: Vec<Option<f64>>,
 }
 
 /// A group whose leader died.
 struct Orphan {
     group: GroupId,
     since_s: f64,
+    /// Index in `failover_s`.
     failover: usize,
 }
 
 impl Leading {
-    /// Number of different ballots that led.
-    pub fn elections(&self) -> u32 {
-        self.ballots.len() as u32
+    /// The result.
+    pub(crate) fn finish(self) -> LeadershipSummary {
+        LeadershipSummary {
+            elections: self.ballots.len() as u32,
+            entries: self.entries,
+            split_brain_s: self.split_brain_s,
+            failover_s: self.failover_s,
+        }
     }
 
-    /// A drone took up leading.
-    pub fn elected(&mut self, t_s: f64, group: String, ballot: Ballot, leader: DroneId) {
+    /// Notes that a drone became the leader of a group.
+    pub(crate) fn elected(&mut self, t_s: f64, group: String, ballot: Ballot, leader: DroneId) {
         self.ballots.insert(ballot.into());
         self.terms.insert(leader, ballot);
         self.entries.push(LeaderEntry { t_s, group, ballot: ballot.into(), leader: leader.0 });
     }
 
-    /// A drone died that was last seen as `row`.
-    pub fn died(&mut self, t_s: f64, row: &DroneRow) {
+    /// Notes the death of a drone, whose last row was `row`.
+    pub(crate) fn died(&mut self, t_s: f64, row: &DroneRow) {
         if leads(row) {
             self.orphans.push(Orphan { group: row.led, since_s: t_s, failover: self.failover_s.len() });
             self.failover_s.push(None);
         }
     }
 
-    /// Takes the rows of a tick that lasted `dt_s`. The dead lead nobody.
-    pub fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
+    /// Takes the rows of a tick that lasted `dt_s`. Dead drones lead no group.
+    pub(crate) fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
         self.leaders.clear();
         self.leaders.extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.led, drone)));
         self.leaders.sort_unstable();
@@ -90,12 +106,12 @@ mod tests {
     }
 
     #[test]
-    fn two_leaders_of_a_group_are_a_split_brain_if_they_hear_each_other() {
+    fn two_leaders_of_a_group_in_radio_range_are_a_split_brain() {
         let one = GroupId::ALL.child(1);
         let split = |range, rows: &[DroneRow]| {
             let mut leading = Leading::default();
             leading.take(1.0, 0.5, rows, range);
-            leading.split_brain_s
+            leading.finish().split_brain_s
         };
         let rivals = [leader(0.0, one), row(5.0, 0.0), leader(60.0, one)];
         assert_eq!(split(None, &rivals), 0.5);
@@ -108,20 +124,20 @@ mod tests {
                 let ballot = Ballot { round, incarnation: 1, claimant: DroneId(leader) };
                 leading.elected(0.5, "N".to_owned(), ballot, DroneId(leader));
             }
-            let whole = DroneRow { group, ..leader(0.0, GroupId::ALL) };
-            leading.take(1.0, 0.5, &[whole, DroneRow { group: one, ..leader(60.0, one) }], None);
-            leading.split_brain_s
+            let whole_group = DroneRow { group, ..leader(0.0, GroupId::ALL) };
+            leading.take(1.0, 0.5, &[whole_group, DroneRow { group: one, ..leader(60.0, one) }], None);
+            leading.finish().split_brain_s
         };
         let two = GroupId::ALL.child(2);
-        assert_eq!(nested(1, two), 0.0, "a part has a leader of its own, the former one leads the rest");
-        assert_eq!(nested(0, two), 0.5, "the whole was claimed, and the leader of a part goes on");
-        assert_eq!(nested(1, one), 0.5, "the part of the former leader has another one now");
+        assert_eq!(nested(1, two), 0.0, "a subgroup has its own leader, the former leader leads the rest");
+        assert_eq!(nested(0, two), 0.5, "the whole group was claimed, and the leader of a subgroup continues");
+        assert_eq!(nested(1, one), 0.5, "the subgroup of the former leader has a new leader");
         let dead = DroneRow { flags: ROW_LEADS, ..leader(60.0, one) };
         assert_eq!(split(None, &[leader(0.0, one), dead]), 0.0);
     }
 
     #[test]
-    fn failover_lasts_until_another_leads_the_group() {
+    fn failover_lasts_until_another_drone_leads_the_group() {
         let (one, two) = (GroupId::ALL.child(1), GroupId::ALL.child(2));
         let mut leading = Leading::default();
         leading.died(10.0, &leader(0.0, one));
@@ -135,12 +151,13 @@ mod tests {
     }
 
     #[test]
-    fn a_ballot_counts_once() {
+    fn a_ballot_that_leads_twice_is_one_election() {
         let mut leading = Leading::default();
         for (round, leader) in [(1, 0), (1, 0), (2, 3)] {
             let ballot = Ballot { round, incarnation: 1, claimant: DroneId(leader) };
             leading.elected(1.0, "N".to_owned(), ballot, DroneId(leader));
         }
-        assert_eq!((leading.elections(), leading.entries.len()), (2, 3));
+        let summary = leading.finish();
+        assert_eq!((summary.elections, summary.entries.len()), (2, 3));
     }
 }

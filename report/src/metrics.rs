@@ -1,44 +1,50 @@
-//! SwarmLab's swarm metrics of the living drones: order, safety, union, connectivity.
+//! The swarm metrics of SwarmLab over the living drones: order, safety, union, connectivity (Soria et al. 2020,
+//! "SwarmLab: a Matlab Drone Swarm Simulator").
 
 use crate::close::Sweep;
 use crate::summary::Metrics;
 use nalgebra::DMatrix;
 use skein_protocol::Vec2;
 
-/// Above this, connectivity is not computed: its eigenvalues cost N³.
+/// Largest number of drones for which connectivity is computed: its eigenvalues cost N³.
 const CONNECTIVITY_MAX: usize = 64;
-/// Slower than this a drone has no heading, m/s.
+/// Speed below which a drone has no heading, m/s.
 const STANDING_MPS: f64 = 1e-9;
 
-/// The metrics of one moment.
+/// The metrics at one time; `None` where one is not defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moment {
-    /// Mean over drones of the mean cosine between its velocity and its neighbours'; 1 for a drone without.
+    /// Mean over drones of the mean cosine between a drone's velocity and its neighbours' velocities. A drone without
+    /// neighbours counts as 1.
     pub order: Option<f64>,
     /// 1 − (pairs closer than the safe distance) / pairs.
     pub safety: Option<f64>,
     /// (N − components) / (N − 1).
     pub union: Option<f64>,
-    /// λ₂ of the graph's Laplacian / N.
+    /// λ₂ of the Laplacian of the graph / N.
     pub connectivity: Option<f64>,
 }
 
-/// Means of the metrics over a mission. Neighbours are drones in radio range; all, if it has no limit.
+/// Averages the metrics over a mission. Two drones are neighbours if they are in radio range; if the range has no limit,
+/// all drones are neighbours.
 pub(crate) struct SwarmMetrics {
     safe_distance_m: f64,
     range_m: Option<f64>,
+    /// Sum and count of each metric.
     sums: [(f64, u32); 4],
     sweep: Sweep,
+    /// The last neighbour graph and its connectivity.
     last_graph: Option<(Vec<u64>, f64)>,
 }
 
 impl SwarmMetrics {
-    pub fn new(safe_distance_m: f64, range_m: Option<f64>) -> Self {
+    /// Without samples. `range_m` is the radio range, m.
+    pub(crate) fn new(safe_distance_m: f64, range_m: Option<f64>) -> Self {
         Self { safe_distance_m, range_m, sums: [(0.0, 0); 4], sweep: Sweep::default(), last_graph: None }
     }
 
-    /// Takes one moment: positions and velocities of the living drones.
-    pub fn take(&mut self, positions: &[Vec2], velocities: &[Vec2]) {
+    /// Takes the positions, m, and velocities, m/s, of the living drones at one time.
+    pub(crate) fn take(&mut self, positions: &[Vec2], velocities: &[Vec2]) {
         let moment = self.moment(positions, velocities);
         let values = [moment.order, moment.safety, moment.union, moment.connectivity];
         for ((sum, count), value) in self.sums.iter_mut().zip(values) {
@@ -49,13 +55,14 @@ impl SwarmMetrics {
     }
 
     /// The means so far.
-    pub fn means(&self) -> Metrics {
+    pub(crate) fn means(&self) -> Metrics {
         let [order, safety, union, connectivity] =
             self.sums.map(|(sum, count)| (count > 0).then(|| sum / f64::from(count)));
         Metrics { order, safety, union, connectivity }
     }
 
-    pub(crate) fn moment(&mut self, positions: &[Vec2], velocities: &[Vec2]) -> Moment {
+    /// The metrics at one time.
+    fn moment(&mut self, positions: &[Vec2], velocities: &[Vec2]) -> Moment {
         let n = positions.len();
         if n < 2 {
             return Moment { order: (n == 1).then_some(1.0), ..Moment::default() };
@@ -75,7 +82,7 @@ impl SwarmMetrics {
         Moment { order: Some(graph.order(&headings)), safety, union, connectivity }
     }
 
-    /// Eigenvalues only when the graph has changed.
+    /// Computes the eigenvalues only if the graph has changed.
     fn connectivity(&mut self, links: &[u64]) -> f64 {
         match &self.last_graph {
             Some((last, value)) if last == links => *value,
@@ -88,12 +95,13 @@ impl SwarmMetrics {
     }
 }
 
-/// Unit vector along a velocity; zero for a drone that stands.
+/// Unit vector along a velocity; zero for a drone at rest.
 fn heading(velocity: Vec2) -> Vec2 {
     velocity.try_normalize(STANDING_MPS).unwrap_or_default()
 }
 
-/// Order when everybody is everybody's neighbour: Σⱼ uᵢ·uⱼ = uᵢ·(S − uᵢ), no pair needs to be looked at.
+/// Order if all drones are neighbours. With S the sum of all headings, Σⱼ uᵢ·uⱼ = uᵢ·(S − uᵢ), so that no pair has to be
+/// visited.
 fn order_of_all(headings: &[Vec2]) -> f64 {
     let sum: Vec2 = headings.iter().sum();
     let moving = headings.iter().filter(|heading| **heading != Vec2::zeros()).count();
@@ -101,17 +109,18 @@ fn order_of_all(headings: &[Vec2]) -> f64 {
     headings.iter().map(one).sum::<f64>() / headings.len() as f64
 }
 
-/// Mean cosine with `moving` neighbours whose headings add up to `sum`; 1 where there is nothing to compare.
+/// Mean cosine with `moving` neighbours whose headings add up to `sum`; 1 without a moving neighbour.
 fn mean_cosine(heading: Vec2, sum: Vec2, moving: usize) -> f64 {
     if heading == Vec2::zeros() || moving == 0 { 1.0 } else { heading.dot(&sum) / moving as f64 }
 }
 
-/// Who is in radio range of whom.
+/// The graph of neighbours.
 struct Graph {
+    /// Union-find forest of the connected components.
     parent: Vec<usize>,
     heading_sum: Vec<Vec2>,
     moving: Vec<usize>,
-    /// One bit a neighbour; left empty above [`CONNECTIVITY_MAX`] drones.
+    /// One bit per neighbour; empty above [`CONNECTIVITY_MAX`] drones.
     links: Vec<u64>,
 }
 
@@ -151,11 +160,10 @@ impl Graph {
     }
 }
 
-/// λ₂ of the Laplacian of a graph with at most 64 nodes, given as neighbour bits.
+/// λ₂, the second-smallest eigenvalue of the Laplacian of a graph with at most 64 nodes, given as neighbour bits.
 fn algebraic_connectivity(links: &[u64]) -> f64 {
-    let laplacian = DMatrix::from_fn(links.len(), links.len(), |i, j| match (i == j, links[i] >> j & 1) {
-        (true, _) => f64::from(links[i].count_ones()),
-        (false, linked) => -(linked as f64),
+    let laplacian = DMatrix::from_fn(links.len(), links.len(), |i, j| {
+        if i == j { f64::from(links[i].count_ones()) } else { -((links[i] >> j & 1) as f64) }
     });
     let mut values: Vec<f64> = laplacian.symmetric_eigenvalues().iter().copied().collect();
     values.sort_by(f64::total_cmp);
@@ -177,11 +185,11 @@ mod tests {
     }
 
     #[test]
-    fn a_path_of_three_and_one_alone() {
+    fn metrics_of_a_path_of_three_and_a_lone_drone() {
         let mut metrics = SwarmMetrics::new(25.0, Some(40.0));
         let velocities = [EAST, -EAST, Vec2::new(0.0, 3.0), EAST];
         let moment = metrics.moment(&row(&[0.0, 30.0, 50.0, 200.0]), &velocities);
-        // Cosines: the first sees −1, the second −1 and 0, the third 0, the last nobody.
+        // Cosines: the first drone has −1, the second −1 and 0, the third 0, the last has no neighbour.
         assert!(close(moment.order, (-1.0 - 0.5 + 0.0 + 1.0) / 4.0), "{moment:?}");
         assert!(close(moment.safety, 1.0 - 1.0 / 6.0), "{moment:?}");
         assert!(close(moment.union, 2.0 / 3.0), "{moment:?}");
@@ -189,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn connectivity_of_a_path_a_star_and_all() {
+    fn connectivity_of_a_path_a_star_and_a_complete_graph() {
         let mut metrics = SwarmMetrics::new(1.0, Some(11.0));
         // λ₂ of a path of n nodes: 2 (1 − cos(π/n)).
         let path = metrics.moment(&row(&[0.0, 10.0, 20.0, 30.0]), &[EAST; 4]);
@@ -201,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_range_all_are_neighbours() {
+    fn without_a_range_limit_all_drones_are_neighbours() {
         let positions = row(&[0.0, 500.0, 1000.0, 1020.0]);
         let velocities = [EAST, Vec2::new(3.0, 4.0), -EAST, Vec2::zeros()];
         let free = SwarmMetrics::new(25.0, None).moment(&positions, &velocities);
@@ -213,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_none() {
+    fn metrics_that_are_not_defined_are_none() {
         let mut metrics = SwarmMetrics::new(25.0, None);
         assert_eq!(metrics.moment(&[], &[]), Moment::default());
         assert_eq!(metrics.moment(&row(&[0.0]), &[EAST]), Moment { order: Some(1.0), ..Moment::default() });

@@ -1,7 +1,8 @@
-//! What is recorded in flight: the records as they came, appended to one file by a thread of its own. What people read
-//! is made of it after the flight, so that a swarm which needs all cores does not wait for text.
+//! Keeps the records of a run while it flies: a thread appends them, as they are, to one file.
 //!
-//! A record is its length in bytes as a `u64` in this machine's byte order, then itself, padded to eight bytes.
+//! The files for people and tools are made from it after the flight, so that a swarm that needs all cores does not wait
+//! for text to be formatted. In the file, each record follows its length in bytes as a `u64` in native byte order, and is
+//! padded to eight bytes.
 
 use crate::error::ReportError;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -13,17 +14,15 @@ use std::mem;
 use std::path::Path;
 use std::thread::JoinHandle;
 
-/// Name of the file in a run's folder, while it flies.
-pub(crate) const FILE: &str = "flight.spool";
-/// A block is handed to the thread once it holds so many bytes.
+/// Size at which a block is handed to the thread, bytes.
 const BLOCK: usize = 64 << 10;
-/// Blocks there are, so many a slow disk may be behind: with the records that exceed a block, all the memory used.
+/// Number of blocks, by which a slow disk may lag behind. They bound the memory used.
 const BLOCKS: usize = 128;
-/// What is read at once, and given back at once, bytes.
+/// Size of the pieces in which the file is read and its disk space is freed, bytes.
 const PIECE: usize = 1 << 20;
 const WORD: usize = size_of::<u64>();
 
-/// Appends records.
+/// Appends records to the file.
 pub(crate) struct Spool {
     block: Vec<u8>,
     block_len: usize,
@@ -33,21 +32,23 @@ pub(crate) struct Spool {
 }
 
 impl Spool {
-    /// Starts the file.
-    pub fn create(path: &Path) -> io::Result<Self> {
+    /// Creates the file and starts the thread.
+    pub(crate) fn create(path: &Path) -> io::Result<Self> {
         Self::start(File::create(path)?, BLOCK)
     }
 
     fn start(mut out: impl Write + Send + 'static, block_len: usize) -> io::Result<Self> {
         let (full, filled) = bounded::<Vec<u8>>(BLOCKS);
         let (emptied, empty) = bounded(BLOCKS);
-        // Room for all of them: no send of an empty block fails or waits.
-        (1..BLOCKS).for_each(|_| drop(emptied.send(Vec::new())));
+        // The channel has room for all blocks: sending an empty one neither fails nor waits.
+        for _ in 1..BLOCKS {
+            drop(emptied.send(Vec::new()));
+        }
         let write = move || {
             for mut block in filled {
                 out.write_all(&block)?;
                 block.clear();
-                // Whoever filled it may have finished meanwhile.
+                // The receiver may be gone, because the spool was finished.
                 let _ = emptied.send(block);
             }
             out.flush()
@@ -57,12 +58,13 @@ impl Spool {
     }
 
     /// Whether [`Spool::take`] would not wait for the disk.
-    pub fn ready(&self) -> bool {
+    pub(crate) fn ready(&self) -> bool {
         !self.empty.is_empty() || self.writer.is_finished()
     }
 
-    /// Takes a record; waits for a slow disk. False once the disk has refused: [`Spool::finish`] tells why.
-    pub fn take(&mut self, record: RecordView<'_>) -> bool {
+    /// Takes a record, and waits if the disk is slow. Returns false after a write has failed; [`Spool::finish`] then
+    /// returns the error.
+    pub(crate) fn take(&mut self, record: RecordView<'_>) -> bool {
         let len = record.byte_len();
         let at = self.block.len();
         self.block.extend_from_slice(&(len as u64).to_ne_bytes());
@@ -75,13 +77,13 @@ impl Spool {
         self.full.send(mem::replace(&mut self.block, next)).is_ok()
     }
 
-    /// Waits until all is written.
+    /// Waits until all records are written.
     ///
     /// # Errors
-    /// What the disk said; all records before are in the file.
-    pub fn finish(self) -> io::Result<()> {
+    /// The error of the first write that failed. All records before it are in the file.
+    pub(crate) fn finish(self) -> io::Result<()> {
         if !self.block.is_empty() {
-            // If nobody takes it, the thread has ended with an error.
+            // If the channel is closed, the thread has ended with an error.
             let _ = self.full.send(self.block);
         }
         drop(self.full);
@@ -89,11 +91,11 @@ impl Spool {
     }
 }
 
-/// Reads a file's records in order, and gives back their room on the disk, which what is made of them may need. Ends
-/// before a record that was cut short.
+/// Reads the records of a file in order. Frees the disk space of what was read, because the files made from it may need
+/// the space. Stops before a record that was cut short.
 ///
 /// # Errors
-/// Of `take`, or [`ReportError::Io`].
+/// The error of `take`, or [`ReportError::Io`].
 pub(crate) fn consume(
     path: &Path,
     mut take: impl FnMut(RecordView<'_>) -> Result<(), ReportError>,
@@ -111,7 +113,7 @@ pub(crate) fn consume(
         let read = left - records.left;
         let past = read - read % PIECE as u64;
         if past > freed {
-            // A file system that cannot do it keeps the file a little longer.
+            // A file system without this operation keeps the space until the file is removed.
             let _ = fallocate(&file, FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE, freed, past - freed);
             freed = past;
         }
@@ -119,11 +121,12 @@ pub(crate) fn consume(
     Ok(())
 }
 
+/// Reads records one after the other.
 struct Records<R> {
     input: R,
-    /// Bytes that are not read yet.
+    /// Number of bytes not yet read.
     left: u64,
-    /// The record read last; words, since its parts must be aligned.
+    /// The record read last. Its parts must be aligned, so it is stored in words.
     words: Vec<u64>,
 }
 
@@ -147,23 +150,24 @@ impl<R: Read> Records<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::SPOOL;
     use crate::testing::row;
     use skein_protocol::record::{DroneRow, RecordHeader};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::time::Duration;
 
-    /// A disk that takes its time, and fails once it holds `room` bytes.
+    /// A slow disk that fails once it holds `room` bytes.
     struct Disk {
         file: File,
         room: usize,
-        nap: Duration,
+        delay: Duration,
         largest: Arc<AtomicUsize>,
     }
 
     impl Write for Disk {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            std::thread::sleep(self.nap);
+            std::thread::sleep(self.delay);
             self.largest.fetch_max(bytes.len(), Ordering::Relaxed);
             if self.room == 0 {
                 return Err(ErrorKind::StorageFull.into());
@@ -178,12 +182,12 @@ mod tests {
         }
     }
 
-    fn disk(path: &Path, room: usize, nap_us: u64) -> Disk {
+    fn disk(path: &Path, room: usize, delay_us: u64) -> Disk {
         let file = File::create(path).unwrap();
-        Disk { file, room, nap: Duration::from_micros(nap_us), largest: Arc::default() }
+        Disk { file, room, delay: Duration::from_micros(delay_us), largest: Arc::default() }
     }
 
-    /// A record of `tick`, with events of another length each time. True as long as it is taken.
+    /// Gives the spool a record of `tick`, whose events have another length in each tick. Returns whether it was taken.
     fn give(spool: &mut Spool, tick: u64) -> bool {
         let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick as f64, f64::from(drone))).collect();
         let events = vec![b'x'; tick as usize % 11];
@@ -204,9 +208,9 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_disk_holds_up_and_loses_nothing() {
+    fn a_slow_disk_delays_the_recorder_and_loses_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
+        let path = folder.path().join(SPOOL);
         let slow = disk(&path, usize::MAX, 300);
         let largest = Arc::clone(&slow.largest);
         let mut spool = Spool::start(slow, 4096).unwrap();
@@ -218,28 +222,30 @@ mod tests {
         assert!(waited.count() > 0, "the disk was never behind");
         spool.finish().unwrap();
         assert_eq!(ticks(&path), (0..2000).collect::<Vec<_>>());
-        assert!(largest.load(Ordering::Relaxed) < 2 * 4096, "blocks grow behind a slow disk");
+        assert!(largest.load(Ordering::Relaxed) < 2 * 4096, "blocks grow if the disk is slow");
     }
 
     #[test]
-    fn a_full_disk_is_named_and_what_it_took_is_there() {
+    fn a_full_disk_is_reported_and_earlier_records_are_kept() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
+        let path = folder.path().join(SPOOL);
         let mut spool = Spool::start(disk(&path, 100_000, 0), 4096).unwrap();
         let refused = (0..100_000).find(|&tick| !give(&mut spool, tick));
-        assert!(refused.is_some() && spool.ready(), "it waits for a disk that is full");
+        assert!(refused.is_some() && spool.ready(), "the spool waits for a full disk");
         assert_eq!(spool.finish().unwrap_err().kind(), ErrorKind::StorageFull);
         let kept = ticks(&path);
         assert!(kept.len() > 90 && kept.iter().zip(0..).all(|(&tick, place)| tick == place), "{kept:?}");
     }
 
     #[test]
-    fn what_was_read_is_off_the_disk() {
+    fn records_that_were_read_free_their_disk_space() {
         use std::os::unix::fs::MetadataExt;
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
+        let path = folder.path().join(SPOOL);
         let mut spool = Spool::create(&path).unwrap();
-        (0..4000).for_each(|tick| assert!(give(&mut spool, tick)));
+        for tick in 0..4000 {
+            assert!(give(&mut spool, tick));
+        }
         spool.finish().unwrap();
         let blocks = || std::fs::metadata(&path).unwrap().blocks() * 512;
         let (whole, mut left) = (blocks(), 0);
@@ -252,15 +258,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_record_is_refused_and_what_is_cut_short_ends_it() {
+    fn invalid_records_are_refused_and_a_truncated_one_ends_the_file() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
+        let path = folder.path().join(SPOOL);
         let read = |words: &[u64]| {
             std::fs::write(&path, bytemuck::cast_slice(words)).unwrap();
             consume(&path, |_| panic!("{words:?} is no record"))
         };
         let error = read(&[16, 7, 7]).unwrap_err().to_string();
-        assert!(error.contains(FILE) && error.contains("16 bytes"), "{error}");
+        assert!(error.contains(SPOOL) && error.contains("16 bytes"), "{error}");
         for cut in [&[][..], &[24, 7, 7], &[u64::MAX, 7]] {
             read(cut).unwrap();
         }

@@ -1,4 +1,4 @@
-//! How each obstacle set was passed: by which routes, in which groups, under whose plan.
+//! How each obstacle set was passed: by which routes, in which groups, under which plan.
 
 use crate::facts::{ObstacleSet, RunFacts};
 use crate::summary::{Stage, StageGroup};
@@ -9,43 +9,49 @@ use skein_protocol::record::DroneRow;
 use skein_protocol::{DroneId, GroupId, Message, Phase, PlanStamp};
 use std::collections::BTreeMap;
 
-/// All stages of a mission.
+/// Follows all stages of a mission. A stage is an obstacle set that the swarm passes.
 pub(crate) struct Stages {
     stages: Vec<Progress>,
     plans: BTreeMap<PlanStamp, AvoidPlan>,
+    /// The group leader that each plan assigns to each drone.
     leaders: BTreeMap<(PlanStamp, u32), DroneId>,
 }
 
+/// What is known of one stage so far.
 struct Progress {
     set: ObstacleSet,
     detected_s: Option<f64>,
     passed_s: Option<f64>,
-    /// For each drone, how it flies the set, or flew it when it passed the gate.
+    /// For each drone, how it passes the set, or how it passed the gate.
     flown: Vec<Option<Flown>>,
     /// For each drone, whether it is past the gate.
     beyond: Vec<bool>,
 }
 
+/// How a drone passes a set.
 #[derive(Clone, Copy)]
 struct Flown {
+    /// The plan that it obeys.
     stamp: PlanStamp,
     group: GroupId,
     route: u16,
     leader: Option<DroneId>,
 }
 
-/// A plan to go around a set, as first said.
+/// A plan to avoid a set, as its leader sent it first.
 struct AvoidPlan {
     group: GroupId,
     obstacles: Vec<u32>,
     routes: u32,
     candidates: u32,
+    /// When the plan was made, s.
     made_s: f64,
     predicted_s: Option<f64>,
 }
 
 impl Stages {
-    pub fn new(facts: &RunFacts) -> Self {
+    /// For a run with these facts, before its first tick.
+    pub(crate) fn new(facts: &RunFacts) -> Self {
         let drones = facts.drones as usize;
         let stage = |set| Progress {
             set,
@@ -57,32 +63,33 @@ impl Stages {
         Self { stages: facts.sets().into_iter().map(stage).collect(), plans: BTreeMap::new(), leaders: BTreeMap::new() }
     }
 
-    /// A living drone senses the set for the first time. Whether it is the first set that anybody senses.
-    pub fn detected(&mut self, stage: u32, t_s: f64) -> bool {
+    /// Notes that a living drone senses the set for the first time. Returns whether it is the first set that any drone
+    /// senses.
+    pub(crate) fn detected(&mut self, stage: u32, t_s: f64) -> bool {
         let first = self.stages.iter().all(|stage| stage.detected_s.is_none());
         let known = self.stages.get_mut(stage as usize);
         known.is_some_and(|stage| stage.detected_s.replace(stage.detected_s.unwrap_or(t_s)).is_none()) && first
     }
 
-    /// The last living drone is past the set.
-    pub fn passed(&mut self, stage: u32, t_s: f64) {
+    /// Notes that the last living drone is past the set.
+    pub(crate) fn passed(&mut self, stage: u32, t_s: f64) {
         if let Some(stage) = self.stages.get_mut(stage as usize) {
             stage.passed_s.get_or_insert(t_s);
         }
     }
 
-    /// Whether every set is passed; true without obstacles.
-    pub fn all_passed(&self) -> bool {
+    /// Whether all sets are passed; true without obstacles.
+    pub(crate) fn all_passed(&self) -> bool {
         self.stages.iter().all(|stage| stage.passed_s.is_some())
     }
 
-    /// Whether there is anything to pass.
-    pub fn any(&self) -> bool {
+    /// Whether the mission has obstacles.
+    pub(crate) fn any(&self) -> bool {
         !self.stages.is_empty()
     }
 
-    /// Learns the plans said in a tick.
-    pub fn hear(&mut self, frames: &[AirFrame]) {
+    /// Takes the plans that were sent in a tick.
+    pub(crate) fn take_frames(&mut self, frames: &[AirFrame]) {
         let planned = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
         for frame in frames.iter().filter(planned) {
             match Message::decode(&frame.frame) {
@@ -92,14 +99,14 @@ impl Stages {
                 Ok(Message::Assignment(Assignment { id, drone, leader, .. })) => {
                     self.leaders.insert((id, drone.0), leader);
                 }
-                // Frames of other kinds, and those that no receiver could read.
+                // Other messages, and frames that no receiver can decode.
                 _ => {}
             }
         }
     }
 
-    /// Takes the rows of a tick: until a drone is past the gate, what it obeys may change.
-    pub fn take(&mut self, rows: &[DroneRow]) {
+    /// Takes the rows of a tick. Until a drone is past the gate, its plan and route may change.
+    pub(crate) fn take_rows(&mut self, rows: &[DroneRow]) {
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
             let queued = row.is_queued() && row.route != NO_ROUTE;
             let plan = self.plans.get(&row.obeyed).filter(|_| queued);
@@ -115,7 +122,7 @@ impl Stages {
     }
 
     /// The stages of the summary.
-    pub fn finish(self) -> Vec<Stage> {
+    pub(crate) fn finish(self) -> Vec<Stage> {
         self.stages.iter().map(|stage| self.summary(stage)).collect()
     }
 
@@ -138,7 +145,7 @@ impl Stages {
         }
     }
 
-    /// The last plan for each group, of those under which drones flew the set.
+    /// The last plan for each group, among the plans under which drones passed the set.
     fn last_plans(&self, stage: &Progress) -> Vec<&AvoidPlan> {
         let mut last: BTreeMap<GroupId, &AvoidPlan> = BTreeMap::new();
         for plan in stage.flown.iter().flatten().filter_map(|flown| self.plans.get(&flown.stamp)) {
@@ -162,7 +169,8 @@ impl Stages {
         groups.into_iter().map(group).collect()
     }
 
-    /// Who led these drones: as their newest assignment says, else the claimant they obeyed, if it is one of them.
+    /// The leader of these drones: the one in their newest assignment, or else the claimant of the ballot that they
+    /// obeyed if it is one of them.
     fn leader(&self, stage: &Progress, drones: &[u32]) -> Option<u32> {
         let flown = |drone: &u32| stage.flown[*drone as usize];
         let newest = drones.iter().max_by_key(|&drone| flown(drone).map(|flown| flown.stamp))?;
@@ -173,12 +181,13 @@ impl Stages {
 }
 
 impl Progress {
-    /// Those who are past the gate, and how they flew.
+    /// The drones past the gate, and how they passed it.
     fn passed_by(&self) -> impl Iterator<Item = (u32, Flown)> + '_ {
         let flown = self.flown.iter().zip(&self.beyond).zip(0..);
         flown.filter_map(|((flown, beyond), drone)| flown.filter(|_| *beyond).map(|flown| (drone, flown)))
     }
 
+    /// Number of drones that passed by each route.
     fn split(&self, routes: u32) -> Vec<u32> {
         let mut split = vec![0; routes as usize];
         for (_, flown) in self.passed_by() {
@@ -196,7 +205,7 @@ impl AvoidPlan {
         Self {
             group: plan.group,
             obstacles: plan.set[..count].iter().map(|id| id.0).collect(),
-            // A route is a u16: a frame that announces more is rubbish.
+            // The index of a route is a u16; a frame with more routes is invalid.
             routes: plan.routes.min(u32::from(NO_ROUTE)),
             candidates: plan.candidates,
             made_s: plan.stamp.secs(),
@@ -205,6 +214,7 @@ impl AvoidPlan {
     }
 }
 
+/// The split past a set with exactly two routes, as `[left, right]`.
 fn left_right(split: &[u32]) -> Option<[u32; 2]> {
     match split {
         [right, left] => Some([*left, *right]),

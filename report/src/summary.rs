@@ -1,5 +1,7 @@
-//! The outcome of a run in one object. Its keys are a contract: added to freely, never renamed or dropped; what does
-//! not apply is null, never absent.
+//! The result of a run in one object, summary.json.
+//!
+//! Its keys are a contract: keys may be added, but are never renamed or removed. The value of a key that does not apply is
+//! null; the key is never absent.
 
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -10,16 +12,16 @@ use skein_protocol::{Ballot, DroneId};
 /// [`Summary::schema`] of this version.
 pub const SUMMARY_SCHEMA: &str = "skein-summary/1";
 
-/// What came of a run. SI units; times in seconds of simulated time unless the key says otherwise.
+/// The result of a run. SI units; times are in seconds of simulated time unless the key says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// Name and version of this layout.
     pub schema: String,
     /// The scenario's name.
     pub scenario: String,
-    /// How drones were grouped.
+    /// The strategy by which drones were grouped.
     pub strategy: String,
-    /// Key of everything random.
+    /// Seed of all random values.
     pub seed: u64,
     /// `processes` or `inline`.
     pub runtime: String,
@@ -33,20 +35,20 @@ pub struct Summary {
     pub ticks: u64,
     /// Simulated time, s.
     pub sim_s: f64,
-    /// Simulated time by wall time.
+    /// Simulated time per wall time.
     pub realtime_factor: Option<f64>,
-    /// Ticks times drones by wall time, 1/s.
+    /// Ticks times drones per wall time, 1/s.
     pub agent_steps_per_s: Option<f64>,
     /// Wall time from the first tick opened to the last tick done, planning and recording included, s.
     pub wall_s: Option<f64>,
     /// Wall time from the command to the first tick, s.
     pub startup_s: Option<f64>,
-    /// Wall time of what came after the last tick (files, plots), s.
+    /// Wall time after the last tick, for files and plots, s.
     pub report_s: Option<f64>,
-    /// How it ended.
+    /// How the mission ended.
     #[schemars(with = "String", extend("enum" = ["reached", "timeout", "unsafe", "aborted"]))]
     pub outcome: Outcome,
-    /// Why it ended, in words.
+    /// Why the mission ended, in words.
     pub reason: Option<String>,
     /// One for each obstacle set, in flight order.
     pub stages: Vec<Stage>,
@@ -60,7 +62,7 @@ pub struct Summary {
     pub formation_error_m: Option<f64>,
     /// Root of the mean squared slot error, m.
     pub formation_rmse_m: Option<f64>,
-    /// Mean distance between drones against the shape's (R6), absolute difference, m.
+    /// Absolute difference between the mean distance of the drones and that of the target shape (R6), m.
     pub mean_distance_error_m: Option<f64>,
     /// Energy used.
     pub energy_j: Energy,
@@ -68,110 +70,110 @@ pub struct Summary {
     pub min_separation_m: Option<f64>,
     /// Least distance of a flying body's centre to an obstacle over the mission, m; negative inside.
     pub min_clearance_m: Option<f64>,
-    /// Invariants that were broken.
+    /// The invariants that were violated.
     pub violations: Vec<Violation>,
-    /// Means over the mission.
+    /// Swarm metrics, averaged over the mission.
     pub metrics: Metrics,
     /// Number of different ballots that led.
     pub elections: u32,
-    /// Who took up leading, when.
+    /// The drones that became leaders, in order of time.
     pub leaders: Vec<LeaderEntry>,
-    /// Time during which two leaders of one group could hear each other, added up, s.
+    /// Total time in which two leaders of one group were in radio range of each other, s.
     pub split_brain_s: f64,
-    /// For each death of a leader, the time until another drone led its group, s; null if none ever did.
+    /// For each death of a leader, the time until another drone led its group, s; null if no drone ever did.
     pub failover_s: Vec<Option<f64>>,
-    /// What was said and heard.
+    /// Messages sent, delivered and dropped.
     pub messages: Messages,
-    /// What was done to drones and links, or happened to them.
+    /// Faults of drones and links, scheduled or not.
     pub faults: Vec<FaultEntry>,
-    /// Ticks that drones did not answer in time (wall clock only).
+    /// Number of ticks that drones did not answer in time (wall clock only).
     pub deadline_misses: u64,
     /// How late ticks opened, µs (wall clock only; null in lockstep).
     pub lateness_us: Option<StepTimes>,
     /// Wall time of a drone's step, µs; null in the inline runtime.
     pub step_us: Option<StepTimes>,
-    /// Commands that were not finite and not carried out.
+    /// Number of commands that were not finite and therefore not executed.
     pub rejected_commands: Option<u64>,
-    /// Ticks missing from this record because the recorder was full (wall clock only).
+    /// Number of ticks missing from the record because the recorder was too slow (wall clock only).
     pub lost_ticks: u64,
-    /// Over every drone's state and every delivered message in every tick: 16 hex digits.
+    /// Hash over every drone's state and every delivered message in every tick, 16 hex digits.
     pub digest: Option<String>,
 }
 
 /// How one obstacle set was passed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
-    /// The set's obstacles, by their places in the scenario.
+    /// The ids of its obstacles: their indices in the scenario.
     pub obstacles: Vec<u32>,
-    /// First tick a living drone sensed it, s.
+    /// When a living drone first sensed it, s.
     pub detected_s: Option<f64>,
     /// When the last living drone was past the mean centre abscissa, s.
     pub passed_s: Option<f64>,
-    /// From detected to passed, s.
+    /// Time from `detected_s` to `passed_s`, s.
     pub pass_time_s: Option<f64>,
     /// Number of routes past the set.
     pub routes: Option<u32>,
-    /// Drones for each route as flown, rightmost route first.
+    /// Number of drones that passed by each route, rightmost route first.
     pub split: Option<Vec<u32>>,
     /// The same as `[left, right]`; null if there are not exactly two routes.
     pub split_left_right: Option<[u32; 2]>,
-    /// The leaders' forecast of `pass_time_s`, s.
+    /// The leaders' prediction of `pass_time_s`, s.
     pub predicted_s: Option<f64>,
-    /// Groupings simulated forward before the choice.
+    /// Number of candidate groupings that a leader simulated before its choice.
     pub candidates_rehearsed: Option<u32>,
-    /// Who flew with whom.
+    /// The groups that passed it.
     pub groups: Option<Vec<StageGroup>>,
 }
 
-/// A group as it passed a set.
+/// A group that passed an obstacle set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageGroup {
-    /// Its lineage: `N1`, `N12`.
+    /// Its name by lineage, such as `N1` or `N12`.
     pub name: String,
     /// Its route, 0 = rightmost.
     pub route: u16,
-    /// Its drones that passed.
+    /// The drones that passed in it.
     pub drones: Vec<u32>,
-    /// Who led it.
+    /// Its leader.
     pub leader: Option<u32>,
 }
 
 /// Energy used, J.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Energy {
-    /// By the drones living at the end, from start to end.
+    /// Of the drones alive at the end, from start to end.
     pub total: f64,
-    /// By the drones living then, from the start until the last stage was passed.
+    /// Of the drones alive when the last stage was passed, from the start until then.
     pub until_passed: Option<f64>,
-    /// By the drones living then, from the first detection until the last stage was passed.
+    /// Of the drones alive when the last stage was passed, from the first detection until then.
     pub detection_to_pass: Option<f64>,
-    /// By each drone, dead ones too.
+    /// Of each drone, dead drones included.
     pub per_drone: Vec<f64>,
 }
 
-/// An invariant that was broken.
+/// A violated invariant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Violation {
-    /// When it began, s.
+    /// When the violation began, s.
     pub t_s: f64,
-    /// Which.
+    /// The invariant.
     #[schemars(
         with = "String",
         extend("enum" = ["separation", "clearance", "conflicting-assignment", "ballot-went-back"])
     )]
     pub kind: ViolationKind,
-    /// Who.
+    /// The drones involved.
     pub drones: Vec<u32>,
-    /// How far, m.
+    /// The violating distance, m.
     pub value_m: f64,
 }
 
-/// SwarmLab's swarm metrics of the living drones, from 0 to 1 (order: from −1), averaged over the mission.
+/// The swarm metrics of SwarmLab over the living drones, averaged over the mission. From 0 to 1; order from −1 to 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Metrics {
-    /// How alike the headings of neighbours are.
+    /// Alignment of the headings of neighbours.
     pub order: Option<f64>,
-    /// Share of pairs at the safe distance or beyond.
+    /// Share of pairs at least the safe distance apart.
     pub safety: Option<f64>,
     /// (N − connected components) / (N − 1).
     pub union: Option<f64>,
@@ -179,27 +181,27 @@ pub struct Metrics {
     pub connectivity: Option<f64>,
 }
 
-/// A drone that took up leading.
+/// A drone that became a leader.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeaderEntry {
     /// When, s.
     pub t_s: f64,
-    /// Which group.
+    /// The group that it led.
     pub group: String,
-    /// Its term.
+    /// The ballot of its term.
     pub ballot: Term,
-    /// Who.
+    /// The leader.
     pub leader: u32,
 }
 
-/// A term of leadership.
+/// A ballot, which identifies a term of leadership.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct Term {
     /// Number of the election.
     pub round: u32,
-    /// Of the claimant's process.
+    /// Incarnation of the claimant's process.
     pub incarnation: u32,
-    /// Who claimed it.
+    /// The drone that claimed it.
     pub claimant: u32,
 }
 
@@ -209,41 +211,41 @@ impl From<Ballot> for Term {
     }
 }
 
-/// Messages over the mission. Counts that only the world knows are null if it died.
+/// Messages over the mission. Counts that only the world process knows are null if it died.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Messages {
     /// Frames sent.
     pub sent: u64,
-    /// Messages heard, over all receivers, each counted once.
+    /// Messages delivered, over all receivers, each message counted once.
     pub delivered: u64,
-    /// Messages heard for the second time, over all receivers.
+    /// Messages delivered a second time, over all receivers.
     pub duplicates: Option<u64>,
-    /// Not heard, by reason.
+    /// Frames that were not delivered, by reason.
     pub dropped: Dropped,
-    /// From sending to hearing.
+    /// Time from sending to delivery.
     #[schemars(with = "PercentilesSchema")]
     pub delay_s: Percentiles,
-    /// Age of a peer's last known pose.
+    /// Age of the last known pose of another drone.
     #[schemars(with = "PercentilesSchema")]
     pub age_s: Percentiles,
 }
 
-/// Frames that were not heard, over all receivers.
+/// Frames that were not delivered, over all receivers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Dropped {
-    /// Lost on their own.
+    /// Lost independently of other frames.
     pub loss: Option<u64>,
     /// Lost in bursts.
     pub burst: Option<u64>,
-    /// Out of range.
+    /// The receiver was out of range.
     pub range: Option<u64>,
-    /// Between two sides of a partition.
+    /// Sender and receiver were on two sides of a partition.
     pub partition: Option<u64>,
-    /// At a deaf receiver, or from a mute sender.
+    /// The receiver was deaf or the sender was mute.
     pub deaf: Option<u64>,
-    /// Not to be decoded.
+    /// The frame could not be decoded.
     pub malformed: Option<u64>,
-    /// Waited too long for the channel.
+    /// The frame waited too long for the shared channel.
     pub queue: Option<u64>,
 }
 
@@ -263,19 +265,19 @@ struct PercentilesSchema {
     max: Option<f64>,
 }
 
-/// A fault.
+/// A fault of a drone or a link.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FaultEntry {
     /// When, s.
     pub t_s: f64,
-    /// What.
+    /// The kind of fault.
     #[schemars(with = "String")]
     pub kind: FaultKind,
-    /// Whom; null: the whole swarm.
+    /// The drone concerned; null for the whole swarm.
     pub target: Option<u32>,
-    /// Whether the scenario asked for it.
+    /// Whether the scenario scheduled it.
     pub scheduled: bool,
-    /// What is known of it, in words.
+    /// Details in words.
     pub detail: String,
 }
 
@@ -296,7 +298,7 @@ pub fn schema_summary() -> serde_json::Value {
     SchemaSettings::default().for_serialize().into_generator().into_root_schema_for::<Summary>().to_value()
 }
 
-/// Drones as JSON numbers.
+/// The numbers of drones.
 pub(crate) fn numbers(drones: &[DroneId]) -> Vec<u32> {
     drones.iter().map(|drone| drone.0).collect()
 }

@@ -1,4 +1,4 @@
-//! Hand-made runs for this crate's tests.
+//! Facts and rows for the tests of this crate.
 
 use crate::facts::{MissionEnd, RunFacts};
 use skein_protocol::formation::Shape;
@@ -29,7 +29,7 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
     }
 }
 
-/// A living drone that stands.
+/// A living drone at rest.
 pub(crate) fn row(x_m: f64, y_m: f64) -> DroneRow {
     DroneRow { position_m: [x_m, y_m], flags: ROW_ALIVE, ..DroneRow::default() }
 }

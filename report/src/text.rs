@@ -1,14 +1,13 @@
-//! A summary for people: the verdict first, then what they ask next.
+//! The summary as text for a terminal: the outcome first, then the details.
 
 use crate::summary::{Stage, Summary};
 use skein_protocol::record::{Outcome, Percentiles};
 use std::fmt::Write;
 
-/// What came of the run, in lines of at most some hundred characters. `colour` sets the verdict in the terminal's
-/// colours.
+/// The summary of a run in several lines. `colour` prints the outcome with ANSI colours.
 #[must_use]
 pub fn summary(summary: &Summary, colour: bool) -> String {
-    let mut text = verdict(summary, colour);
+    let mut text = outcome(summary, colour);
     text.push_str("\n\n");
     for (label, line) in lines(summary) {
         // Writing to a String cannot fail.
@@ -17,21 +16,21 @@ pub fn summary(summary: &Summary, colour: bool) -> String {
     text
 }
 
-/// The outcome in a line.
-pub(crate) fn verdict(summary: &Summary, colour: bool) -> String {
+/// The outcome in one line.
+pub(crate) fn outcome(summary: &Summary, colour: bool) -> String {
     let (word, shade, why) = match summary.outcome {
         Outcome::Reached => ("reached", 32, "the formation is closed and every invariant held".to_owned()),
         Outcome::Timeout => ("timeout", 33, "the goal was not reached".to_owned()),
-        Outcome::Unsafe => ("unsafe", 31, broken(summary)),
-        Outcome::Aborted => ("aborted", 31, "the mission did not come to its end".to_owned()),
+        Outcome::Unsafe => ("unsafe", 31, violations(summary)),
+        Outcome::Aborted => ("aborted", 31, "the mission did not reach its end".to_owned()),
     };
     let word = if colour { format!("\x1b[1;{shade}m{word}\x1b[0m") } else { word.to_owned() };
-    let said = summary.reason.as_ref().filter(|reason| summary.outcome != Outcome::Reached && !reason.is_empty());
-    let reason = said.map_or(String::new(), |reason| format!(" ({reason})"));
+    let reason = summary.reason.as_ref().filter(|reason| summary.outcome != Outcome::Reached && !reason.is_empty());
+    let reason = reason.map_or(String::new(), |reason| format!(" ({reason})"));
     format!("{word} after {:.2} s: {why}{reason}", summary.mission_s)
 }
 
-fn broken(summary: &Summary) -> String {
+fn violations(summary: &Summary) -> String {
     let count = summary.violations.len();
     let first = summary.violations.first().map(|violation| {
         let kind = serde_json::to_value(violation.kind).ok();
@@ -43,12 +42,15 @@ fn broken(summary: &Summary) -> String {
         };
         format!(", first at {:.2} s: {kind} of drones {}{value}", violation.t_s, list(&violation.drones))
     });
-    let often =
-        if count == 1 { "an invariant was broken".to_owned() } else { format!("invariants were broken {count} times") };
-    often + &first.unwrap_or_default()
+    let number = if count == 1 {
+        "an invariant was violated".to_owned()
+    } else {
+        format!("invariants were violated {count} times")
+    };
+    number + &first.unwrap_or_default()
 }
 
-/// What comes after the verdict: labels and lines.
+/// The details: labels and lines.
 pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     let mut lines = vec![("run".to_owned(), run(summary))];
     for (number, stage) in summary.stages.iter().enumerate() {
@@ -69,14 +71,14 @@ pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     );
     line("energy", Some(energy(summary)));
     line("distances", distances(summary));
-    line("leading", Some(leading(summary)));
+    line("leadership", Some(leadership(summary)));
     line("messages", Some(messages(summary)));
     for fault in &summary.faults {
         let by = if fault.scheduled { "scheduled" } else { "not scheduled" };
         let kind = serde_json::to_value(fault.kind).ok();
         let kind = kind.as_ref().and_then(|kind| kind.as_str()).unwrap_or("fault");
-        let whom = fault.target.map_or_else(|| "the swarm".to_owned(), |drone| format!("drone {drone}"));
-        line("fault", Some(format!("{:.2} s: {kind}, {whom} ({by}; {})", fault.t_s, fault.detail)));
+        let target = fault.target.map_or_else(|| "the swarm".to_owned(), |drone| format!("drone {drone}"));
+        line("fault", Some(format!("{:.2} s: {kind}, {target} ({by}; {})", fault.t_s, fault.detail)));
     }
     line("speed", speed(summary));
     line("digest", summary.digest.clone());
@@ -90,7 +92,7 @@ fn run(summary: &Summary) -> String {
 
 fn passed(stage: &Stage) -> String {
     let Some(detected) = stage.detected_s else { return "not detected".to_owned() };
-    let time = stage.pass_time_s.map_or("not passed by all".to_owned(), |time| format!("passed in {time:.2} s"));
+    let time = stage.pass_time_s.map_or("not passed by all drones".to_owned(), |time| format!("passed in {time:.2} s"));
     let mut text = format!("{time} from {detected:.2} s");
     let split = match (&stage.split_left_right, &stage.split) {
         (Some([left, right]), _) => Some(format!("; {left} left, {right} right")),
@@ -100,9 +102,9 @@ fn passed(stage: &Stage) -> String {
         (None, None) => None,
     };
     text.extend(split);
-    text.extend(stage.predicted_s.map(|forecast| format!("; forecast {forecast:.2} s")));
-    let rehearsed = stage.candidates_rehearsed.filter(|&count| count > 0);
-    text.extend(rehearsed.map(|count| format!(", {count} groupings rehearsed")));
+    text.extend(stage.predicted_s.map(|predicted_s| format!("; predicted {predicted_s:.2} s")));
+    let simulated = stage.candidates_rehearsed.filter(|&count| count > 0);
+    text.extend(simulated.map(|count| format!(", {count} groupings simulated")));
     text
 }
 
@@ -114,40 +116,49 @@ fn reformation(summary: &Summary) -> Option<String> {
 
 fn energy(summary: &Summary) -> String {
     let mut text = format!("{:.3} kJ", summary.energy_j.total / 1e3);
-    text.extend(summary.energy_j.until_passed.map(|joule| format!("; {:.3} kJ until passed", joule / 1e3)));
     text.extend(
-        summary.energy_j.detection_to_pass.map(|joule| format!(", {:.3} kJ of it since detection", joule / 1e3)),
+        summary
+            .energy_j
+            .until_passed
+            .map(|joule| format!("; {:.3} kJ until the last obstacle was passed", joule / 1e3)),
+    );
+    text.extend(
+        summary
+            .energy_j
+            .detection_to_pass
+            .map(|joule| format!(", {:.3} kJ of it since the first detection", joule / 1e3)),
     );
     text
 }
 
 fn distances(summary: &Summary) -> Option<String> {
-    let separation = summary.min_separation_m.map(|m| format!("drones {m:.2} m"));
-    let clearance = summary.min_clearance_m.map(|m| format!("obstacles {m:.2} m"));
+    let separation = summary.min_separation_m.map(|m| format!("{m:.2} m between drones"));
+    let clearance = summary.min_clearance_m.map(|m| format!("{m:.2} m to obstacles"));
     let both: Vec<String> = separation.into_iter().chain(clearance).collect();
-    (!both.is_empty()).then(|| format!("at least: {}", both.join(", ")))
+    (!both.is_empty()).then(|| format!("minimum: {}", both.join(", ")))
 }
 
-fn leading(summary: &Summary) -> String {
+fn leadership(summary: &Summary) -> String {
     let mut text = match summary.elections {
         1 => "1 election".to_owned(),
         count => format!("{count} elections"),
     };
     if summary.split_brain_s > 0.0 {
-        let _ = write!(text, ", two leaders in contact for {:.2} s", summary.split_brain_s);
+        let _ = write!(text, ", two leaders of a group in radio range for {:.2} s", summary.split_brain_s);
     }
-    let failovers = summary.failover_s.iter().map(|time| time.map_or("never".to_owned(), |s| format!("{s:.2} s")));
+    let failovers =
+        summary.failover_s.iter().map(|time| time.map_or("until the end".to_owned(), |s| format!("{s:.2} s")));
     let failovers: Vec<String> = failovers.collect();
     if !failovers.is_empty() {
-        let _ = write!(text, "; led again after a leader's death: {}", failovers.join(", "));
+        let _ = write!(text, "; time without a leader after a leader's death: {}", failovers.join(", "));
     }
     text
 }
 
 fn messages(summary: &Summary) -> String {
     let messages = &summary.messages;
-    let mut text = format!("{} sent, {} heard", messages.sent, messages.delivered);
-    text.extend(messages.duplicates.filter(|&count| count > 0).map(|count| format!(", {count} of them twice")));
+    let mut text = format!("{} sent, {} received", messages.sent, messages.delivered);
+    text.extend(messages.duplicates.filter(|&count| count > 0).map(|count| format!(", {count} duplicates")));
     let dropped = &messages.dropped;
     let reasons = [
         ("loss", dropped.loss),
@@ -162,7 +173,7 @@ fn messages(summary: &Summary) -> String {
         text.extend(count.filter(|&count| count > 0).map(|count| format!(", {count} dropped ({reason})")));
     }
     if let Percentiles { p50: Some(p50), p99: Some(p99), .. } = messages.delay_s {
-        let _ = write!(text, "; delay {:.0} ms, p99 {:.0} ms", p50 * 1e3, p99 * 1e3);
+        let _ = write!(text, "; delay: median {:.0} ms, p99 {:.0} ms", p50 * 1e3, p99 * 1e3);
     }
     text
 }
@@ -171,7 +182,10 @@ fn speed(summary: &Summary) -> Option<String> {
     let (wall, factor) = (summary.wall_s?, summary.realtime_factor?);
     let mut text = format!("{:.2} s of wall time, {factor:.1} × real time", wall);
     text.extend(
-        summary.step_us.as_ref().map(|step| format!("; a drone's step {:.0} µs, p99 {:.0} µs", step.p50, step.p99)),
+        summary
+            .step_us
+            .as_ref()
+            .map(|step| format!("; step of a drone: median {:.0} µs, p99 {:.0} µs", step.p50, step.p99)),
     );
     if summary.deadline_misses > 0 {
         let _ = write!(text, "; {} deadlines missed", summary.deadline_misses);

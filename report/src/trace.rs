@@ -1,4 +1,4 @@
-//! trace.csv: where each living drone was in every tick.
+//! trace.csv: the state of each living drone in each tick.
 
 use crate::error::ReportError;
 use skein_protocol::Vec2;
@@ -7,11 +7,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::Path;
 
-/// Name of the file in a run's folder.
-pub(crate) const FILE: &str = "trace.csv";
 const HEADER: &str = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j";
 
-/// Writes the trace, without an allocation a row.
+/// Writes the trace. Reuses its buffers, so that a row costs no allocation.
 pub(crate) struct TraceWriter<W: Write> {
     out: W,
     lines: Vec<u8>,
@@ -19,8 +17,8 @@ pub(crate) struct TraceWriter<W: Write> {
 }
 
 impl TraceWriter<BufWriter<File>> {
-    /// Starts the file in a run's folder.
-    pub fn create(path: &Path) -> std::io::Result<Self> {
+    /// Creates the file.
+    pub(crate) fn create(path: &Path) -> std::io::Result<Self> {
         Self::new(BufWriter::with_capacity(1 << 18, File::create(path)?))
     }
 }
@@ -32,12 +30,14 @@ impl<W: Write> TraceWriter<W> {
     }
 
     /// Writes the living drones of one tick.
-    pub fn tick(&mut self, t_s: f64, rows: &[DroneRow]) -> std::io::Result<()> {
+    pub(crate) fn tick(&mut self, t_s: f64, rows: &[DroneRow]) -> std::io::Result<()> {
         self.lines.clear();
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
             self.field(t_s);
             write!(self.lines, "{drone},")?;
-            row.position_m.into_iter().chain(row.velocity_mps).for_each(|value| self.field(value));
+            for value in row.position_m.into_iter().chain(row.velocity_mps) {
+                self.field(value);
+            }
             write!(self.lines, "{},", row.group)?;
             if let Some(leader) = row.leader() {
                 write!(self.lines, "{leader}")?;
@@ -49,8 +49,8 @@ impl<W: Write> TraceWriter<W> {
         self.out.write_all(&self.lines)
     }
 
-    /// Makes sure that all of it has left this process.
-    pub fn flush(&mut self) -> std::io::Result<()> {
+    /// Writes what is still buffered.
+    pub(crate) fn flush(&mut self) -> std::io::Result<()> {
         self.out.flush()
     }
 
@@ -60,7 +60,7 @@ impl<W: Write> TraceWriter<W> {
     }
 }
 
-/// A drone in a tick, as read from the file.
+/// The state of a drone in a tick, as read from the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TraceRow {
     pub t_s: f64,
@@ -71,7 +71,7 @@ pub(crate) struct TraceRow {
     pub energy_j: f64,
 }
 
-/// Reads a trace tick by tick: the rows of one time are handed over together.
+/// Reads a trace, and calls `tick` with the rows of each tick.
 pub(crate) fn read(path: &Path, mut tick: impl FnMut(&[TraceRow])) -> Result<(), ReportError> {
     let mut lines = BufReader::new(File::open(path).map_err(ReportError::io(path))?).lines();
     let content = |found: String| ReportError::Content { path: path.to_owned(), expected: HEADER, found };
@@ -108,6 +108,7 @@ fn parse(line: &str) -> Option<TraceRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::TRACE;
     use skein_protocol::record::ROW_ALIVE;
     use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp};
 
@@ -135,9 +136,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_by_ticks() {
+    fn a_written_trace_is_read_tick_by_tick() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
+        let path = folder.path().join(TRACE);
         let mut writer = TraceWriter::create(&path).unwrap();
         writer.tick(0.02, &rows()).unwrap();
         writer.tick(0.04, &rows()).unwrap();
@@ -150,10 +151,10 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_line_is_named() {
+    fn an_invalid_line_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(FILE);
-        for (text, place) in [("rubbish\n", "line 1"), (&format!("{HEADER}\n0.0,0,1,1,1,1,N,,0\n0.0,x\n"), "line 3")] {
+        let path = folder.path().join(TRACE);
+        for (text, place) in [("x\n", "line 1"), (&format!("{HEADER}\n0.0,0,1,1,1,1,N,,0\n0.0,x\n"), "line 3")] {
             std::fs::write(&path, text).unwrap();
             let error = read(&path, |_| {}).unwrap_err().to_string();
             assert!(error.contains(place), "{error}");

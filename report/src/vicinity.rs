@@ -1,27 +1,39 @@
-//! How near bodies came to each other and to obstacles over a mission.
+//! The least distances between drones, and between drones and obstacles, over a mission.
 
 use crate::close::Sweep;
 use crate::facts::RunFacts;
+use crate::geometry::clearance;
 use skein_protocol::Vec2;
 use skein_protocol::record::DroneRow;
 use skein_protocol::shape::ConvexShape;
 
-/// The least distances so far. Dead drones are bodies too, until they have landed.
+/// The least distances so far. A dead drone counts as a body until it has landed.
 pub(crate) struct Vicinity {
-    /// Of two bodies, m.
-    pub separation_m: Option<f64>,
-    /// Of a body and an obstacle, m.
-    pub clearance_m: Option<f64>,
-    obstacles: Vec<(ConvexShape, Vec2, Vec2)>,
+    separation_m: Option<f64>,
+    clearance_m: Option<f64>,
+    obstacles: Vec<BoxedShape>,
     landing_s: Option<f64>,
+    /// For each drone, how long it has been dead and without motion, s.
     still_s: Vec<f64>,
+    /// Positions of all bodies in the tick that was taken last, m.
     bodies: Vec<Vec2>,
     sweep: Sweep,
 }
 
+/// A shape and its axis-aligned bounding box.
+struct BoxedShape {
+    shape: ConvexShape,
+    low: Vec2,
+    high: Vec2,
+}
+
 impl Vicinity {
-    pub fn new(facts: &RunFacts) -> Self {
-        let bounded = |shape: &ConvexShape| (*shape, shape.bounds().0, shape.bounds().1);
+    /// For a run with these facts, before its first tick.
+    pub(crate) fn new(facts: &RunFacts) -> Self {
+        let bounded = |shape: &ConvexShape| {
+            let (low, high) = shape.bounds();
+            BoxedShape { shape: *shape, low, high }
+        };
         Self {
             separation_m: None,
             clearance_m: None,
@@ -33,8 +45,18 @@ impl Vicinity {
         }
     }
 
+    /// Least distance of two bodies, centre to centre, m; `None` for fewer than two bodies.
+    pub(crate) fn separation_m(&self) -> Option<f64> {
+        self.separation_m
+    }
+
+    /// Least distance of a body's centre to an obstacle, m, negative inside; `None` without obstacles.
+    pub(crate) fn clearance_m(&self) -> Option<f64> {
+        self.clearance_m
+    }
+
     /// Takes the rows of a tick that lasted `dt_s`.
-    pub fn take(&mut self, rows: &[DroneRow], dt_s: f64) {
+    pub(crate) fn take(&mut self, rows: &[DroneRow], dt_s: f64) {
         self.bodies.clear();
         for (row, still_s) in rows.iter().zip(&mut self.still_s) {
             let landed = self.landing_s.is_some_and(|landing_s| *still_s > landing_s - dt_s / 2.0);
@@ -46,7 +68,7 @@ impl Vicinity {
         let separation = self.sweep.least_distance(&self.bodies);
         self.separation_m = least(self.separation_m, separation);
         for &body in &self.bodies {
-            for (shape, low, high) in &self.obstacles {
+            for BoxedShape { shape, low, high } in &self.obstacles {
                 let box_distance = (low - body).sup(&(body - high)).sup(&Vec2::zeros()).norm();
                 if self.clearance_m.is_none_or(|least| box_distance <= least) {
                     self.clearance_m = least(self.clearance_m, Some(clearance(shape, body)));
@@ -60,52 +82,22 @@ fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.into_iter().chain(b).min_by(f64::total_cmp)
 }
 
-/// Distance from a point to a shape's surface, m; negative inside.
-pub(crate) fn clearance(shape: &ConvexShape, point: Vec2) -> f64 {
-    let vertices: Vec<Vec2> = shape.vertices().collect();
-    let (mut distance, mut inside) = (f64::INFINITY, vertices.len() > 2);
-    for (i, &a) in vertices.iter().enumerate() {
-        let edge = vertices[(i + 1) % vertices.len()] - a;
-        let along = ((point - a).dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        distance = distance.min((point - a - edge * along).norm());
-        inside &= edge.perp(&(point - a)) > 0.0;
-    }
-    (if inside { -distance } else { distance }) - shape.radius_m
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{facts, row};
 
     #[test]
-    fn clearance_is_signed_and_knows_the_rounding() {
-        let at = Vec2::new;
-        let block = ConvexShape::rectangle(at(10.0, 0.0), at(2.0, 3.0), 0.0).unwrap();
-        let disc = ConvexShape::circle(at(0.0, 0.0), 2.0).unwrap();
-        let bar = ConvexShape::new(&[at(0.0, 0.0), at(4.0, 0.0)], 1.0).unwrap();
-        for (shape, point, wanted) in [
-            (block, at(5.0, 0.0), 3.0),
-            (block, at(15.0, 7.0), 5.0),
-            (block, at(10.5, 0.0), -1.5),
-            (disc, at(3.0, 4.0), 3.0),
-            (disc, at(0.0, 0.5), -1.5),
-            (bar, at(2.0, 3.0), 2.0),
-            (bar, at(7.0, 4.0), 4.0),
-        ] {
-            assert!((clearance(&shape, point) - wanted).abs() < 1e-12, "{point} of {shape:?}");
-        }
-    }
-
-    #[test]
-    fn the_dead_are_bodies_until_they_have_landed() {
+    fn dead_drones_are_bodies_until_they_have_landed() {
         let dead = DroneRow { flags: 0, ..row(0.0, 0.0) };
         let far = [row(50.0, 0.0), dead];
         let near = [row(4.0, 0.0), dead];
         let mut hover = Vicinity::new(&facts(2));
         let mut land = Vicinity::new(&RunFacts { landing_s: Some(1.0), ..facts(2) });
         for vicinity in [&mut hover, &mut land] {
-            (0..51).for_each(|_| vicinity.take(&far, 0.02));
+            for _ in 0..51 {
+                vicinity.take(&far, 0.02);
+            }
             vicinity.take(&near, 0.02);
         }
         assert_eq!((hover.separation_m, land.separation_m), (Some(4.0), Some(50.0)));

@@ -1,4 +1,5 @@
-//! A small mission made by hand: four drones fly straight past a disc, the leader of one group dies, another leads on.
+//! The report of a small artificial mission: four drones fly straight past a disc, the leader of a group dies, and another
+//! drone becomes its leader.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use skein_protocol::formation::Shape;
@@ -11,9 +12,9 @@ use skein_report::{Manifest, MissionEnd, Recorder, RunCompletion, RunFacts, RunF
 
 /// Last tick; a tick is 0.1 s.
 const LAST: u64 = 99;
-/// Drone 3, who leads N1, dies here; drone 0 leads on from `LED`.
+/// Tick in which drone 3, the leader of N1, dies. Drone 0 leads N1 from tick `NEW_LEADER`.
 const DEATH: u64 = 60;
-const LED: u64 = 65;
+const NEW_LEADER: u64 = 65;
 const BALLOT: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
 const STAMP: PlanStamp = PlanStamp { ballot: BALLOT, epoch: 2 };
 
@@ -45,11 +46,11 @@ fn completion() -> RunCompletion {
     RunCompletion { fallback: Outcome::Aborted, wall_s: Some(4.0), startup_s: Some(0.25) }
 }
 
-/// Abreast at y = 45, 75, 15, 105, 10 m/s; 100 W.
+/// The row of a drone. The drones fly abreast at y = 45, 75, 15 and 105 m, at 10 m/s, with a power of 100 W.
 fn row(tick: u64, drone: usize) -> DroneRow {
     let dead = drone == 3 && tick >= DEATH;
     let t_s = (if dead { DEATH } else { tick + 1 }) as f64 * 0.1;
-    let leads = if tick < DEATH { drone == 3 } else { drone == 0 && tick >= LED };
+    let leads = if tick < DEATH { drone == 3 } else { drone == 0 && tick >= NEW_LEADER };
     let phase = if tick < 50 { Phase::Avoid } else { Phase::Reform };
     let (group, route) = if drone == 2 { (GroupId::ALL.child(2), 0) } else { (GroupId::ALL.child(1), 1) };
     let queued = (10..50).contains(&tick);
@@ -101,8 +102,8 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         rank: 0,
         reserved: 0,
     };
-    let said = [Message::Plan(plan)].into_iter().chain((0..4).map(|drone| Message::Assignment(part(drone))));
-    let air = |(sequence, message): (usize, Message)| AirFrame {
+    let messages = [Message::Plan(plan)].into_iter().chain((0..4).map(|drone| Message::Assignment(part(drone))));
+    let frame = |(sequence, message): (usize, Message)| AirFrame {
         tick,
         source: DroneId(0),
         sequence: sequence as u32,
@@ -111,8 +112,8 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         link_faults: Default::default(),
         frame: message.encode(),
     };
-    // Said when it is made, and repeated with another time stamp.
-    if tick == 11 || tick == 20 { said.enumerate().map(air).collect() } else { Vec::new() }
+    // The plan is sent when it is made, and repeated later with another time stamp.
+    if tick == 11 || tick == 20 { messages.enumerate().map(frame).collect() } else { Vec::new() }
 }
 
 fn events(tick: u64) -> Vec<RunEvent> {
@@ -146,7 +147,7 @@ fn events(tick: u64) -> Vec<RunEvent> {
                 },
             ),
         ],
-        LED => vec![at(6.6, leader(0, true))],
+        NEW_LEADER => vec![at(6.6, leader(0, true))],
         _ => Vec::new(),
     }
 }
@@ -192,7 +193,7 @@ fn fly(recorder: &mut Recorder, ticks: std::ops::RangeInclusive<u64>) {
 fn flown() -> Summary {
     let mut recorder = Recorder::in_memory(facts());
     fly(&mut recorder, 0..=LAST);
-    // The last word comes with the last tick's rows once more.
+    // The record with the end event repeats the rows of the last tick.
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
     let (summary, files) = recorder.finish(&completion());
     files.unwrap();
@@ -204,14 +205,14 @@ fn near(value: Option<f64>, wanted: f64) -> bool {
 }
 
 #[test]
-fn stages_tell_what_was_flown() {
+fn stages_describe_how_the_set_was_passed() {
     let summary = flown();
     let stage = &summary.stages[0];
     assert_eq!((summary.stages.len(), stage.detected_s, stage.passed_s), (1, Some(1.0), Some(5.0)));
     assert!(near(stage.pass_time_s, 4.0));
     assert_eq!((stage.routes, stage.candidates_rehearsed), (Some(2), Some(5)));
     assert_eq!((stage.split.as_deref(), stage.split_left_right), (Some(&[1, 3][..]), Some([3, 1])));
-    // Made at 1.1 s for 3.5 s: 3.6 s after the detection, whatever is repeated later.
+    // The plan was made at 1.1 s and predicts 3.5 s, which is 3.6 s after the detection. Repetitions do not count.
     assert!(near(stage.predicted_s, 3.6), "{:?}", stage.predicted_s);
     let groups = serde_json::to_value(&stage.groups).unwrap();
     let wanted = serde_json::json!([
@@ -222,7 +223,7 @@ fn stages_tell_what_was_flown() {
 }
 
 #[test]
-fn the_living_count_and_the_dead_are_bodies() {
+fn dead_drones_do_not_count_but_are_bodies() {
     let summary = flown();
     assert_eq!((summary.ticks, summary.sim_s, summary.mission_s), (100, 10.0, 10.0));
     assert!(near(Some(summary.energy_j.total), 3000.0), "{:?}", summary.energy_j);
@@ -237,7 +238,7 @@ fn the_living_count_and_the_dead_are_bodies() {
 }
 
 #[test]
-fn leadership_and_faults_are_told() {
+fn leadership_and_faults_are_in_the_summary() {
     let summary = flown();
     assert_eq!((summary.elections, summary.leaders.len(), summary.split_brain_s), (1, 2, 0.0));
     assert!(summary.failover_s.len() == 1 && near(summary.failover_s[0], 0.5), "{:?}", summary.failover_s);
@@ -251,7 +252,7 @@ fn leadership_and_faults_are_told() {
 }
 
 #[test]
-fn the_worlds_last_word_counts() {
+fn the_end_event_determines_outcome_and_counters() {
     let summary = flown();
     assert_eq!((summary.outcome, summary.reason.as_deref()), (Outcome::Reached, Some("goal met")));
     assert_eq!(
@@ -267,7 +268,7 @@ fn the_worlds_last_word_counts() {
 }
 
 #[test]
-fn without_a_last_word_the_record_is_counted() {
+fn without_an_end_event_the_record_is_counted() {
     let mut recorder = Recorder::in_memory(RunFacts { runtime: "inline".to_owned(), ..facts() });
     fly(&mut recorder, 0..=29);
     let (summary, _) = recorder.finish(&completion());
@@ -280,14 +281,14 @@ fn without_a_last_word_the_record_is_counted() {
 }
 
 #[test]
-fn a_run_that_never_began_is_a_summary_too() {
+fn a_run_without_ticks_has_a_summary() {
     let (summary, _) = Recorder::in_memory(facts()).finish(&RunCompletion { wall_s: None, ..completion() });
     assert_eq!((summary.ticks, summary.digest, summary.formation_error_m), (0, None, None));
     assert_eq!((summary.realtime_factor, summary.stages[0].groups.as_ref()), (None, None));
 }
 
 #[test]
-fn a_broken_record_is_refused_with_its_tick() {
+fn an_invalid_record_is_refused_with_its_tick() {
     let mut recorder = Recorder::in_memory(RunFacts { drones: 5, ..facts() });
     let error = give(&mut recorder, 3, &[], &[]).unwrap_err();
     assert_eq!(error.to_string(), "tick 3: expected a record of 5 rows, one per drone, found 4");
@@ -297,7 +298,7 @@ fn a_broken_record_is_refused_with_its_tick() {
     assert!(error.to_string().starts_with("tick 7: expected an event"), "{error}");
 }
 
-/// Every key that the summary promises, `a.b` for a key of an object, `a[].b` for one of its entries.
+/// Every key of the summary: `a.b` is a key of an object, `a[].b` a key of the entries of a list.
 const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s ticks sim_s realtime_factor \
     agent_steps_per_s wall_s startup_s report_s outcome stages[].detected_s stages[].passed_s stages[].pass_time_s \
     stages[].routes stages[].split stages[].split_left_right stages[].predicted_s stages[].candidates_rehearsed \
@@ -314,7 +315,7 @@ const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s tick
     faults[].kind faults[].target faults[].scheduled deadline_misses step_us.p50 step_us.p99 step_us.max digest";
 
 #[test]
-fn every_promised_key_is_there_and_in_the_schema() {
+fn every_key_is_in_the_summary_and_in_the_schema() {
     let summary = serde_json::to_value(flown()).unwrap();
     let schema = skein_report::schema_summary();
     for key in KEYS.split_whitespace() {
@@ -331,7 +332,7 @@ fn every_promised_key_is_there_and_in_the_schema() {
 }
 
 #[test]
-fn the_runs_folder_holds_trace_and_events() {
+fn the_folder_of_a_run_holds_trace_and_events() {
     let root = tempfile::tempdir().unwrap();
     let folder = RunFolder::numbered(root.path(), "disc").unwrap();
     folder.write_manifest(&Manifest::new(facts(), serde_json::json!({}), "0.1.0", None)).unwrap();
@@ -355,7 +356,7 @@ fn the_runs_folder_holds_trace_and_events() {
 }
 
 #[test]
-fn files_that_cannot_be_written_do_not_cost_the_summary() {
+fn the_summary_is_complete_if_files_cannot_be_written() {
     for name in ["trace.csv", "flight.spool"] {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::numbered(root.path(), "disc").unwrap();
@@ -371,30 +372,30 @@ fn files_that_cannot_be_written_do_not_cost_the_summary() {
 }
 
 #[test]
-fn people_read_the_verdict_first() {
+fn the_text_of_a_summary_starts_with_the_outcome() {
     let text = skein_report::text::summary(&flown(), false);
     let wanted = "\
 reached after 10.00 s: the formation is closed and every invariant held
 
   run           disc: 4 drones, congestion-aware, seed 18446744073709551615, processes, lockstep
-  stage 1       passed in 4.00 s from 1.00 s; 3 left, 1 right; forecast 3.60 s, 5 groupings rehearsed
+  stage 1       passed in 4.00 s from 1.00 s; 3 left, 1 right; predicted 3.60 s, 5 groupings simulated
                 N1    route 1: drones 0 1 3, led by 3
                 N2    route 0: drones 2, led by 2
   reformation   from 5.10 s, closed at 5.10 s
   formation     largest slot error 0.00 m, root mean square 0.00 m
-  energy        3.000 kJ; 2.000 kJ until passed, 1.600 kJ of it since detection
-  distances     at least: drones 30.00 m, obstacles 5.00 m
-  leading       1 election; led again after a leader's death: 0.50 s
-  messages      10 sent, 30 heard, 8 of them twice, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
-5 dropped (deaf), 6 dropped (malformed), 7 dropped (queue); delay 20 ms, p99 40 ms
+  energy        3.000 kJ; 2.000 kJ until the last obstacle was passed, 1.600 kJ of it since the first detection
+  distances     minimum: 30.00 m between drones, 5.00 m to obstacles
+  leadership    1 election; time without a leader after a leader's death: 0.50 s
+  messages      10 sent, 30 received, 8 duplicates, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
+5 dropped (deaf), 6 dropped (malformed), 7 dropped (queue); delay: median 20 ms, p99 40 ms
   fault         6.10 s: kill, drone 3 (not scheduled; signal 9)
-  speed         2.00 s of wall time, 5.0 × real time; a drone's step 20 µs, p99 20 µs
+  speed         2.00 s of wall time, 5.0 × real time; step of a drone: median 20 µs, p99 20 µs
   digest        0000000000000b1f
 ";
     assert_eq!(text, wanted);
-    let broken = Summary { outcome: Outcome::Unsafe, reason: None, ..flown() };
-    let text = skein_report::text::summary(&broken, true);
-    let wanted = "\x1b[1;31munsafe\x1b[0m after 10.00 s: an invariant was broken, first at 3.10 s: separation \
+    let violated = Summary { outcome: Outcome::Unsafe, reason: None, ..flown() };
+    let text = skein_report::text::summary(&violated, true);
+    let wanted = "\x1b[1;31munsafe\x1b[0m after 10.00 s: an invariant was violated, first at 3.10 s: separation \
         of drones 0 1, 24.00 m\n";
     assert!(text.starts_with(wanted), "{text}");
 }

@@ -1,31 +1,34 @@
-//! The scene in Foxglove's primitives: what does not move once, the rest with every sample.
+//! The scene in Foxglove's primitives.
 
 use crate::facts::RunFacts;
+use crate::geometry::outline;
 use crate::mcap::foxglove::{
     ArrowPrimitive, Color, CylinderPrimitive, LINE_LIST, LINE_LOOP, LINE_STRIP, LinePrimitive, Pose, SceneEntity,
     SceneUpdate, TextPrimitive, Time, TriangleListPrimitive, Vector3,
 };
-use crate::plot::outline;
-use crate::scene::{Sample, State, fine};
+use crate::palette::GROUP_COLOURS;
+use crate::scene::{Sample, State, rounded};
 use std::collections::BTreeMap;
 
-/// Height at which drones are drawn, m: above what lies on the ground.
+/// Height at which drones are drawn, m: above obstacles and zones, which are on the ground.
 const ALTITUDE_M: f64 = 2.0;
-/// Length and thickness of a drone's arrow, m.
-const DRONE_M: (f64, f64) = (7.0, 3.0);
-/// A frame that was not heard is drawn once, links from leader to follower always; width in pixels.
+/// Length of the arrow of a drone, m.
+const ARROW_LENGTH_M: f64 = 7.0;
+/// Width of the arrow of a drone, m.
+const ARROW_WIDTH_M: f64 = 3.0;
+/// Width of the line of a radio link, pixels.
 const LINK_PX: f64 = 1.0;
 const GREY: (u8, u8, u8) = (140, 140, 140);
 const RED: (u8, u8, u8) = (204, 30, 20);
 const BLUE: (u8, u8, u8) = (0, 114, 178);
 
 fn colour((r, g, b): (u8, u8, u8), a: f64) -> Color {
-    let part = |value: u8| fine(f64::from(value) / 255.0);
+    let part = |value: u8| rounded(f64::from(value) / 255.0);
     Color { r: part(r), g: part(g), b: part(b), a }
 }
 
 fn point([x, y]: [f64; 2], z: f64) -> Vector3 {
-    Vector3 { x: fine(x), y: fine(y), z }
+    Vector3 { x: rounded(x), y: rounded(y), z }
 }
 
 fn line(kind: u8, points: Vec<Vector3>, color: Color, thickness: f64) -> LinePrimitive {
@@ -34,8 +37,8 @@ fn line(kind: u8, points: Vec<Vector3>, color: Color, thickness: f64) -> LinePri
     LinePrimitive { r#type: kind, pose, thickness, scale_invariant: true, points, color, colors, indices }
 }
 
-/// Obstacles, hulls, routes.
-pub(super) fn still(facts: &RunFacts) -> SceneUpdate {
+/// The parts of the scene that never change: obstacles, hulls, routes.
+pub(super) fn static_scene(facts: &RunFacts) -> SceneUpdate {
     let mut obstacles = SceneEntity::new("obstacles", Time::default());
     for shape in &facts.obstacles {
         let points: Vec<Vector3> = outline(shape).into_iter().map(|(x, y)| point([x, y], 0.0)).collect();
@@ -50,39 +53,43 @@ pub(super) fn still(facts: &RunFacts) -> SceneUpdate {
     for set in &facts.scene.sets {
         let outlined = set.hulls_m.iter().map(|hull| line(LINE_LOOP, points(hull), colour(GREY, 0.8), 1.0));
         hulls.lines.extend(outlined);
-        let ways = set.routes_m.iter().map(|way| line(LINE_STRIP, points(way), colour(BLUE, 0.6), 2.0));
-        routes.lines.extend(ways);
+        let polylines = set.routes_m.iter().map(|route| line(LINE_STRIP, points(route), colour(BLUE, 0.6), 2.0));
+        routes.lines.extend(polylines);
     }
     SceneUpdate { deletions: Vec::new(), entities: vec![obstacles, hulls, routes] }
 }
 
-/// A colour for each group, in the order in which groups appear.
+/// Assigns a colour to each group, in the order in which groups appear.
 #[derive(Default)]
 struct Colours(BTreeMap<String, usize>);
 
 impl Colours {
     fn of(&mut self, group: &str) -> (u8, u8, u8) {
-        let palette = crate::plot::palette();
         let next = self.0.len();
         let place = match self.0.get(group) {
             Some(&place) => place,
             None => *self.0.entry(group.to_owned()).or_insert(next),
         };
-        palette[place % palette.len()]
+        GROUP_COLOURS[place % GROUP_COLOURS.len()]
     }
 }
 
-/// Danger zones, slots and radio links.
-pub(super) fn moving(facts: &RunFacts, sample: &Sample, at: Time) -> SceneUpdate {
+/// The parts of the scene that move: danger zones, slots, radio links.
+pub(super) fn moving_scene(facts: &RunFacts, sample: &Sample, at: Time) -> SceneUpdate {
     let state = &sample.state;
     SceneUpdate { deletions: Vec::new(), entities: vec![zones(facts, state, at), slots(state, at), links(sample, at)] }
 }
 
-/// What a drone looks like: its group, what it leads, whether it lives.
-type Look = (String, Option<String>, u8);
+/// What the look of a drone depends on.
+#[derive(Clone, PartialEq, Eq)]
+struct Look {
+    group: String,
+    leads: Option<String>,
+    alive: u8,
+}
 
-/// The drones' looks. Each drone is an entity in its own frame, so that `/tf` moves it, and is told anew only when it
-/// looks different.
+/// Draws the drones. Each drone is an entity in its own frame, which `/tf` moves. The entity is sent again only if the
+/// look of the drone changes.
 #[derive(Default)]
 pub(super) struct Drones {
     looks: Vec<Option<Look>>,
@@ -90,59 +97,62 @@ pub(super) struct Drones {
 }
 
 impl Drones {
-    /// The drones that look different from before; `None` if none does.
-    pub fn changed(&mut self, state: &State, at: Time) -> Option<SceneUpdate> {
+    /// The drones whose look changed; `None` if no look changed.
+    pub(crate) fn changed(&mut self, state: &State, at: Time) -> Option<SceneUpdate> {
         self.looks.resize(state.x_m.len(), None);
         let mut entities = Vec::new();
         for (drone, known) in self.looks.iter_mut().enumerate() {
-            let look = (&state.group[drone], &state.leads[drone], state.alive[drone]);
-            if known.as_ref().is_none_or(|known| (&known.0, &known.1, known.2) != look) {
-                *known = Some((look.0.clone(), look.1.clone(), look.2));
-                entities.push(dart(state, drone, at, &mut self.colours));
+            let (group, leads, alive) = (&state.group[drone], &state.leads[drone], state.alive[drone]);
+            let unchanged = |known: &Look| known.group == *group && known.leads == *leads && known.alive == alive;
+            if !known.as_ref().is_some_and(unchanged) {
+                *known = Some(Look { group: group.clone(), leads: leads.clone(), alive });
+                entities.push(arrow(state, drone, at, &mut self.colours));
             }
         }
         (!entities.is_empty()).then(|| SceneUpdate { deletions: Vec::new(), entities })
     }
 }
 
-/// Where a drone is.
-fn place(state: &State, drone: usize) -> [f64; 2] {
+/// Position of a drone, m.
+fn position(state: &State, drone: usize) -> [f64; 2] {
     [state.x_m[drone], state.y_m[drone]]
 }
 
+/// The numbers of the living drones.
 fn living(state: &State) -> impl Iterator<Item = usize> + '_ {
     (0..state.x_m.len()).filter(|&drone| state.alive[drone] == 1)
 }
 
-fn dart(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneEntity {
+/// The entity of a drone: an arrow and its number.
+fn arrow(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneEntity {
     let alive = state.alive[drone] == 1;
     let shade = if alive { colours.of(&state.group[drone]) } else { GREY };
     let mut entity = SceneEntity::new(&format!("drone {drone}"), at);
     entity.frame_id = format!("drone_{drone}");
     entity.frame_locked = true;
-    let (length, width) = DRONE_M;
     entity.arrows.push(ArrowPrimitive {
         pose: Pose::new(0.0, 0.0, ALTITUDE_M, 0.0),
-        shaft_length: length / 2.0,
-        shaft_diameter: width / 2.0,
-        head_length: length / 2.0,
-        head_diameter: width,
+        shaft_length: ARROW_LENGTH_M / 2.0,
+        shaft_diameter: ARROW_WIDTH_M / 2.0,
+        head_length: ARROW_LENGTH_M / 2.0,
+        head_diameter: ARROW_WIDTH_M,
         color: colour(shade, 1.0),
     });
-    let led = state.leads[drone].as_ref().map_or(String::new(), |group| format!(" leads {group}"));
+    let leads = state.leads[drone].as_ref().map_or(String::new(), |group| format!(" leads {group}"));
     entity.texts.push(TextPrimitive {
         pose: Pose::new(0.0, 5.0, ALTITUDE_M, 0.0),
         billboard: true,
         font_size: 12.0,
         scale_invariant: true,
         color: colour(shade, 1.0),
-        text: if alive { format!("{drone}{led}") } else { format!("{drone} dead") },
+        text: if alive { format!("{drone}{leads}") } else { format!("{drone} dead") },
     });
     entity
 }
 
+/// A flat disc on the ground.
 fn disc([x, y]: [f64; 2], radius_m: f64, color: Color) -> CylinderPrimitive {
-    let size = Vector3 { x: fine(2.0 * radius_m), y: fine(2.0 * radius_m), z: 0.05 };
+    let size = Vector3 { x: rounded(2.0 * radius_m), y: rounded(2.0 * radius_m), z: 0.05 };
     CylinderPrimitive { pose: Pose::new(x, y, 0.0, 0.0), size, bottom_scale: 1.0, top_scale: 1.0, color }
 }
 
@@ -150,7 +160,7 @@ fn zones(facts: &RunFacts, state: &State, at: Time) -> SceneEntity {
     let mut entity = SceneEntity::new("danger zones", at);
     entity.cylinders.extend(living(state).map(|drone| {
         let speed = state.vx_mps[drone].hypot(state.vy_mps[drone]);
-        disc(place(state, drone), facts.scene.danger_zone_m(speed), colour(RED, 0.08))
+        disc(position(state, drone), facts.scene.danger_zone_m(speed), colour(RED, 0.08))
     }));
     entity
 }
@@ -161,26 +171,27 @@ fn slots(state: &State, at: Time) -> SceneEntity {
     entity
 }
 
-/// From each leader to its followers; and in red, frames that were dropped on the way although in reach.
+/// Lines from each leader to its followers, and red lines for frames that were dropped although the receiver was in
+/// range.
 fn links(sample: &Sample, at: Time) -> SceneEntity {
     let state = &sample.state;
-    let mut led = Vec::new();
+    let mut followed = Vec::new();
     for drone in living(state) {
         let leader = state.leader[drone].map(|leader| leader as usize);
         if let Some(leader) = leader.filter(|&leader| leader != drone && leader < state.x_m.len()) {
-            led.extend([place(state, leader), place(state, drone)].map(|end| point(end, ALTITUDE_M)));
+            followed.extend([position(state, leader), position(state, drone)].map(|end| point(end, ALTITUDE_M)));
         }
     }
-    let mut lost = Vec::new();
+    let mut dropped_frames = Vec::new();
     for frame in sample.radio.frames.iter().filter(|_| sample.radio.receiver.is_none()) {
         let dropped = frame.deliveries.chars().enumerate().filter(|(_, delivery)| !['h', '-', 'r'].contains(delivery));
         for (receiver, _) in dropped.filter(|&(receiver, _)| receiver < state.x_m.len()) {
-            let ends = [place(state, frame.source as usize), place(state, receiver)];
-            lost.extend(ends.map(|end| point(end, ALTITUDE_M)));
+            let ends = [position(state, frame.source as usize), position(state, receiver)];
+            dropped_frames.extend(ends.map(|end| point(end, ALTITUDE_M)));
         }
     }
     let mut entity = SceneEntity::new("radio links", at);
-    entity.lines.push(line(LINE_LIST, led, colour(GREY, 0.6), LINK_PX));
-    entity.lines.push(line(LINE_LIST, lost, colour(RED, 0.6), LINK_PX));
+    entity.lines.push(line(LINE_LIST, followed, colour(GREY, 0.6), LINK_PX));
+    entity.lines.push(line(LINE_LIST, dropped_frames, colour(RED, 0.6), LINK_PX));
     entity
 }

@@ -1,6 +1,7 @@
-//! Foxglove's message types, as far as a flat swarm needs them: field for field as published at docs.foxglove.dev, so that
-//! Foxglove and Lichtblick show them without set-up.
+//! The message types of Foxglove that a swarm in two dimensions needs. All fields are as published at docs.foxglove.dev, so
+//! that Foxglove and Lichtblick show the recording without configuration.
 
+use crate::scene::rounded;
 use schemars::JsonSchema;
 use serde::Serialize;
 use skein_protocol::SimTime;
@@ -8,7 +9,7 @@ use skein_protocol::SimTime;
 /// Name of the world frame.
 pub(super) const WORLD: &str = "world";
 
-/// An instant or a length of time.
+/// A time or a duration.
 #[derive(Clone, Copy, Debug, Default, Serialize, JsonSchema)]
 pub(super) struct Time {
     pub sec: u32,
@@ -38,10 +39,10 @@ pub(super) struct Quaternion {
 }
 
 impl Quaternion {
-    /// About the vertical, counter-clockwise from +x.
-    pub fn yaw(rad: f64) -> Self {
+    /// A rotation about the vertical axis, counter-clockwise.
+    pub(crate) fn yaw(rad: f64) -> Self {
         let (z, w) = (rad / 2.0).sin_cos();
-        Self { x: 0.0, y: 0.0, z: crate::scene::fine(z), w: crate::scene::fine(w) }
+        Self { x: 0.0, y: 0.0, z: rounded(z), w: rounded(w) }
     }
 }
 
@@ -52,7 +53,7 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    pub fn new(x: f64, y: f64, z: f64, yaw_rad: f64) -> Self {
+    pub(crate) fn new(x: f64, y: f64, z: f64, yaw_rad: f64) -> Self {
         Self { position: Vector3 { x, y, z }, orientation: Quaternion::yaw(yaw_rad) }
     }
 }
@@ -126,7 +127,7 @@ pub(super) struct CylinderPrimitive {
 pub(super) const LINE_LOOP: u8 = 1;
 /// [`LinePrimitive::r#type`]: an open line.
 pub(super) const LINE_STRIP: u8 = 0;
-/// [`LinePrimitive::r#type`]: a line for each two points.
+/// [`LinePrimitive::r#type`]: a separate line for each pair of points.
 pub(super) const LINE_LIST: u8 = 2;
 
 #[derive(Debug, Serialize, JsonSchema)]
@@ -160,7 +161,7 @@ pub(super) struct TextPrimitive {
     pub text: String,
 }
 
-/// Primitives that a swarm does not use.
+/// Primitives that the recording does not use.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct Unused {}
 
@@ -183,8 +184,8 @@ pub(super) struct SceneEntity {
 }
 
 impl SceneEntity {
-    /// An entity without primitives, which stays until the next of this name.
-    pub fn new(id: &str, timestamp: Time) -> Self {
+    /// An entity without primitives. It stays until another entity with this id replaces it.
+    pub(crate) fn new(id: &str, timestamp: Time) -> Self {
         Self { timestamp, frame_id: WORLD.to_owned(), id: id.to_owned(), ..Self::default() }
     }
 }

@@ -1,18 +1,31 @@
-use super::*;
+//! Writes recordings and reads them back, with this crate and with the MCAP library.
+
+use super::draw::Drones;
+use super::foxglove::Time;
+use super::writer::{TOPICS, Topic};
+use super::{McapWriter, read};
+use crate::facts::RunFacts;
+use crate::files::RECORDING;
+use crate::scene::State;
 use crate::testing::{facts, row};
 use skein_protocol::DroneId;
-use skein_protocol::record::{DroneRow, FaultKind, Outcome, ROW_LEADS, RecordHeader, Totals};
+use skein_protocol::SimTime;
+use skein_protocol::record::{
+    DroneRow, EventKind, FaultKind, Outcome, ROW_LEADS, RecordHeader, RecordView, RunEvent, Totals,
+};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{GroupId, Vec2};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
-fn ordered_facts() -> RunFacts {
+fn facts_with_obstacle() -> RunFacts {
     let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
     RunFacts { obstacles: vec![block], ..facts(3) }
 }
 
-/// Two seconds of three drones; `wall` is how long everything took on the wall.
+/// Records two seconds of three drones. All wall times are `wall`.
 fn record(folder: &Path, wall: u32) -> PathBuf {
-    let mut writer = McapWriter::create(folder, &ordered_facts(), &serde_json::json!({"name": "s1"})).unwrap();
+    let mut writer = McapWriter::create(folder, &facts_with_obstacle(), &serde_json::json!({"name": "s1"})).unwrap();
     for tick in 0..100u64 {
         let rows: Vec<DroneRow> = (0..3)
             .map(|drone| {
@@ -26,7 +39,7 @@ fn record(folder: &Path, wall: u32) -> PathBuf {
         writer.take(RecordView { head: &head, rows: &rows, frames: &[], events: &[] }, &events).unwrap();
     }
     writer.finish().unwrap();
-    folder.join(FILE)
+    folder.join(RECORDING)
 }
 
 fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
@@ -47,7 +60,7 @@ fn equal_runs_make_equal_files() {
 }
 
 #[test]
-fn any_reader_finds_topics_schemas_and_the_scenario() {
+fn the_mcap_library_finds_topics_schemas_and_the_scenario() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = std::fs::read(record(folder.path(), 1)).unwrap();
     let summary = ::mcap::Summary::read(&bytes).unwrap().unwrap();
@@ -66,12 +79,13 @@ fn any_reader_finds_topics_schemas_and_the_scenario() {
     let scenario: serde_json::Value = serde_json::from_slice(&attachment.data).unwrap();
     assert_eq!((attachment.name.as_str(), &scenario["name"]), ("scenario.json", &serde_json::json!("s1")));
     let counts = &summary.stats.unwrap().channel_message_counts;
-    let count = |to: To| counts.iter().find(|(id, _)| summary.channels[id].topic == TOPICS[to as usize]).unwrap().1;
-    assert_eq!((*count(To::State), *count(To::Scene), *count(To::Log), *count(To::Events)), (20, 6, 2, 2));
+    let count =
+        |topic: Topic| counts.iter().find(|(id, _)| summary.channels[id].topic == TOPICS[topic as usize]).unwrap().1;
+    assert_eq!((*count(Topic::State), *count(Topic::Scene), *count(Topic::Log), *count(Topic::Events)), (20, 6, 2, 2));
 }
 
 #[test]
-fn what_is_shown_is_where_drones_are() {
+fn messages_hold_the_positions_of_the_drones() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = std::fs::read(record(folder.path(), 1)).unwrap();
     let mut last = BTreeMap::new();
@@ -91,24 +105,24 @@ fn what_is_shown_is_where_drones_are() {
 }
 
 #[test]
-fn a_recording_reads_back_even_cut_short() {
+fn a_truncated_recording_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = record(folder.path(), 1);
-    let look = || {
+    let read_back = || {
         let (mut times, mut events) = (Vec::new(), Vec::new());
         read(folder.path(), |sample| times.push(sample.state.t_s), |event| events.push(event)).unwrap();
         (times, events)
     };
-    let (times, events) = look();
+    let (times, events) = read_back();
     assert_eq!((times.len(), times[0], times[19]), (20, 0.1, 2.0));
     assert!(matches!(events[0].what, EventKind::Fault { target: DroneId(2), .. }));
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 30]).unwrap();
-    assert_eq!(look().0.len(), 20);
+    assert_eq!(read_back().0.len(), 20);
 }
 
 #[test]
-fn a_drone_is_drawn_anew_only_when_it_looks_different() {
+fn a_drone_is_sent_again_only_if_its_look_changes() {
     let state = |alive: u8| State {
         x_m: vec![0.0; 2],
         group: vec!["N".to_owned(), "N1".to_owned()],

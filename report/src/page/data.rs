@@ -1,10 +1,10 @@
-//! What the page is fed with: lines of JSON, the same from a recording and from a running swarm.
+//! The data of the page: lines of JSON, which are the same for a recording and for a live run.
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
+use crate::geometry::outline;
 use crate::mcap;
-use crate::plot::outline;
 use crate::scene::{Sample, event_text};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -15,10 +15,10 @@ use serde_json::json;
 use skein_protocol::record::{EventKind, RunEvent};
 use std::io::Write;
 
-/// Most numbers of drones and samples in a page: beyond, samples are left out evenly.
-const MOST: usize = 300_000;
+/// Largest product of drones and samples in a page. Beyond it, samples are left out evenly.
+const MAX_POSITIONS: usize = 300_000;
 
-/// What was ordered, with the obstacles' outlines. Begins a run.
+/// The first line of a run: its facts, and the outlines of the obstacles.
 #[must_use]
 pub fn facts_line(facts: &RunFacts) -> String {
     let mut line = json!({ "facts": facts });
@@ -26,18 +26,19 @@ pub fn facts_line(facts: &RunFacts) -> String {
     line.to_string()
 }
 
-/// A sample.
+/// A line with a sample.
 #[must_use]
 pub fn sample_line(sample: &Sample) -> String {
     #[derive(Serialize)]
     struct Line<'a> {
         sample: &'a Sample,
     }
-    // Keys are strings: nothing of a sample fails to become JSON.
+    // Serialization cannot fail: all keys are strings.
     serde_json::to_string(&Line { sample }).unwrap_or_default()
 }
 
-/// An event and what it means in words; `None` for a drone's part in a plan, of which there are too many to read.
+/// A line with an event, its text and its severity. `None` for the assignment of a single drone: there are too many of
+/// them to read.
 #[must_use]
 pub fn event_line(event: &RunEvent) -> Option<String> {
     if matches!(event.what, EventKind::Assigned { .. }) {
@@ -51,17 +52,17 @@ pub fn event_line(event: &RunEvent) -> Option<String> {
     Some(json!({ "event": event, "text": event_text::line(event), "severity": severity }).to_string())
 }
 
-/// A word in the page's head.
+/// A line with the status that the head of the page shows.
 #[must_use]
 pub fn status_line(status: &str) -> String {
     json!({ "status": status }).to_string()
 }
 
-/// The recording of a run, deflated and in Base64.
+/// The recording of a run: lines of JSON, deflated, in Base64.
 pub(super) fn packed(folder: &RunFolder, facts: &RunFacts) -> Result<String, ReportError> {
     let (mut samples, mut lines) = (Vec::new(), vec![facts_line(facts)]);
     mcap::read(folder.path(), |sample| samples.push(sample), |event| lines.extend(event_line(&event)))?;
-    let step = (samples.len() * facts.drones as usize).div_ceil(MOST).max(1);
+    let step = (samples.len() * facts.drones as usize).div_ceil(MAX_POSITIONS).max(1);
     let last = samples.len().saturating_sub(1);
     let kept = samples.iter().enumerate().filter(|(place, _)| place % step == 0 || *place == last);
     lines.extend(kept.map(|(_, sample)| sample_line(sample)));

@@ -1,9 +1,9 @@
-//! A run's plots in the page: the SVGs of its `plots` folder, in the colours of the page.
+//! The plots of a run inside the page, in the colours of the page.
 
 use crate::error::ReportError;
 use std::path::PathBuf;
 
-/// Colours of the plots that mean paper and ink, and the page's names for them.
+/// The colours of the plots that depend on the page's theme, and their CSS variables.
 const THEMED: [(&str, &str); 6] = [
     ("#FFFFFF", "var(--paper)"),
     ("#333333", "var(--ink)"),
@@ -13,10 +13,10 @@ const THEMED: [(&str, &str); 6] = [
     ("#CC1E14", "var(--bad)"),
 ];
 
-/// The figures.
+/// The figures of the page.
 pub(super) fn all(plots: &[PathBuf]) -> Result<String, ReportError> {
     let mut html = "<h2>Figures</h2>".to_owned();
-    // The animation shows less than the replay does.
+    // The replay shows more than the animation, which is left out.
     for path in plots.iter().filter(|path| !path.ends_with("flight.svg")) {
         let svg = std::fs::read_to_string(path).map_err(ReportError::io(path))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
@@ -25,7 +25,7 @@ pub(super) fn all(plots: &[PathBuf]) -> Result<String, ReportError> {
     Ok(html)
 }
 
-/// Every colour in a plot is a whole attribute, so that a text that looks like one stays.
+/// Replaces colours only where they are a whole attribute, so that text in a plot does not change.
 fn themed(svg: &str) -> String {
     let mut svg = svg.to_owned();
     for (colour, name) in THEMED {
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paper_and_ink_follow_the_page() {
+    fn background_and_ink_follow_the_theme() {
         let svg = r##"<rect fill="#FFFFFF" stroke="#333333"/><path stroke="#0072B2"/><text>fill #FFFFFF</text>"##;
         let wanted =
             r##"<rect fill="var(--paper)" stroke="var(--ink)"/><path stroke="#0072B2"/><text>fill #FFFFFF</text>"##;

@@ -1,8 +1,9 @@
 "use strict";
-// Joins story, scene and panels; plays, and listens to a live run if there is one.
+// The player: connects story, scene and panels, plays a recording, and follows a live run.
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
-const SHOWN = { routes: "routes", slots: "slots", zones: "danger zones", links: "links", drops: "dropped frames", trails: "ways",
+// What the check boxes show and hide.
+const SHOWN = { routes: "routes", slots: "slots", zones: "danger zones", links: "links", drops: "dropped frames", trails: "trails",
   names: "numbers" };
 const byId = id => document.getElementById(id);
 
@@ -137,7 +138,7 @@ class Player {
     slider.max = this.story.end;
     if (document.activeElement !== slider || this.playing) slider.value = this.t;
     byId("clock").textContent = this.t.toFixed(1) + " s";
-    // Text is for reading: ten times a second is enough.
+    // The text of the panels is updated ten times per second.
     if (moment && now - this.shown > 100) { this.shown = now; this.panels.show(moment, this.selected); }
     this.frames++;
     requestAnimationFrame(then => this.frame(then));
@@ -164,27 +165,27 @@ class Player {
     this.story.take(line);
     if (line.facts) { this.scene.facts = line.facts; this.fit(); }
     if (line.sample) for (const group of line.sample.state.group) this.scene.colours.of(group);
-    if (line.status !== undefined) byId("verdict").textContent = line.status;
-    // A live swarm flies out of a picture that nobody has chosen.
+    if (line.status !== undefined) byId("status").textContent = line.status;
+    // Refits the view to a live swarm, which flies out of it, unless the user has moved the view.
     if (line.sample && this.live && !this.scene.fitted && this.story.samples.length % 20 === 1) this.scene.fit(this.story.box());
   }
 }
 
-// The recording in the page: deflated lines of JSON, in Base64.
+// Unpacks the recording in the page: lines of JSON, deflated, in Base64.
 async function unpack(text) {
   const bytes = Uint8Array.from(atob(text.trim()), letter => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return (await new Response(stream).text()).split("\n").filter(line => line).map(line => JSON.parse(line));
 }
 
-// `#t=55&drone=3` shows a moment and a drone.
-function asked() {
+// Applies an address such as `#t=55&drone=3`, which selects a time and a drone.
+function applyHash() {
   const words = new URLSearchParams(location.hash.slice(1));
   if (words.has("t")) player.seek(Number(words.get("t")) || 0);
   if (words.has("drone")) player.choose(Number(words.get("drone")) || 0);
 }
 
-// Listens to a running swarm, and to the next one when that has ended.
+// Follows a live run, and the next one after its end.
 function listen(player) {
   const socket = new WebSocket(`ws://${location.host}/socket`);
   const hint = byId("hint");
@@ -194,7 +195,7 @@ function listen(player) {
   socket.onclose = () => {
     hint.hidden = player.story.samples.length > 0;
     hint.textContent = "skein view has ended.";
-    byId("verdict").textContent = "disconnected";
+    byId("status").textContent = "disconnected";
     player.open = false;
   };
 }
@@ -203,7 +204,7 @@ const player = window.player = new Player();
 const data = byId("data");
 if (data) {
   byId("speed").options[0].remove();
-  unpack(data.textContent).then(lines => { lines.forEach(line => player.take(line)); player.fit(); player.t = player.story.start; asked(); },
+  unpack(data.textContent).then(lines => { lines.forEach(line => player.take(line)); player.fit(); player.t = player.story.start; applyHash(); },
     error => { byId("hint").hidden = false; byId("hint").textContent = "The replay cannot be shown: " + error.message; });
 } else {
   player.live = player.open = true;

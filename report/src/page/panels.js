@@ -1,8 +1,9 @@
 "use strict";
-// The panels beside the scene: groups, the selected drone, events.
+// The panels below the scene: groups, the selected drone, events.
 
 const PHASES = ["cruise", "avoid", "reform"];
-const FATES = { l: "lost", b: "lost in a burst", r: "out of range", p: "partition", d: "deaf", m: "malformed", q: "queue full" };
+// The reasons of dropped frames, by their letters in `frame.fate`.
+const DROP_REASONS = { l: "lost", b: "lost in a burst", r: "out of range", p: "partition", d: "deaf", m: "malformed", q: "waited too long" };
 
 function element(tag, text, name) {
   const made = document.createElement(tag);
@@ -19,13 +20,13 @@ class Panels {
     this.about = document.getElementById("about");
     this.events = document.getElementById("events");
     this.selected = document.getElementById("selected");
-    this.told = 0;
+    this.listed = 0;
     this.drones = -1;
     this.seek = () => {};
   }
 
   clear() {
-    this.told = 0;
+    this.listed = 0;
     this.drones = -1;
     this.events.replaceChildren();
     this.groups.replaceChildren();
@@ -72,7 +73,7 @@ class Panels {
 
   showDrone(moment, i) {
     if (i === null || i >= moment.x.length) {
-      this.about.replaceChildren(element("p", "Click a drone, or choose its number, to see its state, what it hears and from whom."));
+      this.about.replaceChildren(element("p", "Click a drone, or choose its number, to see its state and the messages that it receives."));
       return;
     }
     const state = moment.sample.state, radio = moment.sample.radio, list = element("dl");
@@ -82,43 +83,43 @@ class Panels {
     row("position", `${moment.x[i].toFixed(1)}, ${moment.y[i].toFixed(1)} m`);
     row("speed", `${speed.toFixed(2)} m/s`);
     row("group", state.group[i] + (state.leads[i] ? `, leads ${state.leads[i]}` : ""));
-    row("obeys", state.leader[i] === null ? "nobody" : `drone ${state.leader[i]}, round ${state.plan[i][0]} epoch ${state.plan[i][1]}`);
-    row("phase", PHASES[state.phase[i]] + (state.route[i] === null ? "" : `, route ${state.route[i]}, place ${state.rank[i]}`));
+    row("obeys", state.leader[i] === null ? "no leader" : `drone ${state.leader[i]}, round ${state.plan[i][0]} epoch ${state.plan[i][1]}`);
+    row("phase", PHASES[state.phase[i]] + (state.route[i] === null ? "" : `, route ${state.route[i]}, place ${state.rank[i]} in the queue`));
     row("energy", `${(moment.sample.energy.drone_j[i] / 1000).toFixed(3)} kJ`);
     row("nearest", this.nearest(moment, i));
-    row("radio", `${radio.heard[i] || 0} heard, ${radio.dropped_by[i] || 0} dropped in this sample`);
+    row("radio", `${radio.heard[i] || 0} received, ${radio.dropped_by[i] || 0} dropped since the previous sample`);
     const parts = [list];
-    if (moment.heard) parts.push(element("h3", `Hears ${moment.heard.size ? [...moment.heard.keys()].join(", ") : "nobody"}`));
+    if (moment.heard) parts.push(element("h3", `Hears ${moment.heard.size ? [...moment.heard.keys()].join(", ") : "no drone"}`));
     parts.push(element("h3", "Inbox, newest first"), this.inbox(moment, i));
     this.about.replaceChildren(...parts);
   }
 
   nearest(moment, i) {
-    let least = Infinity, who = null;
+    let least = Infinity, nearest = null;
     for (let k = 0; k < moment.x.length; k++) {
       const d = Math.hypot(moment.x[k] - moment.x[i], moment.y[k] - moment.y[i]);
-      if (k !== i && d < least) { least = d; who = k; }
+      if (k !== i && d < least) { least = d; nearest = k; }
     }
-    return who === null ? "nobody" : `drone ${who}, ${least.toFixed(1)} m`;
+    return nearest === null ? "no other drone" : `drone ${nearest}, ${least.toFixed(1)} m`;
   }
 
   inbox(moment, i) {
     const box = element("div", undefined, "inbox");
-    for (const { frame, fate } of this.story.inbox(i, moment.place, 2, 14)) {
-      const why = fate === "h" ? "" : `  ${FATES[fate] || "not heard"}`;
-      const line = `${frame.t_s.toFixed(2).padStart(7)} s  ${String(frame.source).padStart(3)}  ${frame.kind} ${frame.says}${why}`;
-      box.append(element("div", line, fate === "h" ? "" : "lost"));
+    for (const { frame, delivery } of this.story.inbox(i, moment.place, 2, 14)) {
+      const reason = delivery === "h" ? "" : `  ${DROP_REASONS[delivery] || "dropped"}`;
+      const line = `${frame.t_s.toFixed(2).padStart(7)} s  ${String(frame.source).padStart(3)}  ${frame.kind} ${frame.says}${reason}`;
+      box.append(element("div", line, delivery === "h" ? "" : "lost"));
     }
     return box;
   }
 
   showEvents(t) {
-    for (; this.told < this.story.events.length; this.told++) {
-      const { event, text, severity } = this.story.events[this.told];
+    for (; this.listed < this.story.events.length; this.listed++) {
+      const { event, text, severity } = this.story.events[this.listed];
       const line = element("li", undefined, severity === "info" ? "" : severity);
       const stamp = element("time", event.t_s.toFixed(2) + " s");
       const jump = element("button", text);
-      jump.title = "Show this moment";
+      jump.title = "Go to this time";
       jump.addEventListener("click", () => this.seek(event.t_s));
       line.append(stamp, jump);
       line.dataset.t = event.t_s;
@@ -126,9 +127,9 @@ class Panels {
     }
     let last = null;
     for (const line of this.events.children) {
-      const later = Number(line.dataset.t) > t + 1e-6;
-      line.classList.toggle("late", later);
-      if (!later) last = line;
+      const future = Number(line.dataset.t) > t + 1e-6;
+      line.classList.toggle("future", future);
+      if (!future) last = line;
     }
     if (last && last !== this.current) {
       this.current = last;

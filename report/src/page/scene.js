@@ -1,13 +1,13 @@
 "use strict";
-// Draws one moment of the swarm on a canvas. World frame: x along the flight, y to the left of it, metres.
+// Draws the swarm at one time on a canvas. World frame: x along the flight direction, y to its left, metres.
 
-// Okabe and Ito's colours, told apart by colour-blind people too; the same as in the plots.
+// The colours of Okabe and Ito, which colour-blind people can distinguish; the same as in the plots.
 const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#785e3c", "#d55e00"];
-// Beyond so many drones, what is drawn a drone is kept to the least.
+// Number of drones above which less is drawn for each drone.
 const MANY = 150;
-// Drones nearer to each other than this on the screen go without numbers, pixels.
+// Least safe distance on the screen at which drones have numbers, pixels.
 const NAME_PX = 12;
-// How far back a way is shown, s.
+// Length of the trails, s.
 const TRAIL_S = 8;
 
 class Colours {
@@ -51,7 +51,7 @@ class Scene {
     this.height = height;
   }
 
-  // Shows the box [x0, y0, x1, y1], m.
+  // Fits the view to the box [x0, y0, x1, y1], m.
   fit([x0, y0, x1, y1]) {
     this.resize();
     const pad = 24;
@@ -186,7 +186,7 @@ class Scene {
     }
     pen.globalAlpha = 1;
     if (many) return;
-    // Two of these circles that meet: drones closer than the safe distance.
+    // Circles of half the safe distance. They overlap if two drones are closer than the safe distance.
     pen.strokeStyle = this.ink.bad;
     pen.lineWidth = 1;
     pen.beginPath();
@@ -216,7 +216,7 @@ class Scene {
     pen.stroke();
   }
 
-  // From each leader to its followers; with a drone selected, from those it hears to it.
+  // Lines from each leader to its followers. For a selected drone, also lines from the drones that it hears.
   links(moment, many, selected) {
     const pen = this.pen, state = moment.sample.state;
     pen.lineWidth = 1;
@@ -243,7 +243,7 @@ class Scene {
     pen.globalAlpha = 1;
   }
 
-  // Frames that were lost on their way just now; with a drone selected, those to it.
+  // The frames of this sample that were dropped in range. If a drone is selected, only frames to it.
   drops(moment, selected) {
     const pen = this.pen, radio = moment.sample.radio;
     pen.strokeStyle = this.ink.bad;
@@ -290,7 +290,7 @@ class Scene {
       pen.arc(this.px(moment.x[selected]), this.py(moment.y[selected]), size * 2, 0, 7);
       pen.stroke();
     }
-    // Numbers of drones at the safe distance must not hide each other.
+    // The numbers of two drones at the safe distance must not overlap.
     if (this.shows.names && this.facts.safe_distance_m * this.view.scale > NAME_PX) this.names(moment, size);
   }
 
@@ -320,7 +320,7 @@ class Scene {
     }
   }
 
-  // The drone under a point of the canvas, or null.
+  // The number of the drone at a point of the canvas, or null.
   pick(moment, px, py) {
     let best = null, least = 18 * 18;
     for (let i = 0; i < moment.x.length; i++) {

@@ -1,8 +1,8 @@
 "use strict";
-// What is known of a run: facts, samples in the order of time, events. Filled at once from a report, bit by bit by a live run.
+// The data of a run: facts, samples in order of time, events. A recorded run is loaded at once, a live run line by line.
 
-// A live view of a large swarm forgets its oldest samples beyond so many numbers.
-const KEEP = 6e6;
+// Largest number of values that a live view keeps. Beyond it, the oldest samples are removed.
+const MAX_VALUES = 6e6;
 
 class Story {
   constructor() { this.clear(); }
@@ -11,27 +11,26 @@ class Story {
     this.facts = null;
     this.samples = [];
     this.events = [];
-    this.fresh = true;
   }
 
   get start() { return this.samples.length ? this.samples[0].state.t_s : 0; }
   get end() { return this.samples.length ? this.samples[this.samples.length - 1].state.t_s : 0; }
 
-  // Takes one line of the stream.
+  // Takes one line of the data.
   take(line) {
     if (line.facts) {
       this.clear();
       this.facts = line.facts;
     } else if (line.sample) {
       this.samples.push(line.sample);
-      const most = Math.max(600, KEEP / (16 * Math.max(1, line.sample.state.x_m.length)));
-      if (this.samples.length > most * 1.1) this.samples.splice(0, this.samples.length - most);
+      const limit = Math.max(600, MAX_VALUES / (16 * Math.max(1, line.sample.state.x_m.length)));
+      if (this.samples.length > limit * 1.1) this.samples.splice(0, this.samples.length - limit);
     } else if (line.event) {
       this.events.push(line);
     }
   }
 
-  // Place of the last sample at or before t; -1 before the first.
+  // Index of the last sample at or before t; -1 if there is none.
   before(t) {
     let low = 0, high = this.samples.length;
     while (low < high) {
@@ -41,7 +40,7 @@ class Story {
     return low - 1;
   }
 
-  // The swarm at t: positions between the two samples around it, everything else of the earlier one.
+  // The swarm at t. Positions and velocities are interpolated between two samples; all else is from the earlier sample.
   moment(t, trail) {
     if (!this.samples.length) return null;
     const place = Math.max(this.before(t), 0);
@@ -61,7 +60,8 @@ class Story {
     return moment;
   }
 
-  // Messages to a drone within the last `span` seconds before a place, the newest first; those heard and those not.
+  // The frames sent to a drone in the last `span` seconds before the sample at `place`, newest first, at most `most` of
+  // them: delivered and dropped ones.
   inbox(drone, place, span, most) {
     const found = [];
     const until = this.samples[place] ? this.samples[place].state.t_s - span : 0;
@@ -69,23 +69,23 @@ class Story {
       const radio = this.samples[k].radio;
       for (let f = radio.frames.length - 1; f >= 0 && found.length < most; f--) {
         const frame = radio.frames[f];
-        const fate = radio.receiver === null ? frame.fate[drone] : radio.receiver === drone ? frame.fate[0] : "-";
-        if (fate && fate !== "-") found.push({ frame, fate });
+        const delivery = radio.receiver === null ? frame.fate[drone] : radio.receiver === drone ? frame.fate[0] : "-";
+        if (delivery && delivery !== "-") found.push({ frame, delivery });
       }
     }
     return found;
   }
 
-  // Whom a drone has heard lately: source and number of messages.
+  // The drones whose messages a drone received in the last 0.35 s: a map from sender to number of messages.
   heard(drone, place) {
     const from = new Map();
-    for (const { frame, fate } of this.inbox(drone, place, 0.35, 2000)) {
-      if (fate === "h") from.set(frame.source, (from.get(frame.source) || 0) + 1);
+    for (const { frame, delivery } of this.inbox(drone, place, 0.35, 2000)) {
+      if (delivery === "h") from.set(frame.source, (from.get(frame.source) || 0) + 1);
     }
     return new Map([...from].sort((a, b) => a[0] - b[0]));
   }
 
-  // What is worth seeing: obstacles and all that was flown, m.
+  // The box around obstacles and tracks: [x0, y0, x1, y1], m.
   box() {
     let box = [Infinity, Infinity, -Infinity, -Infinity];
     const add = (x, y) => { box = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)]; };

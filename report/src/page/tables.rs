@@ -1,11 +1,11 @@
-//! The summary of a run in tables.
+//! The tables of the page: summary, messages, faults and violations.
 
-use super::escaped;
+use crate::markup::escaped;
 use crate::summary::Summary;
 use crate::text;
 use skein_protocol::record::Percentiles;
 
-/// The outcome's name.
+/// Name of the outcome.
 pub(super) fn outcome(summary: &Summary) -> String {
     let name = serde_json::to_value(summary.outcome).ok();
     name.as_ref().and_then(|name| name.as_str()).unwrap_or("aborted").to_owned()
@@ -16,8 +16,8 @@ pub(super) fn all(summary: &Summary) -> String {
     let lines = text::lines(summary).into_iter().map(|(label, line)| vec![label, line]);
     let mut html = format!("<h2>Summary</h2>{}", table(&[], lines.collect()));
     html += &format!("<h2>Messages</h2>{}", messages(summary));
-    html += &section("Faults", &["time (s)", "what", "drone", "by", "detail"], faults(summary));
-    html += &section("Broken invariants", &["time (s)", "what", "drones", "value (m)"], violations(summary));
+    html += &section("Faults", &["time (s)", "fault", "drone", "cause", "detail"], faults(summary));
+    html += &section("Violated invariants", &["time (s)", "invariant", "drones", "value (m)"], violations(summary));
     html
 }
 
@@ -37,25 +37,25 @@ fn table(head: &[&str], lines: Vec<Vec<String>>) -> String {
 }
 
 fn messages(summary: &Summary) -> String {
-    let said = &summary.messages;
+    let counts = &summary.messages;
     let mut lines = vec![
-        vec!["frames sent".to_owned(), said.sent.to_string()],
-        vec!["messages heard, over all receivers".to_owned(), said.delivered.to_string()],
+        vec!["frames sent".to_owned(), counts.sent.to_string()],
+        vec!["messages received, over all receivers".to_owned(), counts.delivered.to_string()],
     ];
-    let dropped = serde_json::to_value(&said.dropped).unwrap_or_default();
+    let dropped = serde_json::to_value(&counts.dropped).unwrap_or_default();
     for (reason, count) in dropped.as_object().into_iter().flatten() {
         let count = count.as_u64().map_or("unknown".to_owned(), |count| count.to_string());
         lines.push(vec![format!("dropped: {reason}"), count]);
     }
-    lines.push(vec!["delay from sending to hearing".to_owned(), percentiles(&said.delay_s)]);
-    lines.push(vec!["age of a peer's last known pose".to_owned(), percentiles(&said.age_s)]);
+    lines.push(vec!["delay from sending to receiving".to_owned(), percentiles(&counts.delay_s)]);
+    lines.push(vec!["age of the last known pose of another drone".to_owned(), percentiles(&counts.age_s)]);
     table(&[], lines)
 }
 
 fn percentiles(times: &Percentiles) -> String {
     let ms = |value: Option<f64>| value.map_or("unknown".to_owned(), |s| format!("{:.0} ms", s * 1e3));
     format!(
-        "mean {}, median {}, 99 % within {}, at most {}",
+        "mean {}, median {}, 99th percentile {}, maximum {}",
         ms(times.mean),
         ms(times.p50),
         ms(times.p99),
@@ -70,12 +70,12 @@ fn name(value: &impl serde::Serialize) -> String {
 
 fn faults(summary: &Summary) -> Vec<Vec<String>> {
     let line = |fault: &crate::summary::FaultEntry| {
-        let by = if fault.scheduled { "the scenario" } else { "nobody: it happened" };
+        let cause = if fault.scheduled { "scheduled by the scenario" } else { "not scheduled" };
         vec![
             format!("{:.2}", fault.t_s),
             name(&fault.kind),
             fault.target.map_or_else(|| "all".to_owned(), |drone| drone.to_string()),
-            by.to_owned(),
+            cause.to_owned(),
             fault.detail.clone(),
         ]
     };
@@ -83,9 +83,14 @@ fn faults(summary: &Summary) -> Vec<Vec<String>> {
 }
 
 fn violations(summary: &Summary) -> Vec<Vec<String>> {
-    let line = |broken: &crate::summary::Violation| {
-        let drones: Vec<String> = broken.drones.iter().map(u32::to_string).collect();
-        vec![format!("{:.2}", broken.t_s), name(&broken.kind), drones.join(", "), format!("{:.2}", broken.value_m)]
+    let line = |violation: &crate::summary::Violation| {
+        let drones: Vec<String> = violation.drones.iter().map(u32::to_string).collect();
+        vec![
+            format!("{:.2}", violation.t_s),
+            name(&violation.kind),
+            drones.join(", "),
+            format!("{:.2}", violation.value_m),
+        ]
     };
     summary.violations.iter().map(line).collect()
 }

@@ -1,35 +1,35 @@
-//! The flight as an animated SVG, for a page that shows pictures and runs no script.
+//! The flight as an animated SVG, for pages that show pictures but run no script.
 
 use super::samples::{Samples, Track};
-use super::style::px;
-use super::sweep::escaped;
-use super::tracks::{colours, frame, outline};
+use super::style::{INK, hex, px};
+use super::tracks::{colours, frame};
 use crate::facts::RunFacts;
-use plotters::style::RGBColor;
+use crate::geometry::outline;
+use crate::markup::escaped;
 use skein_protocol::Vec2;
 use std::fmt::Write;
 
 /// Width of the drawing, px.
 const WIDTH: f64 = 1100.0;
-/// Space for the title above, px.
+/// Height of the title, px.
 const TITLE: f64 = 40.0;
-/// Of the samples, every so many-th is a key frame.
-const EVERY: usize = 5;
-/// Simulated seconds shown in one.
+/// Number of samples per key frame.
+const SAMPLES_PER_KEY: usize = 5;
+/// Simulated time per time of the animation.
 const SPEED: f64 = 8.0;
-/// More drones would make a file that nobody wants to load.
-const MOST: usize = 64;
-/// A drone: a dart that points along the flight, px.
-const DART: &str = "M9 0L-7 6L-3 0L-7 -6Z";
+/// Largest number of drones: more would make the file too large.
+const DRONES_MAX: usize = 64;
+/// The symbol of a drone, which points along the flight direction, px.
+const ARROW: &str = "M9 0L-7 6L-3 0L-7 -6Z";
 
-/// The SVG; `None` for a swarm that is too large.
+/// Draws the animation. `None` without drones, and for a swarm that is too large.
 pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
-    if samples.tracks.is_empty() || samples.tracks.len() > MOST {
+    if samples.tracks.is_empty() || samples.tracks.len() > DRONES_MAX {
         return None;
     }
-    let fine = f64::from(px(1));
-    let (low, high, height) = frame(samples, facts, WIDTH * fine);
-    let height = height / fine;
+    let units_per_pixel = f64::from(px(1));
+    let (low, high, height) = frame(samples, facts, WIDTH * units_per_pixel);
+    let height = height / units_per_pixel;
     let scale = WIDTH / (high.x - low.x);
     let place = |at: Vec2| [(at.x - low.x) * scale, TITLE + (high.y - at.y) * scale];
     let size = format!("{WIDTH:.0} {:.0}", height + TITLE);
@@ -49,34 +49,32 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
     let longest = samples.tracks.values().map(|track| track.points.len()).max().unwrap_or(0);
     let seconds = samples.end_s / SPEED;
     for track in samples.tracks.values() {
-        let colour = hex(colours.get(track.group.as_str()).copied().unwrap_or(super::style::INK));
-        let way: Vec<[f64; 2]> = frames(track, longest).into_iter().map(place).collect();
+        let colour = hex(colours.get(track.group.as_str()).copied().unwrap_or(INK));
+        let keys: Vec<[f64; 2]> = key_frames(track, longest).into_iter().map(place).collect();
         let _ = writeln!(
             svg,
             "<polyline fill=\"none\" stroke=\"{colour}\" stroke-opacity=\".3\" stroke-width=\"2\" points=\"{0}\"/>\n\
-             <path d=\"{DART}\" fill=\"{colour}\"><animateTransform attributeName=\"transform\" type=\"translate\" \
+             <path d=\"{ARROW}\" fill=\"{colour}\"><animateTransform attributeName=\"transform\" type=\"translate\" \
              dur=\"{seconds:.2}s\" repeatCount=\"indefinite\" values=\"{1}\"/></path>",
-            points(way.iter().copied()),
-            way.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect::<Vec<_>>().join(";"),
+            points(keys.iter().copied()),
+            keys.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect::<Vec<_>>().join(";"),
         );
     }
     svg.push_str("</svg>\n");
     Some(svg)
 }
 
-/// Key frames: as many for each drone, so that all are shown at the same time; a dead one stays where it was.
-fn frames(track: &Track, longest: usize) -> Vec<Vec2> {
+/// The key frames of a drone, m. Each drone has the same number of them, so that all are shown at the same time. A dead
+/// drone stays at its last position.
+fn key_frames(track: &Track, longest: usize) -> Vec<Vec2> {
     let last = track.points.len().saturating_sub(1);
-    let places = (0..longest).step_by(EVERY).chain([longest.saturating_sub(1)]);
+    let places = (0..longest).step_by(SAMPLES_PER_KEY).chain([longest.saturating_sub(1)]);
     places.filter_map(|place| track.points.get(place.min(last)).copied()).collect()
 }
 
+/// Points in the notation of SVG.
 fn points(points: impl Iterator<Item = [f64; 2]>) -> String {
     points.map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
-}
-
-fn hex(colour: RGBColor) -> String {
-    format!("#{:02x}{:02x}{:02x}", colour.0, colour.1, colour.2)
 }
 
 #[cfg(test)]
@@ -85,7 +83,7 @@ mod tests {
     use crate::testing::facts;
 
     #[test]
-    fn every_drone_has_as_many_key_frames() {
+    fn every_drone_has_the_same_number_of_key_frames() {
         let mut samples = Samples { end_s: 80.0, ..Samples::default() };
         for (drone, count) in [(0, 101), (1, 40)] {
             let points = (0..count).map(|i| Vec2::new(f64::from(i), drone as f64 * 30.0)).collect();

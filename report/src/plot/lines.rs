@@ -4,15 +4,16 @@ use super::style::{Axes, Heading, PALETTE, Sign, plot, px};
 use crate::error::DrawError;
 use plotters::prelude::*;
 
+/// Height of the plotting area.
 const HEIGHT: u32 = px(320);
 
-/// A line and its name; points are times in s and values.
+/// A line with its label. The points are times, s, and values.
 pub(super) struct Line {
     pub label: String,
     pub points: Vec<(f64, f64)>,
 }
 
-/// The SVG.
+/// Draws the lines over time. Returns the SVG.
 pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String, DrawError> {
     let colours = || PALETTE.iter().cycle();
     let signs = lines.iter().zip(colours()).map(|(line, &colour)| (Sign::Line(colour), line.label.clone()));

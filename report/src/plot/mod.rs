@@ -1,6 +1,7 @@
-//! Plots of a flown run, drawn from its trace.csv, so that they can be redone at any time. SVG, light background, colours
-//! that colour-blind people tell apart (Okabe and Ito).
+//! The plots of a run, drawn from its recorded files, so that they can be drawn again at any time. They are SVGs on a light
+//! background, in colours that colour-blind people can distinguish.
 
+mod colour_scale;
 mod curves;
 mod flight;
 mod lines;
@@ -13,42 +14,27 @@ pub mod sweep;
 mod timeline;
 mod tracks;
 
-use crate::deviation::ShapeDeviation;
+use crate::deviation::{self, ShapeDeviation};
 use crate::error::{DrawError, ReportError};
 use crate::facts::RunFacts;
+pub use crate::files::PLOT_FILES as FILES;
+use crate::files::TRACE;
 use crate::folder::RunFolder;
-use curves::{Band, Curve, Figure};
+use curves::{Band, Figure, Level};
 use recording::Recording;
 use samples::Samples;
 use std::path::PathBuf;
 use style::{BLUE, RED};
-pub(crate) use tracks::outline;
 
-/// Names of the plots in a run's `plots` folder: tracks, least separation, speed, distance between drones, energy,
-/// slot error, who led, messages; the flight, animated; distance from the target shape, bending energy.
-pub const FILES: [&str; 11] = [
-    "trace.svg",
-    "separation.svg",
-    "speed.svg",
-    "distance.svg",
-    "energy.svg",
-    "formation.svg",
-    "leaders.svg",
-    "messages.svg",
-    "flight.svg",
-    "disturbance.svg",
-    "bending.svg",
-];
-
-/// Draws the plots of a run from its trace.csv, and from the events and counts in its run.mcap, and writes formation.csv
-/// beside it: how far the swarm was from its target shape. Plots that have no data are left out: all of them for an empty
-/// trace, those of distances for a lone drone, those of the shape for a very large swarm.
+/// Draws the plots of a run from its trace.csv and run.mcap into its folder `plots`, and writes formation.csv, the
+/// deviation from the target shape over time. Returns the paths of the plots. Plots without data are left out: all plots
+/// if the trace is empty, those of distances for a single drone, those of the shape for a very large swarm.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Content`] for a broken trace, [`ReportError::Recording`], [`ReportError::Plot`].
+/// [`ReportError::Io`], [`ReportError::Content`] for an invalid trace, [`ReportError::Recording`], [`ReportError::Plot`].
 pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
-    let samples = Samples::read(&folder.path().join(crate::trace::FILE), facts)?;
-    crate::deviation::write(folder.path(), &samples.deviations.samples)?;
+    let samples = Samples::read(&folder.path().join(TRACE), facts)?;
+    deviation::write(folder.path(), samples.deviations.samples())?;
     let recording = Recording::read(folder)?;
     let plots = folder.plots()?;
     let mut written = Vec::new();
@@ -63,91 +49,119 @@ pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, Repor
     Ok(written)
 }
 
-/// The colours of groups, in order, as red, green and blue.
-pub(crate) fn palette() -> [(u8, u8, u8); 7] {
-    style::PALETTE.map(|colour| (colour.0, colour.1, colour.2))
-}
-
-/// A drawn plot, or why it cannot be drawn; `None` without data.
+/// The SVG of a plot, or the error; `None` without data.
 type Drawn = Option<Result<String, DrawError>>;
 
-fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -> [Drawn; 11] {
+/// Draws the plots in the order of [`FILES`].
+fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -> [Drawn; FILES.len()] {
     let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
-    let safe = || Curve {
-        label: format!("safe distance, {} m", facts.safe_distance_m),
-        colour: RED,
-        level: facts.safe_distance_m,
-    };
-    let separation = Figure {
+    let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
+    let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
+    let terms = timeline::terms(recording.events(), samples.end_s);
+    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, recording.events(), facts, samples.end_s));
+    let messages = recording
+        .has_messages()
+        .then(|| lines::draw(&format!("Messages: {run}"), "messages per second", &recording.lines()));
+    [
+        tracks,
+        curve(separation(samples, facts, &run)),
+        curve(speed(samples, &run)),
+        curve(distance(samples, facts, &run)),
+        curve(energy(samples, &run)),
+        curve(slot_error(samples, facts, &run)),
+        leaders,
+        messages,
+        flight::draw(samples, facts).map(Ok),
+        curve(disturbance(samples, &run)),
+        curve(bending(samples, &run)),
+    ]
+}
+
+fn separation(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+    Figure {
         title: format!("Least separation: {run}"),
         y_label: "distance between the two nearest drones (m)",
         line_label: "least separation",
-        band: exact(&samples.separation),
-        level: Some(safe()),
-    };
-    let speed = Figure {
+        band: without_deviation(samples.separation.iter().copied()),
+        level: Some(safe_distance(facts)),
+    }
+}
+
+fn speed(samples: &Samples, run: &str) -> Figure {
+    Figure {
         title: format!("Speed: {run}"),
         y_label: "speed (m/s)",
         line_label: "mean over drones",
         band: samples.speed.clone(),
         level: None,
-    };
-    let distance = Figure {
+    }
+}
+
+fn distance(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+    Figure {
         title: format!("Distance between drones: {run}"),
         y_label: "distance between drones (m)",
         line_label: "mean over pairs",
         band: samples.distance.clone(),
-        level: Some(safe()),
-    };
-    let shape = |title: &str, y_label, line_label, of: fn(&ShapeDeviation) -> f64| {
-        let band = |deviation: &ShapeDeviation| Band { t_s: deviation.t_s, mean: of(deviation), deviation: 0.0 };
-        let band = samples.deviations.samples.iter().map(band).collect();
-        Figure { title: format!("{title}: {run}"), y_label, line_label, band, level: None }
-    };
-    let disturbance = shape(
-        "Disturbance of the formation",
-        "distance from the target shape (m)",
-        "root mean square over drones, after the best translation and assignment",
-        |deviation| deviation.disturbance_m,
-    );
-    let bending = shape(
-        "Bending energy",
-        "bending energy (1)",
-        "of the thin-plate spline that takes the target shape to the drones",
-        |deviation| deviation.bending,
-    );
-    let energy = Figure {
+        level: Some(safe_distance(facts)),
+    }
+}
+
+fn energy(samples: &Samples, run: &str) -> Figure {
+    Figure {
         title: format!("Energy: {run}"),
         y_label: "energy used by a drone (J)",
         line_label: "mean over drones",
         band: samples.energy.clone(),
         level: None,
-    };
-    let formation = Figure {
-        title: format!("Largest slot error, after the best translation: {run}"),
-        y_label: "distance from the slot (m)",
-        line_label: "drone farthest from its slot",
-        band: exact(&samples.formation),
-        level: Some(Curve {
-            label: format!("closed, {} m", facts.arrival_error_m),
-            colour: RED,
-            level: facts.arrival_error_m,
-        }),
-    };
-    let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
-    let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
-    let terms = timeline::terms(&recording.events, samples.end_s);
-    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, &recording.events, facts, samples.end_s));
-    let messages =
-        recording.any().then(|| lines::draw(&format!("Messages: {run}"), "messages a second", &recording.lines()));
-    let [separation, speed, distance, energy, formation] = [separation, speed, distance, energy, formation].map(curve);
-    let flight = flight::draw(samples, facts).map(Ok);
-    let (disturbance, bending) = (curve(disturbance), curve(bending));
-    [tracks, separation, speed, distance, energy, formation, leaders, messages, flight, disturbance, bending]
+    }
 }
 
-fn exact(points: &[(f64, f64)]) -> Vec<Band> {
-    points.iter().map(|&(t_s, mean)| Band { t_s, mean, deviation: 0.0 }).collect()
+fn slot_error(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+    Figure {
+        title: format!("Largest slot error after the best translation: {run}"),
+        y_label: "distance from the slot (m)",
+        line_label: "drone farthest from its slot",
+        band: without_deviation(samples.formation.iter().copied()),
+        level: Some(Level {
+            label: format!("limit of a closed formation, {} m", facts.arrival_error_m),
+            colour: RED,
+            value: facts.arrival_error_m,
+        }),
+    }
+}
+
+fn disturbance(samples: &Samples, run: &str) -> Figure {
+    Figure {
+        title: format!("Disturbance of the formation: {run}"),
+        y_label: "distance from the target shape (m)",
+        line_label: "root mean square over drones, after the best translation and assignment",
+        band: of_deviations(samples, |deviation| deviation.disturbance_m),
+        level: None,
+    }
+}
+
+fn bending(samples: &Samples, run: &str) -> Figure {
+    Figure {
+        title: format!("Bending energy: {run}"),
+        y_label: "bending energy (1)",
+        line_label: "of the thin-plate spline from the target shape to the drones",
+        band: of_deviations(samples, |deviation| deviation.bending),
+        level: None,
+    }
+}
+
+fn safe_distance(facts: &RunFacts) -> Level {
+    Level { label: format!("safe distance, {} m", facts.safe_distance_m), colour: RED, value: facts.safe_distance_m }
+}
+
+fn of_deviations(samples: &Samples, quantity: fn(&ShapeDeviation) -> f64) -> Vec<Band> {
+    without_deviation(samples.deviations.samples().iter().map(|deviation| (deviation.t_s, quantity(deviation))))
+}
+
+/// A quantity over time that has no standard deviation.
+fn without_deviation(points: impl Iterator<Item = (f64, f64)>) -> Vec<Band> {
+    points.map(|(t_s, mean)| Band { t_s, mean, deviation: 0.0 }).collect()
 }
 
 #[cfg(test)]
@@ -158,7 +172,7 @@ mod tests {
     use skein_protocol::shape::ConvexShape;
     use std::fmt::Write;
 
-    fn flown(drones: u32, ticks: u32) -> (tempfile::TempDir, RunFolder) {
+    fn recorded(drones: u32, ticks: u32) -> (tempfile::TempDir, RunFolder) {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
         let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
@@ -169,20 +183,20 @@ mod tests {
             }
         }
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
-        // A recording in which nothing is said.
+        // A recording without messages.
         let scenario = serde_json::json!({});
         crate::mcap::McapWriter::create(folder.path(), &facts(drones), &scenario).unwrap().finish().unwrap();
         (root, folder)
     }
 
     #[test]
-    fn every_plot_says_what_it_shows() {
-        let (_root, folder) = flown(3, 500);
+    fn every_plot_has_labels() {
+        let (_root, folder) = recorded(3, 500);
         let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
         let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
-        let silent = |name: &&str| !["leaders.svg", "messages.svg"].contains(name);
-        assert_eq!(names, FILES.into_iter().filter(silent).collect::<Vec<_>>());
+        let drawn = |name: &&str| !["leaders.svg", "messages.svg"].contains(name);
+        assert_eq!(names, FILES.into_iter().filter(drawn).collect::<Vec<_>>());
         let text = |i: usize| std::fs::read_to_string(&written[i]).unwrap();
         for group in ["N1", "N2", "N3", "start", "end", "obstacle", "x (m)"] {
             assert!(text(0).contains(group), "{group} is not in the legend");
@@ -194,10 +208,10 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_data_is_left_out() {
-        let (_root, folder) = flown(0, 0);
+    fn plots_without_data_are_left_out() {
+        let (_root, folder) = recorded(0, 0);
         assert_eq!(write(&folder, &facts(3)).unwrap(), Vec::<PathBuf>::new());
-        let (_root, folder) = flown(1, 10);
+        let (_root, folder) = recorded(1, 10);
         let written = write(&folder, &facts(1)).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(names, ["trace.svg", "speed.svg", "energy.svg", "formation.svg", "flight.svg"]);

@@ -1,4 +1,4 @@
-//! What the recording tells beside the trace: events, and how much was said and heard.
+//! What the plots need from run.mcap: the events, and the number of messages over time.
 
 use super::lines::Line;
 use crate::error::ReportError;
@@ -6,28 +6,29 @@ use crate::folder::RunFolder;
 use crate::mcap;
 use skein_protocol::record::RunEvent;
 
-/// Seconds over which messages are counted.
-const EVERY_S: f64 = 1.0;
+/// Length of the intervals in which messages are counted, s.
+const INTERVAL_S: f64 = 1.0;
 
-/// Messages in one second.
+/// Messages per second in one interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Count {
     sent: f64,
-    heard: f64,
+    received: f64,
     dropped: f64,
 }
 
 /// Events and messages of a run.
 #[derive(Default)]
 pub(super) struct Recording {
-    pub events: Vec<RunEvent>,
+    events: Vec<RunEvent>,
     counts: Vec<Count>,
+    /// Time of the last sample, s.
     end_s: f64,
 }
 
 impl Recording {
     /// Reads run.mcap.
-    pub fn read(folder: &RunFolder) -> Result<Self, ReportError> {
+    pub(crate) fn read(folder: &RunFolder) -> Result<Self, ReportError> {
         let (mut recording, mut events) = (Self::default(), Vec::new());
         mcap::read(
             folder.path(),
@@ -47,36 +48,41 @@ impl Recording {
         Ok(recording)
     }
 
-    fn count(&mut self, t_s: f64, sent: f64, heard: f64, dropped: f64) {
-        // A sample tells what was said before it.
-        let bin = ((t_s / EVERY_S - 1e-6).max(0.0)).floor() as usize;
+    fn count(&mut self, t_s: f64, sent: f64, received: f64, dropped: f64) {
+        // A sample counts the messages before it.
+        let bin = ((t_s / INTERVAL_S - 1e-6).max(0.0)).floor() as usize;
         if self.counts.len() <= bin {
             self.counts.resize(bin + 1, Count::default());
         }
         let count = &mut self.counts[bin];
-        count.sent += sent / EVERY_S;
-        count.heard += heard / EVERY_S;
-        count.dropped += dropped / EVERY_S;
+        count.sent += sent / INTERVAL_S;
+        count.received += received / INTERVAL_S;
+        count.dropped += dropped / INTERVAL_S;
         self.end_s = t_s;
     }
 
-    /// Whether anything was said.
-    pub fn any(&self) -> bool {
+    /// The events in order.
+    pub(super) fn events(&self) -> &[RunEvent] {
+        &self.events
+    }
+
+    /// Whether any message was sent.
+    pub(super) fn has_messages(&self) -> bool {
         self.counts.iter().any(|count| count.sent > 0.0)
     }
 
-    /// Sent, heard, dropped, one a second; the last second only if it is whole.
-    pub fn lines(&self) -> Vec<Line> {
-        let whole = ((self.end_s + 1e-6) / EVERY_S).floor().max(1.0) as usize;
+    /// Messages sent, received and dropped per second. An incomplete last interval is left out.
+    pub(crate) fn lines(&self) -> Vec<Line> {
+        let whole = ((self.end_s + 1e-6) / INTERVAL_S).floor().max(1.0) as usize;
         let line = |label: &str, value: fn(&Count) -> f64| Line {
             label: label.to_owned(),
             points: (self.counts.iter().take(whole).enumerate())
-                .map(|(bin, count)| ((bin as f64 + 0.5) * EVERY_S, value(count)))
+                .map(|(bin, count)| ((bin as f64 + 0.5) * INTERVAL_S, value(count)))
                 .collect(),
         };
         vec![
             line("sent", |count| count.sent),
-            line("heard, over all receivers", |count| count.heard),
+            line("received, over all receivers", |count| count.received),
             line("dropped, over all receivers", |count| count.dropped),
         ]
     }
@@ -87,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_are_counted_by_the_second() {
+    fn messages_are_counted_per_second() {
         let mut recording = Recording::default();
         for tenth in 1..=25 {
             recording.count(f64::from(tenth) * 0.1, 2.0, 6.0, 1.0);
@@ -95,6 +101,6 @@ mod tests {
         let lines = recording.lines();
         assert_eq!(lines[0].points, [(0.5, 20.0), (1.5, 20.0)]);
         assert_eq!((lines[1].points[1].1, lines[2].points[1].1), (60.0, 10.0));
-        assert!(recording.any() && !Recording::default().any());
+        assert!(recording.has_messages() && !Recording::default().has_messages());
     }
 }

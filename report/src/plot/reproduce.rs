@@ -1,11 +1,13 @@
-//! Figures that put a mission beside a paper's: moments of it seen from above, and bars side by side.
+//! Figures that compare a mission with a paper: snapshots of the swarm from above, and bar charts.
 
-use super::style::PALETTE;
-use super::sweep::escaped;
-use super::tracks::outline;
+use super::style::{PALETTE, hex};
 use crate::error::ReportError;
 use crate::facts::RunFacts;
+use crate::files::TRACE;
 use crate::folder::RunFolder;
+use crate::formation::mean_distance;
+use crate::geometry::outline;
+use crate::markup::escaped;
 use crate::trace;
 use plotters::style::RGBColor;
 use skein_protocol::Vec2;
@@ -13,55 +15,63 @@ use skein_protocol::shape::ConvexShape;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// How far back a drone's way is shown at a moment, s.
+/// Length of the track that a snapshot shows behind each drone, s.
 const TAIL_S: f64 = 8.0;
-/// Time between two points of that way, s.
+/// Time between two points of that track, s.
 const STEP_S: f64 = 0.25;
-/// Width of a drawing, px.
+/// Width of a figure, px.
 const WIDTH: f64 = 1100.0;
 
-/// One drone at a moment.
-struct Seen {
+/// A drone in a snapshot.
+struct SnapshotDrone {
     position_m: Vec2,
     group: String,
+    /// Its track in the last seconds, m.
     tail: Vec<Vec2>,
 }
 
-/// How far the swarm extends in a tick.
+/// The extent of the swarm in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwarmExtent {
-    /// When, s.
+    /// Time, s.
     pub t_s: f64,
     /// Extent across the flight direction, m.
     pub width_m: f64,
-    /// Mean distance over all pairs of drones, m; 0 for a lone one.
+    /// Mean distance over all pairs of drones, m; 0 for a single drone.
     pub distance_m: f64,
 }
 
-/// Moments of a flown run.
+/// The living drones at one time.
+struct Snapshot {
+    t_s: f64,
+    drones: Vec<SnapshotDrone>,
+}
+
+/// Snapshots of a recorded run, and the extents of the swarm over the whole run.
 pub struct Snapshots {
-    /// Time of each, s, and every living drone then.
-    moments: Vec<(f64, Vec<Seen>)>,
-    /// Where drones were, m: lower left and upper right corner.
+    /// In order of time.
+    snapshots: Vec<Snapshot>,
+    /// Least and greatest corner of the box around all tracks, m.
     corners: (Vec2, Vec2),
-    /// Of every tick.
+    /// Of each tick.
     extents: Vec<SwarmExtent>,
 }
 
 impl Snapshots {
-    /// Reads a run's trace for these moments, s; one beyond the end shows the end.
+    /// Reads the trace of a run and takes snapshots at these times, s, which must ascend. For times after the end of the
+    /// run, the snapshot is of its last tick.
     ///
     /// # Errors
-    /// [`ReportError::Io`], [`ReportError::Content`] for a broken trace.
+    /// [`ReportError::Io`], or [`ReportError::Content`] for an invalid trace.
     pub fn read(folder: &RunFolder, times_s: &[f64]) -> Result<Self, ReportError> {
         let mut tails: BTreeMap<usize, Vec<(f64, Vec2)>> = BTreeMap::new();
         let mut found = Self {
-            moments: Vec::new(),
+            snapshots: Vec::new(),
             corners: (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)),
             extents: Vec::new(),
         };
         let mut last: Vec<trace::TraceRow> = Vec::new();
-        trace::read(&folder.path().join(trace::FILE), |rows| {
+        trace::read(&folder.path().join(TRACE), |rows| {
             found.measure(rows);
             for row in rows {
                 let tail = tails.entry(row.drone).or_default();
@@ -69,46 +79,45 @@ impl Snapshots {
                     tail.push((row.t_s, row.position_m));
                 }
             }
-            while times_s.get(found.moments.len()).is_some_and(|&t_s| rows[0].t_s >= t_s) {
-                found.moments.push(moment(rows, &tails));
+            while times_s.get(found.snapshots.len()).is_some_and(|&t_s| rows[0].t_s >= t_s) {
+                found.snapshots.push(snapshot(rows, &tails));
             }
             last = rows.to_vec();
         })?;
         if !last.is_empty() {
-            let missing = times_s.len().saturating_sub(found.moments.len());
-            found.moments.extend((0..missing).map(|_| moment(&last, &tails)));
+            let missing = times_s.len().saturating_sub(found.snapshots.len());
+            found.snapshots.extend((0..missing).map(|_| snapshot(&last, &tails)));
         }
         Ok(found)
     }
 
+    /// Adds the extent of a tick.
     fn measure(&mut self, rows: &[trace::TraceRow]) {
-        let nothing = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+        let empty = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
         let join = |(low, high): (Vec2, Vec2), at: &Vec2| (low.inf(at), high.sup(at));
-        let (low, high) = rows.iter().map(|row| &row.position_m).fold(nothing, join);
+        let (low, high) = rows.iter().map(|row| &row.position_m).fold(empty, join);
         self.corners = join(join(self.corners, &low), &high);
-        let pair = |i: usize| rows[..i].iter().map(move |other| (other.position_m - rows[i].position_m).norm());
-        let total: f64 = (0..rows.len()).flat_map(pair).sum();
-        let pairs = rows.len() * (rows.len() - 1) / 2;
-        let distance_m = total / pairs.max(1) as f64;
+        let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
+        let distance_m = mean_distance(&positions);
         self.extents.push(SwarmExtent { t_s: rows[0].t_s, width_m: high.y - low.y, distance_m });
     }
 
-    /// The ticks between these times, s.
+    /// The extents of all ticks between these times, s.
     pub fn extents(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &SwarmExtent> {
         self.extents.iter().filter(move |extent| (from_s..=to_s).contains(&extent.t_s))
     }
 
-    /// The groups in which drones fly at the moment of this place, in order.
+    /// Names of the groups in the snapshot with this index, sorted.
     #[must_use]
-    pub fn groups(&self, moment: usize) -> Vec<&str> {
-        let seen = self.moments.get(moment).map_or(&[][..], |moment| &moment.1);
-        let mut groups: Vec<&str> = seen.iter().map(|drone| drone.group.as_str()).collect();
+    pub fn groups(&self, index: usize) -> Vec<&str> {
+        let drones = self.snapshots.get(index).map_or(&[][..], |snapshot| &snapshot.drones);
+        let mut groups: Vec<&str> = drones.iter().map(|drone| drone.group.as_str()).collect();
         groups.sort_unstable();
         groups.dedup();
         groups
     }
 
-    /// The SVG: a panel a moment, two in a row, a metre as long in all of them.
+    /// Draws a panel per snapshot, two in a row, all at the same scale. Returns the SVG.
     #[must_use]
     pub fn draw(&self, facts: &RunFacts, title: &str) -> String {
         let (mut low, mut high) = self.corners;
@@ -117,16 +126,16 @@ impl Snapshots {
         }
         let edge = Vec2::repeat(15.0);
         let view = View { low: low - edge, high: high + edge };
-        let rows = self.moments.len().div_ceil(2);
+        let rows = self.snapshots.len().div_ceil(2);
         let height = 70.0 + rows as f64 * view.pitch();
         let mut svg = opening(height, title);
         let colours = self.colours();
         self.draw_legend(&mut svg, &colours);
-        for (i, (t_s, seen)) in self.moments.iter().enumerate() {
+        for (i, snapshot) in self.snapshots.iter().enumerate() {
             let (x, y) = (14.0 + (i % 2) as f64 * (WIDTH / 2.0), 70.0 + (i / 2) as f64 * view.pitch());
             let _ = writeln!(svg, "<g transform=\"translate({x:.0} {y:.0})\">");
-            view.draw(&mut svg, facts, seen, &colours);
-            let label = format!("t = {t_s:.0} s: {}", self.groups(i).join(", "));
+            view.draw(&mut svg, facts, &snapshot.drones, &colours);
+            let label = format!("t = {:.0} s: {}", snapshot.t_s, self.groups(i).join(", "));
             let _ = writeln!(svg, "<text x=\"8\" y=\"18\">{}</text></g>", escaped(&label));
         }
         svg.push_str("</svg>\n");
@@ -134,9 +143,11 @@ impl Snapshots {
     }
 
     fn colours(&self) -> BTreeMap<&str, RGBColor> {
-        let groups = (0..self.moments.len()).flat_map(|i| self.groups(i));
+        let groups = (0..self.snapshots.len()).flat_map(|i| self.groups(i));
         let mut colours: BTreeMap<&str, RGBColor> = groups.map(|group| (group, PALETTE[0])).collect();
-        colours.values_mut().zip(PALETTE.iter().cycle()).for_each(|(colour, &fresh)| *colour = fresh);
+        for (colour, &next) in colours.values_mut().zip(PALETTE.iter().cycle()) {
+            *colour = next;
+        }
         colours
     }
 
@@ -152,22 +163,22 @@ impl Snapshots {
             );
             x += 34.0 + 8.0 * group.chars().count() as f64;
         }
-        let note = format!("the way of the last {TAIL_S:.0} s behind each drone; flight to the right");
+        let note = format!("behind each drone, its track of the last {TAIL_S:.0} s; flight to the right");
         let _ = writeln!(svg, "<text x=\"{:.0}\" y=\"56\">{note}</text>", x + 10.0);
     }
 }
 
-fn moment(rows: &[trace::TraceRow], tails: &BTreeMap<usize, Vec<(f64, Vec2)>>) -> (f64, Vec<Seen>) {
+fn snapshot(rows: &[trace::TraceRow], tails: &BTreeMap<usize, Vec<(f64, Vec2)>>) -> Snapshot {
     let t_s = rows[0].t_s;
-    let seen = |row: &trace::TraceRow| {
+    let drone = |row: &trace::TraceRow| {
         let tail = tails.get(&row.drone).into_iter().flatten().filter(|point| point.0 >= t_s - TAIL_S);
         let tail = tail.map(|point| point.1).chain([row.position_m]).collect();
-        Seen { position_m: row.position_m, group: row.group.clone(), tail }
+        SnapshotDrone { position_m: row.position_m, group: row.group.clone(), tail }
     };
-    (t_s, rows.iter().map(seen).collect())
+    Snapshot { t_s, drones: rows.iter().map(drone).collect() }
 }
 
-/// What of the world a panel shows, m.
+/// The part of the world that each panel shows, m.
 struct View {
     low: Vec2,
     high: Vec2,
@@ -190,23 +201,25 @@ impl View {
         self.height() + 18.0
     }
 
+    /// Place of a point in the panel, px.
     fn at(&self, point: Vec2) -> (f64, f64) {
         ((point.x - self.low.x) * self.scale(), (self.high.y - point.y) * self.scale())
     }
 
+    /// Points in the notation of SVG.
     fn path(&self, points: impl Iterator<Item = Vec2>) -> String {
         let places: Vec<String> = points.map(|point| self.at(point)).map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
         places.join(" ")
     }
 
-    fn draw(&self, svg: &mut String, facts: &RunFacts, seen: &[Seen], colours: &BTreeMap<&str, RGBColor>) {
+    fn draw(&self, svg: &mut String, facts: &RunFacts, drones: &[SnapshotDrone], colours: &BTreeMap<&str, RGBColor>) {
         let (width, height) = (Self::PANEL, self.height());
         let _ = writeln!(svg, "<rect width=\"{width:.0}\" height=\"{height:.0}\" fill=\"none\" stroke=\"#e8e8e8\"/>");
         for shape in &facts.obstacles {
             let corners = self.path(outline(shape).into_iter().map(|(x, y)| Vec2::new(x, y)));
             let _ = writeln!(svg, "<polygon points=\"{corners}\" fill=\"#bebebe\"/>");
         }
-        for drone in seen {
+        for drone in drones {
             let colour = hex(colours.get(drone.group.as_str()).copied().unwrap_or(PALETTE[0]));
             let tail = self.path(drone.tail.iter().copied());
             let (x, y) = self.at(drone.position_m);
@@ -219,37 +232,39 @@ impl View {
     }
 }
 
-/// Groups of bars over names, one bar of each kind in a group.
+/// A bar chart: groups of bars, with one bar of each kind per group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bars {
-    /// Above.
+    /// Title.
     pub title: String,
-    /// What the bars show, with its unit.
+    /// The quantity and its unit.
     pub y_label: String,
-    /// In the legend; a colour each.
+    /// Labels of the kinds in the legend; each kind has a colour.
     pub kinds: Vec<String>,
-    /// By group: its name in two lines, a note above it, and a value from zero for each kind.
+    /// The groups from left to right.
     pub groups: Vec<BarGroup>,
 }
 
 /// A group of [`Bars`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BarGroup {
-    /// Below the bars, two lines.
+    /// Name, two lines below the bars.
     pub name: [String; 2],
-    /// Above them.
+    /// Note above the bars.
     pub note: String,
-    /// One a kind.
+    /// One value per kind, not negative.
     pub values: Vec<f64>,
 }
 
 impl Bars {
-    /// Left and upper edge of the bars, and height of the tallest, px.
+    /// Left edge of the bars, px.
     const LEFT: f64 = 30.0;
+    /// Upper edge of the tallest bar, px.
     const TOP: f64 = 120.0;
+    /// Height of the tallest bar, px.
     const TALL: f64 = 300.0;
 
-    /// The SVG: each bar with its value above it.
+    /// Draws each bar with its value above it. Returns the SVG.
     #[must_use]
     pub fn draw(&self) -> String {
         let bottom = Self::TOP + Self::TALL;
@@ -296,7 +311,7 @@ impl Bars {
         let top = group.values.iter().fold(0.0f64, |a, &b| a.max(b)) * scale;
         let lines =
             [(bottom - top - 26.0, &group.note), (bottom + 20.0, &group.name[0]), (bottom + 38.0, &group.name[1])];
-        // Small enough for the longest name to stay in its group.
+        // The font is small enough for the longest name.
         for (y, line) in lines {
             let text = escaped(line);
             let _ = writeln!(
@@ -307,7 +322,7 @@ impl Bars {
     }
 }
 
-/// Canvas and title.
+/// The start of an SVG: canvas and title.
 fn opening(height: f64, title: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH:.0}\" height=\"{height:.0}\" viewBox=\"0 0 \
@@ -318,17 +333,13 @@ fn opening(height: f64, title: &str) -> String {
     )
 }
 
-fn hex(RGBColor(r, g, b): RGBColor) -> String {
-    format!("#{r:02x}{g:02x}{b:02x}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::facts;
 
     #[test]
-    fn moments_show_who_was_where_and_the_last_stands_for_what_is_beyond_the_end() {
+    fn snapshots_are_at_the_given_times_or_at_the_end() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
         let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
@@ -337,7 +348,7 @@ mod tests {
         }
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
         let found = Snapshots::read(&folder, &[0.0, 0.5, 9.0]).unwrap();
-        assert_eq!(found.moments.iter().map(|moment| moment.0).collect::<Vec<_>>(), [0.02, 1.0, 2.0]);
+        assert_eq!(found.snapshots.iter().map(|snapshot| snapshot.t_s).collect::<Vec<_>>(), [0.02, 1.0, 2.0]);
         assert_eq!((found.groups(0), found.groups(1)), (vec!["N"], vec!["N", "N1"]));
         let extent = |t_s, m| SwarmExtent { t_s, width_m: m, distance_m: m };
         assert_eq!(found.extents(0.5, 9.0).copied().collect::<Vec<_>>(), [extent(1.0, 40.0), extent(2.0, 20.0)]);
@@ -347,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tallest_bar_fills_the_height_and_the_others_their_share() {
+    fn bar_heights_are_proportional_to_their_values() {
         let group = BarGroup { name: ["S1".into(), "total".into()], note: "1.50".into(), values: vec![20.0, 30.0] };
         let bars = Bars {
             title: "energy".into(),

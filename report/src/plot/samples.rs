@@ -1,4 +1,4 @@
-//! A trace, thinned to what an eye can see.
+//! The data of the plots: a trace, reduced to what a plot can show.
 
 use super::curves::Band;
 use crate::close::Sweep;
@@ -12,53 +12,56 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Time between two samples, s.
-const EVERY_S: f64 = 0.1;
-/// Most points of all tracks together: a plot of a thousand drones must still open.
+const PERIOD_S: f64 = 0.1;
+/// Largest number of points of all tracks together, so that a plot of a thousand drones can still be opened.
 const MAX_POINTS: usize = 60_000;
-/// The slot error is drawn for no more drones: the best assignment takes their number to the third.
+/// Largest number of drones for which the slot error is computed: the best assignment takes O(n³).
 const FORMATION_MAX: usize = 100;
 
-/// What the plots show.
+/// The data of the plots.
 #[derive(Default)]
 pub(super) struct Samples {
-    /// Time, and the least separation since the last sample, m: no short dip is lost.
+    /// Time, s, and least separation since the previous sample, m, so that no short dip is lost.
     pub separation: Vec<(f64, f64)>,
-    /// Of the drones' speeds, m/s.
+    /// Speeds of the drones, m/s.
     pub speed: Vec<Band>,
-    /// Of the distances of all pairs, m.
+    /// Distances of all pairs of drones, m.
     pub distance: Vec<Band>,
-    /// How far the swarm was from its shape.
+    /// Deviation of the swarm from its target shape.
     pub deviations: DeviationSampler,
-    /// Of what the drones have used, J.
+    /// Energies used by the drones, J.
     pub energy: Vec<Band>,
-    /// Time, and the largest slot error, m.
+    /// Time, s, and largest slot error, m.
     pub formation: Vec<(f64, f64)>,
-    /// By drone.
+    /// Tracks by drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
     pub end_s: f64,
 }
 
-/// One drone's way.
+/// The track of a drone.
 #[derive(Default)]
 pub(super) struct Track {
-    /// Where it was, m; the first and the last point are exact.
+    /// Positions, m. The first and the last one are exact.
     pub points: Vec<Vec2>,
-    /// The last group it was in.
+    /// Its last group.
     pub group: String,
-    /// When it was last seen, s.
+    /// Time of its last position, s.
     pub last_s: f64,
-    /// Where it was then, m.
+    /// Its last position, m.
     pub last_m: Vec2,
 }
 
 impl Samples {
     /// Reads trace.csv.
-    pub fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
-        let (mut samples, mut sweep, mut bin) = (Self::default(), Sweep::default(), None);
+    ///
+    /// # Errors
+    /// [`ReportError::Io`], or [`ReportError::Content`] for an invalid line.
+    pub(crate) fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
+        let (mut samples, mut sweep, mut period) = (Self::default(), Sweep::default(), None);
         trace::read(path, |rows| {
-            let now = (rows[0].t_s / EVERY_S + 1e-6).floor() as i64;
-            samples.take(facts, rows, bin.replace(now) != Some(now), &mut sweep);
+            let now = (rows[0].t_s / PERIOD_S + 1e-6).floor() as i64;
+            samples.take(facts, rows, period.replace(now) != Some(now), &mut sweep);
         })?;
         for track in samples.tracks.values_mut() {
             track.points.push(track.last_m);
@@ -67,6 +70,7 @@ impl Samples {
         Ok(samples)
     }
 
+    /// Takes the rows of a tick.
     fn take(&mut self, facts: &RunFacts, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
         let t_s = rows[0].t_s;
         self.end_s = t_s;
@@ -99,6 +103,12 @@ impl Samples {
         }
     }
 
+    /// Whether a drone died before the end.
+    pub(super) fn is_lost(&self, track: &Track) -> bool {
+        track.last_s < self.end_s
+    }
+
+    /// Removes points evenly until no more than [`MAX_POINTS`] are left.
     fn thin(&mut self) {
         let points: usize = self.tracks.values().map(|track| track.points.len()).sum();
         let step = points.div_ceil(MAX_POINTS).max(1);
@@ -113,7 +123,7 @@ impl Samples {
     }
 }
 
-/// Mean and standard deviation; `None` of nothing.
+/// Mean and standard deviation, by the method of Welford; `None` without values.
 fn band(t_s: f64, values: impl Iterator<Item = f64>) -> Option<Band> {
     let (mut count, mut mean, mut squares) = (0.0, 0.0, 0.0);
     for value in values {
@@ -131,7 +141,7 @@ mod tests {
     use crate::testing::facts;
 
     #[test]
-    fn a_dip_between_samples_is_kept_and_tracks_end_where_they_end() {
+    fn a_dip_between_samples_is_kept_and_tracks_end_at_their_last_positions() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trace.csv");
         let header = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n";

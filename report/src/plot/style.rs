@@ -1,63 +1,66 @@
-//! What all plots have in common.
+//! The common style of all plots: colours, sizes, axes, title and legend.
 
 use crate::error::DrawError;
+use crate::palette::GROUP_COLOURS;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
-/// Okabe and Ito's colours that show on white, told apart by colour-blind people too.
-pub(super) const PALETTE: [RGBColor; 7] = [
-    BLUE,
-    RGBColor(230, 159, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(120, 94, 60),
-    RGBColor(213, 94, 0),
-];
-pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
+/// The colours of series and groups.
+pub(super) const PALETTE: [RGBColor; GROUP_COLOURS.len()] = {
+    let mut palette = [RGBColor(0, 0, 0); GROUP_COLOURS.len()];
+    let mut i = 0;
+    while i < palette.len() {
+        let (r, g, b) = GROUP_COLOURS[i];
+        palette[i] = RGBColor(r, g, b);
+        i += 1;
+    }
+    palette
+};
+pub(super) const BLUE: RGBColor = PALETTE[0];
 pub(super) const RED: RGBColor = RGBColor(204, 30, 20);
 pub(super) const INK: RGBColor = RGBColor(51, 51, 51);
 pub(super) const GREY: RGBColor = RGBColor(140, 140, 140);
 pub(super) const GRID: RGBColor = RGBColor(232, 232, 232);
-/// Fonts in the order in which they are tried.
+/// Font family, in order of preference.
 const FONT: &str = "Helvetica, Arial, sans-serif";
-/// Units of a drawing to a pixel: the backend rounds to whole units, and a track of whole pixels is a staircase.
-const FINE: u32 = 4;
+/// Units of a drawing per pixel. The backend rounds to whole units, and tracks rounded to whole pixels would have steps.
+const UNITS_PER_PIXEL: u32 = 4;
 /// Width of every plot.
 pub(super) const WIDTH: u32 = px(1100);
-/// Left of the plotting area: ordinate's labels.
+/// Width of the labels left of the plotting area.
 pub(super) const LEFT: u32 = px(66);
-/// Left of that, and right of the plotting area.
+/// Margin left of the labels and right of the plotting area.
 pub(super) const EDGE: u32 = px(14);
-/// Below it: abscissa's labels.
+/// Height of the labels below the plotting area.
 pub(super) const BOTTOM: u32 = px(48);
-/// Height of the title and of each line of the legend.
+/// Height of the title.
 const TITLE: u32 = px(44);
+/// Height of a line of the legend.
 const LINE: u32 = px(24);
 
-/// Pixels in a drawing's units.
+/// A number of pixels in units of the drawing.
 pub(super) const fn px(pixels: u32) -> u32 {
-    pixels * FINE
+    pixels * UNITS_PER_PIXEL
 }
 
-/// Where a drawing goes.
+/// The whole drawing.
 pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-/// Axes with numbers on a canvas.
+/// The plotting area with its axes.
 pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// What the two axes show.
+/// The two axes of a plot.
 pub(super) struct Axes<'a> {
-    /// What stands below, and from where to where it goes.
+    /// Label and range of the abscissa.
     pub x: (&'a str, Range<f64>),
-    /// The same for what stands left; without a word there, an axis without numbers.
+    /// Label and range of the ordinate. With an empty label, the axis has no numbers.
     pub y: (&'a str, Range<f64>),
     /// Height of the plotting area.
     pub height: u32,
 }
 
-/// A plot: heading, axes, and whatever `content` draws. The SVG.
+/// Draws a plot with its heading, its axes, and what `content` adds. Returns the SVG.
 pub(super) fn plot(
     heading: &Heading,
     axes: Axes<'_>,
@@ -89,61 +92,74 @@ pub(super) fn plot(
         content(&canvas, &mut chart)?;
         canvas.present().map_err(DrawError::new)?;
     }
-    // The view box keeps the drawing's units; shown, it has its size in pixels.
+    // The view box keeps the units of the drawing; width and height are in pixels.
     let sized = |by: u32| format!("width=\"{}\" height=\"{}\"", size.0 / by, size.1 / by);
-    Ok(svg.replacen(&sized(1), &sized(FINE), 1))
+    Ok(svg.replacen(&sized(1), &sized(UNITS_PER_PIXEL), 1))
 }
 
-/// 50 and 2.5, not 50.0 and 2.4999999.
+/// A label of an axis: the number without trailing zeros and rounding errors.
 fn number(value: &f64) -> String {
     // Adding zero turns -0 into 0.
     ((value * 1e6).round() / 1e6 + 0.0).to_string()
 }
 
-/// A sign of the legend.
+/// The colour in the notation of SVG.
+pub(super) fn hex(RGBColor(r, g, b): RGBColor) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// A symbol of the legend.
 #[derive(Clone, Copy)]
 pub(super) enum Sign {
     /// A line.
     Line(RGBColor),
-    /// A shaded range about it.
+    /// A shaded range.
     Range(RGBColor),
     /// A filled shape.
     Block(RGBColor),
-    /// ◇.
+    /// ◇, a start.
     Start,
-    /// ●.
+    /// ●, an end.
     End,
-    /// ✕.
+    /// ✕, a death.
     Lost,
-    /// +.
+    /// +, a slot at the goal.
     Goal,
 }
 
-/// Text of a size in pixels, in ink.
+/// Style of text of this size, pixels.
 pub(super) fn text(size: u32) -> TextStyle<'static> {
     TextStyle::from((FONT, px(size)).into_font()).color(&INK).pos(Pos::new(HPos::Left, VPos::Center))
 }
 
-/// Title and legend above the plotting area, so that they hide no data.
+/// Title and legend. They are above the plotting area, so that they hide no data.
 pub(super) struct Heading {
     title: String,
-    entries: Vec<(i32, i32, Sign, String)>,
-    /// Height of it all.
-    pub height: u32,
+    entries: Vec<Entry>,
+    height: u32,
+}
+
+/// An entry of the legend at its place.
+struct Entry {
+    x: i32,
+    y: i32,
+    sign: Sign,
+    label: String,
 }
 
 impl Heading {
-    pub fn new(title: &str, signs: Vec<(Sign, String)>) -> Self {
+    /// A heading with this title and legend. Entries that do not fit into a line start a new one.
+    pub(super) fn new(title: &str, signs: Vec<(Sign, String)>) -> Self {
         let first = LEFT + EDGE;
         let (mut x, mut y) = (first, TITLE + px(10));
         let mut entries = Vec::new();
         for (sign, label) in signs {
-            // Sign, label at seven pixels a letter, and some space.
+            // Symbol, label with seven pixels per letter, and a gap.
             let width = px(30 + 7 * label.chars().count() as u32 + 22);
             if x + width > WIDTH - EDGE && x > first {
                 (x, y) = (first, y + LINE);
             }
-            entries.push((x as i32, y as i32, sign, label));
+            entries.push(Entry { x: x as i32, y: y as i32, sign, label });
             x += width;
         }
         Self { title: title.to_owned(), entries, height: y + LINE }
@@ -152,7 +168,7 @@ impl Heading {
     fn draw(&self, canvas: &Canvas) -> Result<(), DrawError> {
         let at = ((LEFT + EDGE) as i32, px(26) as i32);
         canvas.draw(&Text::new(self.title.as_str(), at, text(18))).map_err(DrawError::new)?;
-        for (x, y, sign, label) in &self.entries {
+        for Entry { x, y, sign, label } in &self.entries {
             draw_sign(canvas, *sign, (*x, *y))?;
             canvas.draw(&Text::new(label.as_str(), (x + px(30) as i32, *y), text(14))).map_err(DrawError::new)?;
         }

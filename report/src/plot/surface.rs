@@ -1,22 +1,23 @@
-//! A signed quantity over two keys: a heat map whose two colours meet at zero, and a line where the sign changes.
+//! A signed quantity over two keys: a heat map with two colours that meet at zero, and a line where the sign changes.
 
-use super::sweep::{bounds, escaped};
+use super::colour_scale::{bounds, ink_on, interpolated};
+use crate::markup::escaped;
 use std::fmt::Write as _;
 
-/// A value for each pair of values of two keys; zero means that nothing is gained or lost.
+/// A value for each pair of values of two keys. Zero means neither gain nor loss.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// Above, with the unit of the values.
+    /// Title, with the unit of the values.
     pub title: String,
-    /// The key whose values are columns, and the values.
+    /// The key of the columns, and its values.
     pub x: (String, Vec<String>),
-    /// The key whose values are rows, from the bottom, and the values.
+    /// The key of the rows, and its values from the bottom.
     pub y: (String, Vec<String>),
-    /// Row by row from the bottom; `None` without data.
+    /// The values, row by row from the bottom; `None` without data.
     pub cells: Vec<Option<f64>>,
 }
 
-/// From a great loss over nothing to a great gain: blue, white, orange, which colour-blind people tell apart.
+/// The colours from loss (blue) over zero (white) to gain (orange), which colour-blind people can distinguish.
 const SCALE: [[f64; 3]; 7] = [
     [5.0, 70.0, 130.0],
     [70.0, 140.0, 195.0],
@@ -26,16 +27,21 @@ const SCALE: [[f64; 3]; 7] = [
     [235.0, 155.0, 50.0],
     [170.0, 85.0, 0.0],
 ];
-/// Values at both ends of the scale are as far from zero, and never nearer than this.
-const LEAST_EXTENT: f64 = 1.0;
+/// Least absolute value at the ends of the scale, which are equally far from zero.
+const EXTENT_MIN: f64 = 1.0;
+/// Space left of the cells, px.
 const LEFT: usize = 80;
+/// Space above the cells, px.
 const TOP: usize = 70;
+/// Space below the cells, px.
 const BELOW: usize = 60;
+/// Space right of the cells, px.
 const RIGHT: usize = 110;
+/// Height of a row, px.
 const ROW: usize = 44;
 
 impl Surface {
-    /// The SVG.
+    /// Draws the heat map. Returns the SVG.
     #[must_use]
     pub fn draw(&self) -> String {
         let (columns, rows) = (self.columns(), self.y.1.len().max(1));
@@ -74,15 +80,16 @@ impl Surface {
         (LEFT + cell % self.columns() * self.column(), TOP + (rows - 1 - cell / self.columns()) * ROW)
     }
 
+    /// Absolute value at the ends of the scale.
     fn extent(&self) -> f64 {
         let (low, high) = bounds(self.cells.iter().flatten().copied());
-        low.abs().max(high.abs()).clamp(LEAST_EXTENT, f64::MAX)
+        low.abs().max(high.abs()).clamp(EXTENT_MIN, f64::MAX)
     }
 
     fn draw_cell(&self, svg: &mut String, cell: usize, value: Option<f64>, extent: f64) {
         let ((x, y), width) = (self.corner(cell), self.column());
-        let [r, g, b] = value.map_or([225.0; 3], |value| colour(value / extent));
-        let ink = if 0.3 * r + 0.59 * g + 0.11 * b > 125.0 { "#000" } else { "#fff" };
+        let fill = value.map_or([225.0; 3], |value| colour(value / extent));
+        let ([r, g, b], ink) = (fill, ink_on(fill));
         let text = value.map_or_else(|| "–".to_owned(), signed);
         // Writing to a string cannot fail.
         let _ = writeln!(
@@ -94,7 +101,7 @@ impl Surface {
         );
     }
 
-    /// Along every edge between a loss and what is none.
+    /// Draws a line along every edge between a cell with a loss and a cell without one.
     fn draw_zero(&self, svg: &mut String) {
         let (columns, column) = (self.columns(), self.column());
         let loses = |cell: usize| self.cells.get(cell).copied().flatten().map(|value| tidy(value) < 0.0);
@@ -130,7 +137,7 @@ impl Surface {
         label(20, TOP - 12, "start", &format!("{} ↑", self.y.0));
     }
 
-    /// The colours and their values, right of the cells.
+    /// Draws the colours and their values right of the cells.
     fn draw_scale(&self, svg: &mut String, extent: f64) {
         let x = LEFT + self.column() * self.columns() + 24;
         let step = (ROW * self.y.1.len()) as f64 / SCALE.len() as f64;
@@ -149,22 +156,19 @@ impl Surface {
     }
 }
 
-/// What is no more than rounding, shown with one decimal, is zero and has no sign.
+/// The value, or zero if it rounds to zero with one decimal.
 fn tidy(value: f64) -> f64 {
     if value.abs() < 0.05 { 0.0 } else { value }
 }
 
-/// With its sign, unless it is zero.
+/// The value as text with its sign; zero has none.
 fn signed(value: f64) -> String {
     if tidy(value) == 0.0 { "0".to_owned() } else { format!("{value:+.1}") }
 }
 
-/// From −1 to 1.
+/// The colour of a value from −1 to 1.
 fn colour(share: f64) -> [f64; 3] {
-    let place = (share.clamp(-1.0, 1.0) + 1.0) / 2.0 * (SCALE.len() - 1) as f64;
-    let below = (place.floor() as usize).min(SCALE.len() - 2);
-    let (from, to, part) = (SCALE[below], SCALE[below + 1], place - below as f64);
-    std::array::from_fn(|i| from[i] + (to[i] - from[i]) * part)
+    interpolated(&SCALE, (share.clamp(-1.0, 1.0) + 1.0) / 2.0)
 }
 
 #[cfg(test)]
@@ -177,22 +181,22 @@ mod tests {
     }
 
     #[test]
-    fn zero_is_white_and_both_ends_are_as_far_from_it() {
+    fn zero_is_white_and_in_the_middle_of_the_scale() {
         let svg = surface(vec![Some(-8.0), Some(0.0), Some(4.0), None]).draw();
         assert!(svg.contains("rgb(5,70,130)") && svg.contains("rgb(250,250,250)"), "{svg}");
         assert!(svg.contains(">-8.0<") && svg.contains(">+4.0<") && svg.contains(">–<") && svg.contains("a &lt; b"));
-        // Half of the way to a gain of 8.
+        // The cell of 4 has half of the greatest gain, 8.
         let [r, g, b] = colour(0.5);
         assert!(svg.contains(&format!("rgb({r:.0},{g:.0},{b:.0})")));
     }
 
     #[test]
-    fn the_zero_line_parts_losses_from_the_rest_and_passes_by_what_is_missing() {
+    fn the_zero_line_separates_losses_and_ignores_missing_cells() {
         let zero = |cells| {
             let svg = surface(cells).draw();
             svg.split("class=\"zero\" d=\"").nth(1).map(|rest| rest.split('"').next().unwrap().to_owned())
         };
-        // The lower left cell loses: a line to its right, and one above it.
+        // The lower left cell has a loss: there is a line right of it and one above it.
         let corner = format!("M{} {}v{ROW}M{LEFT} {}h120", LEFT + 120, TOP + ROW, TOP + ROW);
         assert_eq!(zero(vec![Some(-1.0), Some(0.0), Some(2.0), Some(0.01)]), Some(corner));
         assert_eq!(zero(vec![Some(-1.0), None, None, Some(3.0)]), None);

@@ -1,50 +1,52 @@
-//! What came of a sweep: lines with their intervals over one key, a heat map over two.
+//! Plots of a sweep: lines with confidence intervals over one key, and a heat map over two keys.
 
+use super::colour_scale::{bounds, ink_on, interpolated};
 use super::style::{Axes, Heading, PALETTE, Sign, plot, px};
 use crate::error::DrawError;
+use crate::markup::escaped;
 use plotters::prelude::*;
 use std::fmt::Write as _;
 
-/// Height of the plotting area of lines.
+/// Height of the plotting area of [`Lines`].
 const HEIGHT: u32 = px(420);
 
-/// A mean and its interval at a place of the axis.
+/// A mean and its interval at a value of the key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Value of the key.
     pub x: f64,
-    /// Mean, or rate.
+    /// Mean or rate.
     pub mean: f64,
     /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// A line.
+/// A line of [`Lines`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// In the legend.
+    /// Label in the legend.
     pub label: String,
-    /// By x; at least one.
+    /// The points in order of x; at least one.
     pub points: Vec<Point>,
 }
 
-/// Lines over a key.
+/// Lines over the values of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lines {
-    /// Above.
+    /// Title.
     pub title: String,
-    /// The key.
+    /// Label of the abscissa: the key.
     pub x_label: String,
-    /// The metric and its unit.
+    /// Label of the ordinate: the metric and its unit.
     pub y_label: String,
-    /// At least one.
+    /// The lines; at least one.
     pub series: Vec<Series>,
 }
 
 impl Lines {
-    /// The SVG: each line in its interval.
+    /// Draws each line with its interval as a shaded range. Returns the SVG.
     ///
     /// # Errors
     /// [`DrawError`] if the SVG backend fails.
@@ -62,7 +64,7 @@ impl Lines {
                 let line = points.iter().map(|point| (point.x, point.mean));
                 chart.draw_series(LineSeries::new(line.clone(), colour.stroke_width(px(2)))).map_err(DrawError::new)?;
                 chart.draw_series(line.map(|at| Circle::new(at, px(4), colour.filled()))).map_err(DrawError::new)?;
-                // Of a point that stands alone the shaded interval has no width.
+                // The shaded range of a single point has no width.
                 let whisker = |p: &Point| PathElement::new([(p.x, p.low), (p.x, p.high)], colour.stroke_width(px(1)));
                 chart.draw_series(points.iter().map(whisker)).map_err(DrawError::new)?;
             }
@@ -70,6 +72,7 @@ impl Lines {
         })
     }
 
+    /// The series with their colours.
     fn coloured(&self) -> impl Iterator<Item = (RGBColor, &Series)> {
         self.series.iter().enumerate().map(|(i, series)| (PALETTE[i % PALETTE.len()], series))
     }
@@ -84,7 +87,7 @@ impl Lines {
         low - edge..high + edge
     }
 
-    /// From zero if the values are of that size, else around them.
+    /// Range of the ordinate. It starts at zero unless all values are far from zero compared to their range.
     fn y_range(&self) -> std::ops::Range<f64> {
         let (low, high) = bounds(self.points().flat_map(|point| [point.low, point.high]));
         let edge = if high > low { (high - low) * 0.06 } else { high.abs().max(1.0) * 0.06 };
@@ -96,17 +99,29 @@ impl Lines {
 /// A value for each pair of values of two keys.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// Above.
+    /// Title.
     pub title: String,
-    /// The key whose values are columns, and the values.
+    /// The key of the columns, and its values.
     pub x: (String, Vec<String>),
-    /// The key whose values are rows, from the bottom, and the values.
+    /// The key of the rows, and its values from the bottom.
     pub y: (String, Vec<String>),
-    /// Mean and interval, row by row from the bottom; `None` without data.
-    pub cells: Vec<Option<(f64, f64, f64)>>,
+    /// The cells, row by row from the bottom; `None` without data.
+    pub cells: Vec<Option<Cell>>,
 }
 
-/// Cividis at eleven places: even for everybody's eyes, dark is little.
+/// A mean and its interval in a cell of a [`HeatMap`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Mean or rate.
+    pub mean: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+}
+
+/// The colour map Cividis at eleven places, from low values (dark) to high values (light). It is perceived as uniform, by
+/// colour-blind people too.
 const SCALE: [[f64; 3]; 11] = [
     [0.0, 34.0, 78.0],
     [8.0, 51.0, 112.0],
@@ -120,16 +135,19 @@ const SCALE: [[f64; 3]; 11] = [
     [229.0, 207.0, 82.0],
     [254.0, 232.0, 56.0],
 ];
-/// Least room for the rows' values.
+/// Least space for the values of the rows, px.
 const LEFT: usize = 110;
-/// Of a letter, about.
+/// Approximate width of a letter, px.
 const LETTER: usize = 7;
+/// Space above the cells, px.
 const TOP: usize = 60;
+/// Space below the cells, px.
 const BELOW: usize = 70;
+/// Height of a row, px.
 const ROW: usize = 54;
 
 impl HeatMap {
-    /// The SVG: in each cell its mean, and below it half of its interval.
+    /// Draws the mean and the interval of each cell. Returns the SVG.
     #[must_use]
     pub fn draw(&self) -> String {
         let (columns, rows) = (self.x.1.len().max(1), self.y.1.len().max(1));
@@ -145,7 +163,7 @@ impl HeatMap {
              <text x=\"20\" y=\"32\" font-size=\"18\">{}</text>\n",
             escaped(&self.title)
         );
-        let (low, high) = bounds(self.cells.iter().flatten().map(|cell| cell.0));
+        let (low, high) = bounds(self.cells.iter().flatten().map(|cell| cell.mean));
         for (i, cell) in self.cells.iter().enumerate().take(columns * rows) {
             let at = (left + i % columns * column, TOP + (rows - 1 - i / columns) * ROW);
             draw_cell(&mut svg, at, column, *cell, (low, high));
@@ -172,16 +190,11 @@ impl HeatMap {
     }
 }
 
-fn draw_cell(
-    svg: &mut String,
-    (x, y): (usize, usize),
-    width: usize,
-    cell: Option<(f64, f64, f64)>,
-    (low, high): (f64, f64),
-) {
+/// Draws a cell at (x, y). The colours range from `low` to `high`.
+fn draw_cell(svg: &mut String, (x, y): (usize, usize), width: usize, cell: Option<Cell>, (low, high): (f64, f64)) {
     let share = |value: f64| if high > low { (value - low) / (high - low) } else { 1.0 };
-    let [r, g, b] = cell.map_or([235.0; 3], |(mean, ..)| colour(share(mean)));
-    let ink = if 0.3 * r + 0.59 * g + 0.11 * b > 125.0 { "#000" } else { "#fff" };
+    let fill = cell.map_or([235.0; 3], |cell| interpolated(&SCALE, share(cell.mean)));
+    let ([r, g, b], ink) = (fill, ink_on(fill));
     let _ = writeln!(
         svg,
         "<rect x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" fill=\"rgb({r:.0},{g:.0},{b:.0})\"/>",
@@ -197,35 +210,18 @@ fn draw_cell(
     };
     match cell {
         None => text(ROW / 2 + 5, 13, "–".to_owned()),
-        Some((mean, from, to)) => {
+        Some(Cell { mean, low, high }) => {
             text(ROW / 2 - 2, 14, brief(mean));
-            text(ROW / 2 + 15, 11, format!("{} to {}", brief(from), brief(to)));
+            text(ROW / 2 + 15, 11, format!("{} to {}", brief(low), brief(high)));
         }
     }
 }
 
-/// From dark, 0, to light, 1.
-fn colour(share: f64) -> [f64; 3] {
-    let place = share.clamp(0.0, 1.0) * (SCALE.len() - 1) as f64;
-    let below = (place.floor() as usize).min(SCALE.len() - 2);
-    let (from, to, part) = (SCALE[below], SCALE[below + 1], place - below as f64);
-    std::array::from_fn(|i| from[i] + (to[i] - from[i]) * part)
-}
-
-/// Three digits, more before the point.
+/// The value as text with three significant digits, or more before the decimal point.
 fn brief(value: f64) -> String {
     let digits = if value == 0.0 { 0.0 } else { 2.0 - value.abs().log10().floor() };
     let text = format!("{value:.*}", digits.clamp(0.0, 4.0) as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// Least and greatest.
-pub(super) fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-}
-
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]
@@ -233,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_show_every_series_in_a_colour_of_its_own() {
+    fn each_series_has_its_own_colour() {
         let series = |label: &str, y: f64| Series {
             label: label.to_owned(),
             points: (0..3).map(|i| Point { x: f64::from(i), mean: y, low: y - 1.0, high: y + 1.0 }).collect(),
@@ -253,12 +249,13 @@ mod tests {
     }
 
     #[test]
-    fn a_heat_map_has_its_rows_from_the_bottom_and_marks_what_is_missing() {
+    fn rows_of_a_heat_map_start_at_the_bottom_and_missing_cells_are_marked() {
+        let cell = |mean: f64| Cell { mean, low: mean - 1.0, high: mean + 1.0 };
         let map = HeatMap {
             title: "a < b".to_owned(),
             x: ("radio.loss".to_owned(), vec!["0".to_owned(), "0.5".to_owned()]),
             y: ("radio.delay_s".to_owned(), vec!["0".to_owned(), "1".to_owned()]),
-            cells: vec![Some((10.0, 9.0, 11.0)), Some((20.0, 19.0, 21.0)), None, Some((30.0, 29.0, 31.0))],
+            cells: vec![Some(cell(10.0)), Some(cell(20.0)), None, Some(cell(30.0))],
         };
         let svg = map.draw();
         let y_of = |text: &str| {
@@ -273,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn one_value_alone_is_drawn_too() {
+    fn a_single_value_is_drawn() {
         let point = Point { x: 0.0, mean: 1.0, low: 1.0, high: 1.0 };
         let series = vec![Series { label: "a".to_owned(), points: vec![point] }];
         let lines = Lines { title: String::new(), x_label: String::new(), y_label: String::new(), series };

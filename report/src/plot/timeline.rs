@@ -1,4 +1,4 @@
-//! Who led which group when: a row a group, a bar a term.
+//! Leadership over time: a row per group, a bar per term.
 
 use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, text};
 use crate::error::DrawError;
@@ -7,20 +7,21 @@ use plotters::prelude::*;
 use skein_protocol::record::{EventKind, RunEvent};
 use std::collections::BTreeMap;
 
-/// Height of a row, and of the bar in it as a share.
+/// Height of a row.
 const ROW: u32 = px(34);
+/// Height of a bar as a share of its row.
 const BAR: f64 = 0.62;
 
-/// A drone leads a group from one time to another, s.
+/// The time in which a drone leads a group.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Term {
-    pub group: String,
-    pub leader: u32,
-    pub from_s: f64,
-    pub to_s: f64,
+    group: String,
+    leader: u32,
+    from_s: f64,
+    to_s: f64,
 }
 
-/// The terms in a run's events, in the order in which they began. A death ends the dead drone's.
+/// The terms in the events of a run, in order of their beginning. A fault of a leader ends its terms.
 pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
     let (mut terms, mut open): (Vec<Term>, BTreeMap<(u32, String), usize>) = Default::default();
     for event in events {
@@ -28,7 +29,7 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
             EventKind::Leader { group, leader, leads: true, .. } => {
                 let from = terms.len();
                 let key = (leader.0, group.clone());
-                // A new term of the same leader goes on where the last one was laid down.
+                // If the same leader starts a new term when its last one ends, both are drawn as one.
                 let same = |term: &Term| (term.leader, &term.group) == (leader.0, group) && term.to_s >= event.t_s;
                 if let Some(place) = terms.iter().rposition(same) {
                     terms[place].to_s = end_s;
@@ -55,14 +56,14 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
     terms
 }
 
-/// The SVG; there is at least one term.
+/// Draws the timeline. There must be at least one term. Returns the SVG.
 pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s: f64) -> Result<String, DrawError> {
     let mut groups: Vec<&str> = terms.iter().map(|term| term.group.as_str()).collect();
     groups.sort_unstable();
     groups.dedup();
     let title = format!("Leadership: {}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
     let faults: Vec<f64> = events.iter().filter(|e| matches!(e.what, EventKind::Fault { .. })).map(|e| e.t_s).collect();
-    let mut signs = vec![(Sign::Block(PALETTE[0]), "leads the group; the leader's number in the bar".to_owned())];
+    let mut signs = vec![(Sign::Block(PALETTE[0]), "a drone leads the group; its number is in the bar".to_owned())];
     signs.extend((!faults.is_empty()).then(|| (Sign::Line(RED), "fault".to_owned())));
     let rows = groups.len() as f64;
     let axes =
@@ -103,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn terms_end_when_laid_down_or_with_a_death_and_renewed_ones_are_one() {
+    fn terms_end_by_resignation_or_death_and_renewed_terms_are_joined() {
         let kill =
             EventKind::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: String::new() };
         let events = [

@@ -1,4 +1,4 @@
-//! The drones' ways past the obstacles, seen from above, at true aspect ratio.
+//! The tracks of the drones past the obstacles, seen from above, at true aspect ratio.
 
 use super::samples::{Samples, Track};
 use super::style::{
@@ -6,21 +6,22 @@ use super::style::{
 };
 use crate::error::DrawError;
 use crate::facts::{MissionEnd, RunFacts};
+use crate::geometry::outline;
 use plotters::prelude::*;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
-/// Least and greatest height of the plotting area.
-const HEIGHT: (u32, u32) = (px(260), px(1400));
+/// Least height of the plotting area.
+const HEIGHT_MIN: u32 = px(260);
+/// Greatest height of the plotting area.
+const HEIGHT_MAX: u32 = px(1400);
 /// Space around what is drawn, as a share of its larger extent.
 const MARGIN: f64 = 0.04;
-/// Segments of a full circle.
-const SEGMENTS: f64 = 72.0;
+/// Colour of obstacles.
 const OBSTACLE: RGBColor = RGBColor(190, 190, 190);
 
-/// The SVG.
+/// Draws the tracks. Returns the SVG.
 pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<String, DrawError> {
     let colours = colours(samples);
     let heading = Heading::new(title, signs(samples, facts, &colours));
@@ -47,18 +48,21 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<S
     })
 }
 
-/// A colour for each group in which drones ended.
+/// A colour for each group that is the last group of a drone.
 pub(super) fn colours(samples: &Samples) -> BTreeMap<&str, RGBColor> {
     let mut colours: BTreeMap<&str, RGBColor> =
         samples.tracks.values().map(|track| (track.group.as_str(), INK)).collect();
-    colours.values_mut().zip(PALETTE.iter().cycle()).for_each(|(colour, &fresh)| *colour = fresh);
+    for (colour, &next) in colours.values_mut().zip(PALETTE.iter().cycle()) {
+        *colour = next;
+    }
     colours
 }
 
+/// The legend.
 fn signs(samples: &Samples, facts: &RunFacts, colours: &BTreeMap<&str, RGBColor>) -> Vec<(Sign, String)> {
     let mut signs: Vec<(Sign, String)> =
         colours.iter().map(|(group, &colour)| (Sign::Line(colour), (*group).to_owned())).collect();
-    let lost = samples.tracks.values().any(|track| samples.lost(track));
+    let lost = samples.tracks.values().any(|track| samples.is_lost(track));
     let goal = matches!(facts.end, MissionEnd::Goal { .. });
     let marks = [
         (true, Sign::Start, "start"),
@@ -71,25 +75,27 @@ fn signs(samples: &Samples, facts: &RunFacts, colours: &BTreeMap<&str, RGBColor>
     signs
 }
 
-/// Corners of what is shown, m, and the plotting area's height, so that a metre is as long either way.
+/// The part of the world that a drawing of this width shows: its least and its greatest corner, m, and the height of the
+/// drawing. A metre is equally long on both axes.
 pub(super) fn frame(samples: &Samples, facts: &RunFacts, width: f64) -> (Vec2, Vec2, f64) {
-    let ways = samples.tracks.values().flat_map(|track| track.points.iter().copied());
+    let tracks = samples.tracks.values().flat_map(|track| track.points.iter().copied());
     let corners = facts.obstacles.iter().map(ConvexShape::bounds).flat_map(|(low, high)| [low, high]);
-    let nothing = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-    let points = ways.chain(corners).chain(goal_slots(samples, facts));
-    let (low, high) = points.fold(nothing, |(low, high), point| (low.inf(&point), high.sup(&point)));
+    let empty = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    let points = tracks.chain(corners).chain(goal_slots(samples, facts));
+    let (low, high) = points.fold(empty, |(low, high), point| (low.inf(&point), high.sup(&point)));
     let middle = (low + high) / 2.0;
     let mut half = (high - low) / 2.0;
     half += Vec2::repeat(half.amax().max(1.0) * MARGIN * 2.0);
-    let height = (width * half.y / half.x).clamp(HEIGHT.0.into(), HEIGHT.1.into());
-    let metres_a_pixel = (half.x / width).max(half.y / height);
-    let half = Vec2::new(width, height) * metres_a_pixel;
+    let height = (width * half.y / half.x).clamp(HEIGHT_MIN.into(), HEIGHT_MAX.into());
+    let metres_per_unit = (half.x / width).max(half.y / height);
+    let half = Vec2::new(width, height) * metres_per_unit;
     (middle - half, middle + half, height)
 }
 
+/// The slots of the living drones at the goal, m.
 fn goal_slots(samples: &Samples, facts: &RunFacts) -> Vec<Vec2> {
     let MissionEnd::Goal { front_m } = facts.end else { return Vec::new() };
-    let living = samples.tracks.values().filter(|track| !samples.lost(track)).count();
+    let living = samples.tracks.values().filter(|track| !samples.is_lost(track)).count();
     facts.shape.slots(living, facts.spacing_m).into_iter().map(|slot| slot + Vec2::from(front_m)).collect()
 }
 
@@ -112,7 +118,7 @@ fn draw_tracks(
             continue;
         };
         canvas.draw(&start(first, colour(track))).map_err(DrawError::new)?;
-        if samples.lost(track) {
+        if samples.is_lost(track) {
             canvas.draw(&lost(last, colour(track))).map_err(DrawError::new)?;
         } else {
             canvas.draw(&end(last, colour(track))).map_err(DrawError::new)?;
@@ -121,62 +127,13 @@ fn draw_tracks(
     Ok(())
 }
 
-/// The outline with its rounding: about each vertex an arc from one edge's normal to the next one's.
-pub(crate) fn outline(shape: &ConvexShape) -> Vec<(f64, f64)> {
-    let vertices: Vec<Vec2> = shape.vertices().collect();
-    let n = vertices.len();
-    let normal = |from: Vec2, to: Vec2| {
-        let edge = to - from;
-        (-edge.x).atan2(edge.y)
-    };
-    let mut outline = Vec::new();
-    for (i, &vertex) in vertices.iter().enumerate() {
-        let first = normal(vertices[(i + n - 1) % n], vertex);
-        let turn = if n == 1 { TAU } else { (normal(vertex, vertices[(i + 1) % n]) - first).rem_euclid(TAU) };
-        let steps = if shape.radius_m > 0.0 { (turn / TAU * SEGMENTS).ceil().max(1.0) as u32 } else { 0 };
-        for step in 0..=steps {
-            let angle = first + turn * f64::from(step) / f64::from(steps.max(1));
-            let point = vertex + Vec2::new(angle.cos(), angle.sin()) * shape.radius_m;
-            outline.push((point.x, point.y));
-        }
-    }
-    outline
-}
-
-impl Samples {
-    /// Whether a drone was gone before the end.
-    fn lost(&self, track: &Track) -> bool {
-        track.last_s < self.end_s
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::facts;
-    use crate::vicinity::clearance;
 
     #[test]
-    fn outlines_lie_on_the_surface() {
-        let at = Vec2::new;
-        for shape in [
-            ConvexShape::circle(at(3.0, 4.0), 2.0).unwrap(),
-            ConvexShape::new(&[at(0.0, 0.0), at(4.0, 1.0)], 1.0).unwrap(),
-            ConvexShape::rectangle(at(1.0, 1.0), at(2.0, 3.0), 0.4).unwrap(),
-            ConvexShape::new(&[at(0.0, 0.0), at(4.0, 0.0), at(1.0, 5.0)], 0.5).unwrap(),
-        ] {
-            let outline = outline(&shape);
-            for &(x, y) in &outline {
-                assert!(clearance(&shape, at(x, y)).abs() < 1e-9, "({x}, {y}) of {shape:?}");
-            }
-            let (low, high) = shape.bounds();
-            let widest = outline.iter().fold(0.0f64, |widest, &(x, _)| widest.max(x - low.x));
-            assert!((widest - (high - low).x).abs() < 0.01, "{shape:?}");
-        }
-    }
-
-    #[test]
-    fn a_metre_is_as_long_either_way() {
+    fn a_metre_is_equally_long_on_both_axes() {
         for points in [[(0.0, 0.0), (500.0, 20.0)], [(0.0, 0.0), (20.0, 900.0)], [(0.0, 0.0), (300.0, 200.0)]] {
             let points = points.map(|(x, y)| Vec2::new(x, y)).to_vec();
             let mut samples = Samples::default();

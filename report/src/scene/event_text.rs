@@ -1,20 +1,20 @@
-//! The run's events in words, for people.
+//! The events of a run as text for people.
 
 use skein_protocol::DroneId;
 use skein_protocol::record::{EventKind, RunEvent};
 
-/// How much an event matters.
+/// How severe an event is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
-    /// It is as it should be.
+    /// A normal event.
     Info,
-    /// A fault: meant, or coped with.
+    /// A fault, scheduled or not.
     Warning,
-    /// An invariant is broken.
+    /// A violated invariant.
     Error,
 }
 
-/// How much an event matters.
+/// The severity of an event.
 #[must_use]
 pub fn severity(event: &RunEvent) -> Severity {
     match event.what {
@@ -24,43 +24,44 @@ pub fn severity(event: &RunEvent) -> Severity {
     }
 }
 
-/// An event in a line, without its time.
+/// Describes an event in one line, without its time.
 #[must_use]
 pub fn line(event: &RunEvent) -> String {
     match &event.what {
         EventKind::Detected { stage, drone, obstacle, distance_m } => {
             format!("drone {drone} senses obstacle {} of set {} at {distance_m:.1} m", obstacle.0, stage + 1)
         }
-        EventKind::Passed { stage } => format!("all are past set {}", stage + 1),
+        EventKind::Passed { stage } => format!("all living drones are past set {}", stage + 1),
         EventKind::Leader { group, ballot, leader, leads } => {
-            let what = if *leads { "leads" } else { "no longer leads" };
+            let what = if *leads { "becomes leader of" } else { "is no longer leader of" };
             format!("drone {leader} {what} {group} (round {})", ballot.round)
         }
         EventKind::Grouping { plan, group, phase, members, predicted_s, .. } => {
-            let forecast = predicted_s.map_or(String::new(), |s| format!(", forecast {s:.1} s"));
-            format!("plan for {group} by drone {}: {phase}, {members} drones{forecast}", plan.ballot.claimant)
+            let forecast = predicted_s.map_or(String::new(), |s| format!(", predicted pass time {s:.1} s"));
+            format!("drone {} plans for {group}: {phase}, {members} drones{forecast}", plan.ballot.claimant)
         }
         EventKind::Assigned { drone, group, leader, route, rank, .. } => {
             let route = route.map_or(String::new(), |route| format!(", route {route}, place {rank}"));
-            format!("drone {drone} is in {group} under drone {leader}{route}")
+            format!("drone {drone} joins {group}, led by drone {leader}{route}")
         }
-        EventKind::Fault { kind, target, detail, .. } => format!("{} of {}: {detail}", name(kind), whom(*target)),
+        EventKind::Fault { kind, target, detail, .. } => format!("{}, {}: {detail}", name(kind), target_text(*target)),
         EventKind::FaultOver { kind, target, detail } => {
-            format!("{} of {} is over: {detail}", name(kind), whom(*target))
+            format!("{}, {}, is over: {detail}", name(kind), target_text(*target))
         }
         EventKind::Violation { kind, drones, value_m } => {
-            format!("{} broken by drones {}: {value_m:.2}", name(kind), list(drones))
+            format!("{} violated by drones {}: {value_m:.2}", name(kind), list(drones))
         }
         EventKind::End { outcome, reason, .. } => format!("{}: {reason}", name(outcome)),
     }
 }
 
+/// The name of a value in JSON, with spaces.
 fn name(value: &impl serde::Serialize) -> String {
     let name = serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned));
     name.unwrap_or_default().replace('-', " ")
 }
 
-fn whom(target: DroneId) -> String {
+fn target_text(target: DroneId) -> String {
     if target == DroneId::NONE { "the whole swarm".to_owned() } else { format!("drone {target}") }
 }
 
@@ -78,14 +79,14 @@ mod tests {
         let kill =
             EventKind::Fault { kind: FaultKind::Kill, target: DroneId(3), scheduled: true, detail: "signal 9".into() };
         let kill = RunEvent { t_s: 1.0, what: kill };
-        assert_eq!((line(&kill).as_str(), severity(&kill)), ("kill of drone 3: signal 9", Severity::Warning));
-        let broken = EventKind::Violation {
+        assert_eq!((line(&kill).as_str(), severity(&kill)), ("kill, drone 3: signal 9", Severity::Warning));
+        let violation = EventKind::Violation {
             kind: ViolationKind::Separation,
             drones: vec![DroneId(1), DroneId(2)],
             value_m: 24.5,
         };
-        let broken = RunEvent { t_s: 1.0, what: broken };
-        assert_eq!(line(&broken), "separation broken by drones 1, 2: 24.50");
-        assert_eq!(severity(&broken), Severity::Error);
+        let violation = RunEvent { t_s: 1.0, what: violation };
+        assert_eq!(line(&violation), "separation violated by drones 1, 2: 24.50");
+        assert_eq!(severity(&violation), Severity::Error);
     }
 }

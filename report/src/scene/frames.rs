@@ -1,6 +1,6 @@
-//! Who hears a frame: the receivers' own rule, asked again.
+//! Describes frames: their delivery to each receiver, by the receivers' own rule, and their content.
 
-use crate::scene::facts::SceneFacts;
+use crate::scene_facts::SceneFacts;
 use serde::Serialize;
 use skein_protocol::LeadershipKind;
 use skein_protocol::frame::AirFrame;
@@ -10,10 +10,10 @@ use skein_protocol::record::DroneRow;
 use skein_protocol::{DroneId, Message, Vec2};
 use std::sync::LazyLock;
 
-/// The letter of a receiver that has nothing to do with a frame.
+/// The letter of a receiver that a frame does not concern: its sender or a dead drone.
 const ABSENT: char = '-';
 
-/// What becomes of a frame at one receiver, as a letter.
+/// The delivery of a frame to one receiver, as a letter of [`SentFrame::deliveries`](super::SentFrame::deliveries).
 pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows: &[DroneRow], dt_ns: i64) -> char {
     let Some(row) = rows.get(receiver.index()).filter(|row| row.alive() && receiver != frame.source) else {
         return ABSENT;
@@ -30,7 +30,7 @@ pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, 
     }
 }
 
-/// A reason's name.
+/// Name of a drop reason.
 pub(super) fn reason(reason: DropReason) -> &'static str {
     static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| DropReason::ALL.iter().map(name).collect());
     &NAMES[reason as usize]
@@ -40,32 +40,32 @@ fn letter(why: DropReason) -> char {
     reason(why).chars().next().unwrap_or('?')
 }
 
-/// The name of a frame's kind.
+/// Name of a frame's topic.
 pub(super) fn topic(frame: &AirFrame) -> &'static str {
     static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| Topic::ALL.iter().map(name).collect());
     let place = Topic::ALL.iter().position(|topic| *topic as u16 == frame.frame.kind);
     place.map_or("unknown", |place| &NAMES[place])
 }
 
-/// As it stands in every JSON.
+/// The name of a value in JSON.
 fn name(value: &impl Serialize) -> String {
     serde_json::to_value(value).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// What a frame says, in a few words.
+/// Describes the content of a frame in a few words.
 pub(super) fn content(frame: &AirFrame) -> String {
     match Message::decode(&frame.frame) {
         Ok(Message::Pose(_)) => String::new(),
-        Ok(Message::Obstacle(obstacle)) => format!("obstacle {}, seen by {}", obstacle.id.0, obstacle.witness),
-        Ok(Message::Leadership(said)) => {
-            let what = match said.kind() {
+        Ok(Message::Obstacle(obstacle)) => format!("obstacle {}, sensed by drone {}", obstacle.id.0, obstacle.witness),
+        Ok(Message::Leadership(message)) => {
+            let what = match message.kind() {
                 LeadershipKind::Claim => "claims",
                 LeadershipKind::Heartbeat => "leads",
-                LeadershipKind::PreVote => "misses the leader of",
-                LeadershipKind::PreVoteRejection => "heard of the leader of",
-                LeadershipKind::LeadershipTransfer => "hands over",
+                LeadershipKind::PreVote => "requests a pre-vote for",
+                LeadershipKind::PreVoteRejection => "rejects the pre-vote for",
+                LeadershipKind::LeadershipTransfer => "transfers the leadership of",
             };
-            format!("{what} {}, round {}", said.group, said.ballot.round)
+            format!("{what} {}, round {}", message.group, message.ballot.round)
         }
         Ok(Message::Plan(plan)) => {
             let phase = plan.phase();
@@ -74,8 +74,8 @@ pub(super) fn content(frame: &AirFrame) -> String {
             format!("{phase} {}, round {} epoch {}{past}", plan.group, plan.id.ballot.round, plan.id.epoch)
         }
         Ok(Message::Assignment(part)) => format!("drone {}: {}, place {}", part.drone, part.group, part.rank),
-        Ok(Message::Arrivals(row)) => format!("drone {}: ways past {} routes", row.drone, row.routes),
-        Ok(Message::Passed(passed)) => format!("past {} obstacles", passed.set_count),
+        Ok(Message::Arrivals(row)) => format!("drone {}: arrival times by {} routes", row.drone, row.routes),
+        Ok(Message::Passed(passed)) => format!("passed {} obstacles", passed.set_count),
         Err(error) => error.to_string(),
     }
 }
@@ -89,7 +89,7 @@ mod tests {
     use skein_protocol::radio::{ChannelModel, Radio, Range};
 
     fn frame(sequence: u32) -> AirFrame {
-        let said = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), reserved: 0 };
+        let passed = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), reserved: 0 };
         AirFrame {
             tick: 3,
             source: DroneId(0),
@@ -97,7 +97,7 @@ mod tests {
             position_m: [0.0; 2],
             queue_ns: 0,
             link_faults: Default::default(),
-            frame: Message::Passed(said).encode(),
+            frame: Message::Passed(passed).encode(),
         }
     }
 
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn frames_have_a_topic_and_a_content() {
-        assert_eq!((topic(&frame(0)), content(&frame(0)).as_str()), ("passed", "past 2 obstacles"));
+        assert_eq!((topic(&frame(0)), content(&frame(0)).as_str()), ("passed", "passed 2 obstacles"));
         let mut strange = frame(0);
         strange.frame.kind = 99;
         assert_eq!(topic(&strange), "unknown");

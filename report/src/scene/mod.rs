@@ -1,14 +1,14 @@
-//! What a picture of a run is made of, the same for the recording, the report and a live view: a [`Sample`] of the swarm
-//! every now and then, and the run's events in words.
+//! What a picture of a run consists of: a [`Sample`] of the swarm at regular times, and the text of each event.
+//!
+//! The recording, the page and the live view are made from the same samples.
 
 pub mod event_text;
-mod facts;
 mod frames;
 mod observer;
 mod sample;
 mod slots;
 
-pub use facts::{SceneFacts, SetOutline};
-pub(crate) use observer::fine;
+pub use crate::scene_facts::{SceneFacts, SetOutline};
 pub use observer::{MAX_LISTED_DRONES, Observer};
+pub(crate) use sample::rounded;
 pub use sample::{EnergySample, RadioSample, Sample, SentFrame, State};

@@ -1,54 +1,58 @@
-//! Makes samples of a run's records.
+//! Makes samples from the records of a run.
 
-use crate::accumulate::seconds;
 use crate::facts::RunFacts;
 use crate::scene::frames;
-use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State};
+use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State, rounded};
 use crate::scene::slots::Slots;
+use skein_protocol::frame::AirFrame;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::radio::DropReason;
 use skein_protocol::record::{DroneRow, RecordView};
 use skein_protocol::{DroneId, SimTime};
 use std::collections::BTreeMap;
 
-/// Up to this many drones every frame is listed, with its delivery to every receiver.
+/// Largest number of drones for which samples list every frame, with its delivery to every receiver.
 pub const MAX_LISTED_DRONES: usize = 64;
-/// Most frames in a sample: beyond, the oldest are left out.
+/// Largest number of frames in a sample; the oldest frames beyond it are left out.
 const FRAMES_MAX: usize = 4096;
 
-/// Watches a run's records and makes samples of them.
+/// Follows the records of a run and makes samples from them.
 pub struct Observer {
     facts: RunFacts,
+    /// Length of a tick, ns.
     dt_ns: i64,
     slots: Slots,
+    /// Radio traffic since the previous sample.
     radio: RadioSample,
+    /// The receiver selected in a large swarm.
     receiver: Option<DroneId>,
     last_tick: Option<u64>,
 }
 
 impl Observer {
-    /// Of a run that was ordered so.
+    /// For a run with these facts.
     #[must_use]
     pub fn new(facts: RunFacts) -> Self {
         let dt_ns = (facts.dt_s * 1e9).round() as i64;
         Self { facts, dt_ns, slots: Slots::default(), radio: RadioSample::default(), receiver: None, last_tick: None }
     }
 
-    /// In a swarm of more than [`MAX_LISTED_DRONES`] drones, lists what this one hears from now on, or nothing.
-    pub fn listen(&mut self, receiver: Option<DroneId>) {
+    /// In a swarm of more than [`MAX_LISTED_DRONES`] drones, samples list from now on the frames to this receiver, or none.
+    /// Without effect in a smaller swarm.
+    pub fn select_receiver(&mut self, receiver: Option<DroneId>) {
         self.receiver = receiver.filter(|_| self.facts.drones as usize > MAX_LISTED_DRONES);
         self.radio.frames.clear();
     }
 
-    /// Takes the record of a tick, and makes a sample of it if one is wanted. The last record of a run, which repeats a
-    /// tick, gives none.
+    /// Takes the record of a tick, and returns a sample if `wanted`. The last record of a run, which repeats a tick, gives
+    /// no sample.
     pub fn take(&mut self, record: RecordView<'_>, wanted: bool) -> Option<Sample> {
         let head = record.head;
         if record.rows.is_empty() || self.last_tick.is_some_and(|last| head.tick <= last) {
             return None;
         }
         self.last_tick = Some(head.tick);
-        self.slots.hear(record.frames, record.rows);
+        self.slots.take_frames(record.frames, record.rows);
         self.count(record);
         wanted.then(|| Sample {
             state: self.state(record),
@@ -60,11 +64,12 @@ impl Observer {
         })
     }
 
-    /// Takes the record of a tick whose frames are not listed and counted: of a swarm too fast to be looked at closely.
+    /// Takes the record of a tick without listing or counting its frames, for a live view that cannot keep up.
     pub fn skip(&mut self, record: RecordView<'_>) {
-        self.slots.hear(record.frames, record.rows);
+        self.slots.take_frames(record.frames, record.rows);
     }
 
+    /// Counts and lists the frames of a tick.
     fn count(&mut self, record: RecordView<'_>) {
         let radio = &mut self.radio;
         radio.heard.resize(record.rows.len(), 0);
@@ -82,7 +87,7 @@ impl Observer {
             if listed {
                 let deliveries = self.deliveries(frame, record.rows);
                 let (source, sequence) = (frame.source.0, frame.sequence);
-                let t_s = seconds(SimTime(frame.tick as i64 * self.dt_ns));
+                let t_s = SimTime(frame.tick as i64 * self.dt_ns).secs();
                 let content = frames::content(frame);
                 self.radio.frames.push(SentFrame { t_s, source, sequence, kind: topic.into(), content, deliveries });
             }
@@ -92,7 +97,8 @@ impl Observer {
         self.radio.frames.drain(..surplus);
     }
 
-    fn deliveries(&self, frame: &skein_protocol::frame::AirFrame, rows: &[DroneRow]) -> String {
+    /// The letters of [`SentFrame::deliveries`].
+    fn deliveries(&self, frame: &AirFrame, rows: &[DroneRow]) -> String {
         let delivery = |drone| frames::delivery(&self.facts.scene, frame, drone, rows, self.dt_ns);
         match self.receiver {
             Some(receiver) => delivery(receiver).to_string(),
@@ -102,12 +108,12 @@ impl Observer {
 
     fn state(&self, record: RecordView<'_>) -> State {
         let (now, rows) = (record.head.now, record.rows);
-        let mut state = State { tick: record.head.tick, t_s: seconds(now), ..State::default() };
+        let mut state = State { tick: record.head.tick, t_s: now.secs(), ..State::default() };
         for (drone, row) in rows.iter().enumerate() {
-            state.x_m.push(fine(row.position_m[0]));
-            state.y_m.push(fine(row.position_m[1]));
-            state.vx_mps.push(fine(row.velocity_mps[0]));
-            state.vy_mps.push(fine(row.velocity_mps[1]));
+            state.x_m.push(rounded(row.position_m[0]));
+            state.y_m.push(rounded(row.position_m[1]));
+            state.vx_mps.push(rounded(row.velocity_mps[0]));
+            state.vy_mps.push(rounded(row.velocity_mps[1]));
             state.alive.push(u8::from(row.alive()));
             state.group.push(row.group.to_string());
             state.leader.push(row.leader().map(|leader| leader.0));
@@ -117,7 +123,7 @@ impl Observer {
             state.rank.push(row.rank);
             state.plan.push([row.obeyed.ballot.round, row.obeyed.epoch]);
             let slot = self.slots.of(drone, row, now).filter(|_| row.alive());
-            state.slot_m.push(slot.map(|slot| [fine(slot.x), fine(slot.y)]));
+            state.slot_m.push(slot.map(|slot| [rounded(slot.x), rounded(slot.y)]));
             state.late.push(u8::from(row.is_late()));
         }
         state
@@ -125,7 +131,7 @@ impl Observer {
 }
 
 fn add(counts: &mut BTreeMap<String, u32>, name: &str, count: u32) {
-    // A name is made once, not for every frame.
+    // Allocates the name once, and not for every frame.
     if let Some(known) = counts.get_mut(name) {
         *known += count;
     } else {
@@ -135,13 +141,7 @@ fn add(counts: &mut BTreeMap<String, u32>, name: &str, count: u32) {
 
 fn energy(rows: &[DroneRow]) -> EnergySample {
     let total_j: f64 = rows.iter().filter(|row| row.alive()).map(|row| row.energy_j).sum();
-    EnergySample { total_j: fine(total_j), drone_j: rows.iter().map(|row| fine(row.energy_j)).collect() }
-}
-
-/// To a thousandth: a picture needs no more, and the text stays short.
-pub(crate) fn fine(value: f64) -> f64 {
-    // Adding zero turns -0 into 0.
-    (value * 1e3).round() / 1e3 + 0.0
+    EnergySample { total_j: rounded(total_j), drone_j: rows.iter().map(|row| rounded(row.energy_j)).collect() }
 }
 
 #[cfg(test)]
@@ -149,12 +149,11 @@ mod tests {
     use super::*;
     use crate::testing::{facts, row};
     use skein_protocol::Message;
-    use skein_protocol::frame::AirFrame;
     use skein_protocol::payload::Passed;
     use skein_protocol::record::RecordHeader;
 
     fn frame(tick: u64) -> AirFrame {
-        let said = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), reserved: 0 };
+        let passed = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), reserved: 0 };
         AirFrame {
             tick,
             source: DroneId(1),
@@ -162,7 +161,7 @@ mod tests {
             position_m: [0.0; 2],
             queue_ns: 0,
             link_faults: Default::default(),
-            frame: Message::Passed(said).encode(),
+            frame: Message::Passed(passed).encode(),
         }
     }
 
@@ -175,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_said_between_two_samples_is_in_the_second() {
+    fn frames_between_two_samples_are_in_the_second() {
         let mut observer = Observer::new(facts(3));
         assert!(take(&mut observer, 0, 3, false).is_none());
         let sample = take(&mut observer, 1, 3, true).unwrap();
@@ -189,10 +188,10 @@ mod tests {
     }
 
     #[test]
-    fn in_a_large_swarm_one_receiver_is_listened_to() {
+    fn in_a_large_swarm_frames_to_the_selected_receiver_are_listed() {
         let mut observer = Observer::new(facts(65));
         assert!(take(&mut observer, 0, 65, true).unwrap().radio.frames.is_empty());
-        observer.listen(Some(DroneId(4)));
+        observer.select_receiver(Some(DroneId(4)));
         let sample = take(&mut observer, 1, 65, true).unwrap();
         assert_eq!((sample.radio.receiver, sample.radio.frames[0].deliveries.as_str()), (Some(4), "h"));
     }

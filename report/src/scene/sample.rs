@@ -1,101 +1,107 @@
-//! A sample of the swarm. Written as JSON into the recording, the report and the live view's socket; lists have one
-//! entry a drone, in the order of their numbers.
+//! A sample of the swarm, as it is written in JSON to the recording, the page and the live view. Lists without another
+//! description have one entry per drone, in the order of the drones' numbers.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// The swarm at the end of a tick, and what was said since the sample before.
+/// The swarm at the end of a tick, and the radio traffic since the previous sample.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sample {
-    /// Where the drones are and what they do.
+    /// Positions and activity of the drones.
     pub state: State,
-    /// What they have used.
+    /// Energy used so far.
     pub energy: EnergySample,
-    /// What they have said and heard.
+    /// Radio traffic since the previous sample.
     pub radio: RadioSample,
 }
 
-/// Where the drones are, and what they obey. World frame.
+/// Positions of the drones, and the plans they obey. World frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct State {
-    /// The tick's number.
+    /// Number of the tick.
     pub tick: u64,
     /// Simulated time, s.
     pub t_s: f64,
-    /// Along the flight, m.
+    /// Position along the flight direction, m.
     pub x_m: Vec<f64>,
-    /// To the left of it, m.
+    /// Position to the left of the flight direction, m.
     pub y_m: Vec<f64>,
-    /// m/s.
+    /// Velocity along x, m/s.
     pub vx_mps: Vec<f64>,
-    /// m/s.
+    /// Velocity along y, m/s.
     pub vy_mps: Vec<f64>,
-    /// 1 if its process lives, else 0.
+    /// 1 if the drone's process lives, else 0.
     pub alive: Vec<u8>,
-    /// Its group, by lineage.
+    /// The drone's group, by lineage.
     pub group: Vec<String>,
-    /// Whom it obeys.
+    /// The leader that the drone obeys.
     pub leader: Vec<Option<u32>>,
-    /// The group it leads.
+    /// The group that the drone leads.
     pub leads: Vec<Option<String>>,
     /// 0: cruise, 1: avoid, 2: reform.
     pub phase: Vec<u32>,
-    /// Its route past the set, 0 = rightmost.
+    /// The drone's route past the obstacle set, 0 = rightmost.
     pub route: Vec<Option<u16>>,
-    /// Its place in the queue.
+    /// The drone's place in the queue of its route.
     pub rank: Vec<u16>,
-    /// Round and epoch of the plan it obeys.
+    /// Round and epoch of the plan that the drone obeys.
     pub plan: Vec<[u32; 2]>,
-    /// Where its slot in the formation is now, if it is known, m.
+    /// Current position of the drone's slot in the formation, if it is known, m.
     pub slot_m: Vec<Option<[f64; 2]>>,
-    /// 1 if it missed the tick's deadline (wall clock only), else 0.
+    /// 1 if the drone missed the deadline of the tick (wall clock only), else 0.
     pub late: Vec<u8>,
 }
 
 /// Energy used since the start, J.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EnergySample {
-    /// By the living drones together.
+    /// Sum over the living drones.
     pub total_j: f64,
-    /// By each.
+    /// Of each drone.
     pub drone_j: Vec<f64>,
 }
 
-/// What was said and heard since the sample before.
+/// Radio traffic since the previous sample.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RadioSample {
     /// Frames sent, by kind.
     pub sent: BTreeMap<String, u32>,
-    /// Messages heard, by receiver.
+    /// Messages delivered, by receiver.
     pub heard: Vec<u32>,
-    /// Frames not heard, by reason, over all receivers.
+    /// Frames dropped, by reason, over all receivers.
     pub dropped: BTreeMap<String, u32>,
-    /// Frames not heard, by receiver.
+    /// Frames dropped, by receiver.
     pub dropped_by: Vec<u32>,
-    /// The frames, if they are listed.
+    /// The frames sent; empty in a large swarm without a selected receiver.
     pub frames: Vec<SentFrame>,
-    /// The only receiver that the frames' fates are told for; `None`: all.
+    /// The only receiver for which deliveries are listed; `None` if they are listed for all.
     pub receiver: Option<u32>,
 }
 
-/// A frame on the air.
+/// A frame that was sent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SentFrame {
-    /// When it was sent, s.
+    /// Time of sending, s.
     pub t_s: f64,
-    /// Who sent it.
+    /// The sender.
     pub source: u32,
     /// Running number of the source's frames.
     pub sequence: u32,
-    /// A topic's name; `unknown` if it is none.
+    /// Name of its topic; `unknown` for an invalid topic.
     pub kind: Cow<'static, str>,
-    /// What it says, shortly; empty for beacons.
+    /// A short description of its content; empty for beacons.
     #[serde(rename = "says")]
     pub content: String,
-    /// A letter for each receiver: `h` heard, `-` not for it (its sender, a dead drone), or why not: `l`oss, `b`urst,
-    /// `r`ange, `p`artition, `d`eaf, `m`alformed, `?` another reason.
+    /// A letter per receiver: `h` for delivered, `-` for the sender and for dead drones, or the reason for which it was
+    /// dropped: `l`oss, `b`urst, `r`ange, `p`artition, `d`eaf, `m`alformed, `q`ueue, `?` for any other.
     #[serde(rename = "fate")]
     pub deliveries: String,
+}
+
+/// The value rounded to thousandths: a picture needs no more, and the JSON text stays short.
+pub(crate) fn rounded(value: f64) -> f64 {
+    // Adding zero turns -0 into 0.
+    (value * 1e3).round() / 1e3 + 0.0
 }

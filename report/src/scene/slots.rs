@@ -1,4 +1,4 @@
-//! Where the slots are that drones were given, from what leaders say.
+//! The current positions of the drones' slots, from the plans and assignments that leaders send.
 
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
@@ -7,30 +7,31 @@ use skein_protocol::record::DroneRow;
 use skein_protocol::{Message, Phase, PlanStamp, SimTime, Vec2};
 use std::collections::BTreeMap;
 
-/// Plans on the air, and each drone's part in the latest of them.
+/// The plans that were sent, and the latest assignment of each drone.
 #[derive(Debug, Default)]
 pub(super) struct Slots {
     plans: BTreeMap<PlanStamp, Plan>,
-    parts: Vec<Option<Assignment>>,
+    assignments: Vec<Option<Assignment>>,
 }
 
 impl Slots {
-    /// Hears what is on the air; forgets plans that nobody obeys any more and a later one has followed.
-    pub fn hear(&mut self, frames: &[AirFrame], rows: &[DroneRow]) {
-        self.parts.resize(rows.len(), None);
+    /// Takes the frames of a tick. Forgets superseded plans that no drone obeys any more.
+    pub(super) fn take_frames(&mut self, frames: &[AirFrame], rows: &[DroneRow]) {
+        self.assignments.resize(rows.len(), None);
         let mut planned = false;
-        let told = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
-        for frame in frames.iter().filter(told) {
+        let of_plan = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
+        for frame in frames.iter().filter(of_plan) {
             match Message::decode(&frame.frame) {
                 Ok(Message::Plan(plan)) => planned |= self.plans.insert(plan.id, plan).is_none(),
-                Ok(Message::Assignment(part)) => {
-                    if let Some(place) = self.parts.get_mut(part.drone.index())
-                        && place.is_none_or(|known| known.id <= part.id)
+                Ok(Message::Assignment(assignment)) => {
+                    if let Some(place) = self.assignments.get_mut(assignment.drone.index())
+                        && place.is_none_or(|known| known.id <= assignment.id)
                     {
-                        *place = Some(part);
+                        *place = Some(assignment);
                     }
                 }
-                _ => {} // Malformed: its receivers count it.
+                // Malformed: its receivers count it.
+                _ => {}
             }
         }
         if planned {
@@ -39,12 +40,12 @@ impl Slots {
         }
     }
 
-    /// Where a drone's slot is, world frame, m; `None` while it goes around something, or if it is not known.
-    pub fn of(&self, drone: usize, row: &DroneRow, now: SimTime) -> Option<Vec2> {
-        let part = self.parts.get(drone).copied().flatten().filter(|part| part.id == row.obeyed)?;
-        let plan = self.plans.get(&part.id).filter(|plan| plan.phase() != Phase::Avoid)?;
+    /// Position of a drone's slot, world frame, m. `None` while the drone avoids obstacles, or if the slot is not known.
+    pub(super) fn of(&self, drone: usize, row: &DroneRow, now: SimTime) -> Option<Vec2> {
+        let assignment = self.assignments.get(drone).copied().flatten().filter(|known| known.id == row.obeyed)?;
+        let plan = self.plans.get(&assignment.id).filter(|plan| plan.phase() != Phase::Avoid)?;
         let (anchor, _) = plan.anchor_at(now);
-        Some(anchor + Vec2::from(part.slot_m))
+        Some(anchor + Vec2::from(assignment.slot_m))
     }
 }
 
@@ -55,7 +56,7 @@ mod tests {
     use skein_protocol::payload::{MAX_SET, NO_ROUTE};
     use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId};
 
-    fn said(message: Message) -> AirFrame {
+    fn sent(message: Message) -> AirFrame {
         AirFrame {
             tick: 0,
             source: DroneId(0),
@@ -87,7 +88,7 @@ mod tests {
             set: [ObstacleId(0); MAX_SET],
             reserved: 0,
         };
-        let part = Assignment {
+        let assignment = Assignment {
             id,
             scope: GroupId::ALL,
             group: GroupId::ALL,
@@ -101,7 +102,7 @@ mod tests {
         };
         let rows = [row(0.0, 0.0), DroneRow { obeyed: id, ..row(0.0, 0.0) }];
         let mut slots = Slots::default();
-        slots.hear(&[said(Message::Plan(plan)), said(Message::Assignment(part))], &rows);
+        slots.take_frames(&[sent(Message::Plan(plan)), sent(Message::Assignment(assignment))], &rows);
         let at = |s: f64| slots.of(1, &rows[1], SimTime::from_secs(s));
         assert_eq!(at(1.0), Some(Vec2::new(7.0, 6.0)));
         assert_eq!(at(9.0), Some(Vec2::new(12.0, 6.0)));

@@ -122,7 +122,7 @@ fn maps(experiment: &Experiment, cells: &[Cell], columns: &Side, rows: &Side, me
         let at = |column: &[String], row: &[String]| {
             let cell = of.iter().find(|cell| has(cell, columns, column) && has(cell, rows, row))?;
             let Estimate { mean, low, high, .. } = cell.estimate(metric)?;
-            Some((mean, low, high))
+            Some(skein_report::plot::sweep::Cell { mean, low, high })
         };
         let values = rows.values.iter().flat_map(|row| columns.values.iter().map(|column| at(&column.0, &row.0)));
         let (scenario, strategy) = (&of[0].scenario, &of[0].strategy);

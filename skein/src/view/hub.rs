@@ -202,7 +202,7 @@ impl Shared {
         let selected = self.selected.load(Ordering::Relaxed);
         if selected != watcher.selected {
             watcher.selected = selected;
-            watcher.observer.listen((selected != NOBODY).then_some(DroneId(selected)));
+            watcher.observer.select_receiver((selected != NOBODY).then_some(DroneId(selected)));
         }
         let (events, sample) = watcher.take(record);
         if events.is_empty() && sample.is_none() {

@@ -1,19 +1,19 @@
-//! What a picture shows beside the drones.
+//! What the recording and the page draw beside the drones.
 
 use serde::{Deserialize, Serialize};
 use skein_protocol::radio::Radio;
 
-/// What a picture of the run needs to know, and no figure of the summary depends on. World frame, SI units.
+/// What a picture of the run needs and no figure of the summary depends on. World frame, SI units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SceneFacts {
-    /// What the air does to frames: who hears what follows from it.
+    /// The radio model, from which it follows which drone receives which frame.
     pub radio: Radio,
-    /// Distance at which obstacles are sensed, m.
+    /// Distance at which drones sense obstacles, m.
     pub detection_range_m: f64,
-    /// Radius of a drone's danger zone at v m/s: `[0] + [1]·v + [2]·v²`, m.
+    /// Coefficients of the radius of a drone's danger zone at speed v in m/s: `[0] + [1]·v + [2]·v²`, m.
     pub danger_m: [f64; 3],
-    /// The obstacle sets as a leader that knows all would see them, in flight order.
+    /// The obstacle sets as a leader with complete knowledge sees them, in flight order.
     pub sets: Vec<SetOutline>,
 }
 
@@ -25,16 +25,16 @@ impl SceneFacts {
     }
 }
 
-/// An obstacle set: where no path may lead, and where paths may.
+/// The inflated obstacles of a set, and the routes past it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetOutline {
-    /// Its obstacles.
+    /// The ids of its obstacles.
     pub obstacles: Vec<u32>,
     /// Abscissa of its gate, m.
     pub gate_x_m: f64,
-    /// Inflated obstacles; those too close for a way between them are one.
+    /// Outlines of the inflated obstacles, m. Obstacles without a passable gap between them have one outline.
     pub hulls_m: Vec<Vec<[f64; 2]>>,
-    /// The corners that each route passes, from the rightmost route on.
+    /// A polyline for each route, m, from the rightmost route to the leftmost.
     pub routes_m: Vec<Vec<[f64; 2]>>,
 }
 

@@ -1,0 +1,258 @@
+//! Writes run.mcap.
+
+use crate::error::ReportError;
+use crate::facts::RunFacts;
+use crate::files::RECORDING;
+use crate::mcap::draw::{self, Drones};
+use crate::mcap::foxglove::{
+    FrameTransform, FrameTransforms, Log, Pose, PosesInFrame, Quaternion, SceneUpdate, Time, Vector3, WORLD,
+};
+use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, event_text, rounded};
+use ::mcap::records::{MessageHeader, Metadata};
+use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::Serialize;
+use skein_protocol::SimTime;
+use skein_protocol::record::{EventKind, RecordView, RunEvent};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+/// Samples per simulated second.
+const SAMPLE_RATE_HZ: f64 = 10.0;
+/// Number of drones above which the sample rate falls in proportion to the number.
+const FULL_RATE_DRONES: f64 = 100.0;
+/// Number of samples between two updates of danger zones, slots and links, which `/tf` does not move.
+const SCENE_PERIOD: u64 = 5;
+/// Compression level of zstd: the fastest, because a run must not wait for its recording.
+const COMPRESSION_LEVEL: u32 = 1;
+/// Uncompressed size of a chunk, bytes.
+const CHUNK_BYTES: u64 = 1 << 20;
+/// The topics, in the order of [`Topic`].
+pub(super) const TOPICS: [&str; 10] = [
+    "/tf",
+    "/drones",
+    "/scene",
+    "/log",
+    "/skein/state",
+    "/skein/energy",
+    "/skein/radio",
+    "/skein/groups",
+    "/skein/leadership",
+    "/skein/events",
+];
+
+/// The topics of the recording, as indices of [`TOPICS`].
+#[derive(Clone, Copy)]
+#[repr(usize)]
+pub(super) enum Topic {
+    Transforms,
+    Drones,
+    Scene,
+    Log,
+    State,
+    Energy,
+    Radio,
+    Groups,
+    Leadership,
+    Events,
+}
+
+/// Writes run.mcap.
+pub(crate) struct McapWriter {
+    path: PathBuf,
+    out: Writer<BufWriter<File>>,
+    /// The channel of each topic.
+    channels: Vec<u16>,
+    /// Number of messages on each topic so far.
+    sequences: Vec<u32>,
+    facts: RunFacts,
+    observer: Observer,
+    /// Ticks from one sample to the next.
+    stride: u64,
+    /// Number of samples so far.
+    samples: u64,
+    drones: Drones,
+    /// Buffer for the JSON of one message.
+    json: Vec<u8>,
+}
+
+/// Ticks from one sample to the next.
+fn stride(facts: &RunFacts) -> u64 {
+    let rarer = (f64::from(facts.drones) / FULL_RATE_DRONES).max(1.0);
+    (rarer / SAMPLE_RATE_HZ / facts.dt_s).round().max(1.0) as u64
+}
+
+impl McapWriter {
+    /// Creates the file in a run's folder. `scenario` is the resolved scenario.
+    pub(crate) fn create(folder: &Path, facts: &RunFacts, scenario: &serde_json::Value) -> Result<Self, ReportError> {
+        let path = folder.join(RECORDING);
+        let file = File::create(&path).map_err(ReportError::io(&path))?;
+        // With one thread, the bytes do not depend on the number of cores.
+        let options = WriteOptions::new()
+            .profile("skein")
+            .chunk_size(Some(CHUNK_BYTES))
+            .compression_level(COMPRESSION_LEVEL)
+            .compression_threads(0);
+        let out = options.create(BufWriter::with_capacity(1 << 18, file)).map_err(ReportError::recording(&path))?;
+        let mut writer = Self {
+            out,
+            channels: Vec::new(),
+            sequences: vec![0; TOPICS.len()],
+            stride: stride(facts),
+            samples: 0,
+            drones: Drones::default(),
+            json: Vec::new(),
+            observer: Observer::new(facts.clone()),
+            facts: facts.clone(),
+            path,
+        };
+        writer.open(scenario).map_err(ReportError::recording(&writer.path))?;
+        Ok(writer)
+    }
+
+    /// Takes the record of a tick and its events.
+    pub(crate) fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), ReportError> {
+        let wanted = (record.head.tick + 1).is_multiple_of(self.stride);
+        let sample = self.observer.take(record, wanted);
+        let written = sample
+            .map_or(Ok(()), |sample| self.sample(&sample, record.head.now))
+            .and_then(|()| events.iter().try_for_each(|event| self.event(event)));
+        written.map_err(ReportError::recording(&self.path))
+    }
+
+    /// Completes the file.
+    pub(crate) fn finish(&mut self) -> Result<(), ReportError> {
+        self.out.finish().map(|_| ()).map_err(ReportError::recording(&self.path))
+    }
+
+    /// Writes schemas, channels, metadata and all that does not move.
+    fn open(&mut self, scenario: &serde_json::Value) -> McapResult<()> {
+        let schemas = [
+            ("foxglove.FrameTransforms", schema::<FrameTransforms>()),
+            ("foxglove.PosesInFrame", schema::<PosesInFrame>()),
+            ("foxglove.SceneUpdate", schema::<SceneUpdate>()),
+            ("foxglove.Log", schema::<Log>()),
+            ("skein.State", schema::<State>()),
+            ("skein.Energy", schema::<EnergySample>()),
+            ("skein.Radio", schema::<RadioSample>()),
+        ];
+        let event = ("skein.Event", serde_json::json!({"type": "object", "required": ["t_s", "event"]}));
+        let all = schemas.into_iter().chain(std::iter::repeat(event));
+        for (topic, (name, schema)) in TOPICS.iter().zip(all) {
+            let id = self.out.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
+            self.channels.push(self.out.add_channel(id, topic, "json", &BTreeMap::new())?);
+        }
+        self.out.write_metadata(&Metadata { name: "run".to_owned(), metadata: metadata(&self.facts) })?;
+        self.out.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: "scenario.json".to_owned(),
+            media_type: "application/json".to_owned(),
+            data: Cow::Owned(serde_json::to_vec_pretty(scenario).unwrap_or_default()),
+        })?;
+        self.put(Topic::Scene, SimTime::ZERO, &draw::static_scene(&self.facts))
+    }
+
+    fn sample(&mut self, sample: &Sample, now: SimTime) -> McapResult<()> {
+        let (at, state) = (Time::from(now), &sample.state);
+        self.put(Topic::Transforms, now, &transforms(state, at))?;
+        self.put(Topic::State, now, state)?;
+        self.put(Topic::Energy, now, &sample.energy)?;
+        self.put(Topic::Radio, now, &sample.radio)?;
+        self.samples += 1;
+        if let Some(changed) = self.drones.changed(state, at) {
+            self.put(Topic::Scene, now, &changed)?;
+        }
+        if self.samples % SCENE_PERIOD == 1 {
+            self.put(Topic::Drones, now, &poses(state, at))?;
+            self.put(Topic::Scene, now, &draw::moving_scene(&self.facts, sample, at))?;
+        }
+        Ok(())
+    }
+
+    fn event(&mut self, event: &RunEvent) -> McapResult<()> {
+        let at = SimTime::from_secs(event.t_s);
+        let level = match event_text::severity(event) {
+            event_text::Severity::Info => 2,
+            event_text::Severity::Warning => 3,
+            event_text::Severity::Error => 4,
+        };
+        let (message, name) = (event_text::line(event), "world".to_owned());
+        let file = String::new();
+        self.put(Topic::Log, at, &Log { timestamp: at.into(), level, message, name, file, line: 0 })?;
+        let topic = match event.what {
+            EventKind::Leader { .. } => Topic::Leadership,
+            EventKind::Grouping { .. } | EventKind::Assigned { .. } => Topic::Groups,
+            _ => Topic::Events,
+        };
+        self.put(topic, at, &without_wall_time(event))
+    }
+
+    fn put(&mut self, topic: Topic, at: SimTime, message: &impl Serialize) -> McapResult<()> {
+        self.json.clear();
+        // Serialization cannot fail: all keys are strings, and the writer is a Vec.
+        serde_json::to_writer(&mut self.json, message).map_err(std::io::Error::from)?;
+        let time = at.0.max(0).unsigned_abs();
+        let (channel_id, sequence) = (self.channels[topic as usize], self.sequences[topic as usize]);
+        self.sequences[topic as usize] += 1;
+        let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
+        self.out.write_to_known_channel(&header, &self.json)
+    }
+}
+
+/// The event without wall time, which the end event contains and a recording must not.
+fn without_wall_time(event: &RunEvent) -> Cow<'_, RunEvent> {
+    let mut event = Cow::Borrowed(event);
+    if matches!(event.what, EventKind::End { .. })
+        && let EventKind::End { totals, .. } = &mut event.to_mut().what
+    {
+        totals.wall_s = 0.0;
+    }
+    event
+}
+
+/// The main facts of the run as text.
+fn metadata(facts: &RunFacts) -> BTreeMap<String, String> {
+    let pairs = [
+        ("scenario", facts.scenario.clone()),
+        ("strategy", facts.strategy.clone()),
+        ("seed", facts.seed.to_string()),
+        ("drones", facts.drones.to_string()),
+        ("dt_s", facts.dt_s.to_string()),
+        ("safe_distance_m", facts.safe_distance_m.to_string()),
+        ("clearance_m", facts.clearance_m.to_string()),
+    ];
+    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// A JSON schema without references: the viewers do not follow them.
+fn schema<T: JsonSchema>() -> serde_json::Value {
+    let settings = SchemaSettings::default().for_serialize().with(|settings| settings.inline_subschemas = true);
+    settings.into_generator().into_root_schema_for::<T>().to_value()
+}
+
+/// Direction of flight, rad, counter-clockwise from x.
+fn heading(state: &State, drone: usize) -> f64 {
+    state.vy_mps[drone].atan2(state.vx_mps[drone])
+}
+
+fn transforms(state: &State, timestamp: Time) -> FrameTransforms {
+    let transform = |drone: usize| FrameTransform {
+        timestamp,
+        parent_frame_id: WORLD.to_owned(),
+        child_frame_id: format!("drone_{drone}"),
+        translation: Vector3 { x: state.x_m[drone], y: state.y_m[drone], z: 0.0 },
+        rotation: Quaternion::yaw(heading(state, drone)),
+    };
+    FrameTransforms { transforms: (0..state.x_m.len()).map(transform).collect() }
+}
+
+fn poses(state: &State, timestamp: Time) -> PosesInFrame {
+    let pose =
+        |drone: usize| Pose::new(rounded(state.x_m[drone]), rounded(state.y_m[drone]), 0.0, heading(state, drone));
+    PosesInFrame { timestamp, frame_id: WORLD.to_owned(), poses: (0..state.x_m.len()).map(pose).collect() }
+}
