@@ -10,12 +10,10 @@ use crate::metrics::SwarmMetrics;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
 use crate::summary::{Dropped, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
+use crate::tuning::METRICS_PERIOD_S;
 use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
 use skein_protocol::{DroneId, Phase, Vec2};
-
-/// Time between two samples of the swarm metrics, s.
-const METRICS_PERIOD_S: f64 = 0.1;
 
 /// Accumulates everything that the summary of a run contains.
 pub(crate) struct Accumulator {

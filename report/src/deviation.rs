@@ -5,20 +5,15 @@ use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::files::FORMATION;
 use crate::formation::{centred, error, slots};
+use crate::tuning::{
+    DEVIATION_DRONES_MAX, DEVIATION_LARGE_SWARM_PERIOD_S, DEVIATION_PERIOD_S, DEVIATION_SMALL_SWARM_MAX,
+};
 use skein_protocol::Vec2;
 use skein_protocol::thin_plate::ThinPlate;
 use std::fmt::Write as _;
 use std::path::Path;
 
 const HEADER: &str = "t_s,disturbance_m,largest_m,bending";
-/// Time between two samples, s.
-const PERIOD_S: f64 = 0.1;
-/// Time between two samples of a swarm of more than [`SMALL_SWARM_MAX`] drones, s: the assignment takes longer.
-const LARGE_SWARM_PERIOD_S: f64 = 1.0;
-/// Largest number of drones that are sampled every [`PERIOD_S`].
-const SMALL_SWARM_MAX: usize = 64;
-/// Largest number of drones that are sampled at all: above, assignment and spline take seconds per sample.
-const DRONES_MAX: usize = 200;
 
 /// Deviation of the swarm from its target shape at one time, after the best translation and assignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,10 +47,14 @@ impl DeviationSampler {
 
     /// Takes the positions of the living drones in a tick, and makes a sample of them if one is due.
     pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
-        if positions.len() < 2 || positions.len() > DRONES_MAX {
+        if positions.len() < 2 || positions.len() > DEVIATION_DRONES_MAX {
             return;
         }
-        let every_s = if positions.len() > SMALL_SWARM_MAX { LARGE_SWARM_PERIOD_S } else { PERIOD_S };
+        let every_s = if positions.len() > DEVIATION_SMALL_SWARM_MAX {
+            DEVIATION_LARGE_SWARM_PERIOD_S
+        } else {
+            DEVIATION_PERIOD_S
+        };
         let now = (t_s / every_s + 1e-6).floor() as i64;
         if self.period.replace(now) != Some(now) {
             let sample = self.measure(facts, t_s, positions);

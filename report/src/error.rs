@@ -78,7 +78,7 @@ impl DrawError {
 
 /// Why the record of a tick cannot be used.
 #[derive(Debug, Error)]
-pub enum TickError {
+pub(crate) enum TickError {
     /// The record does not have one row per drone.
     #[error("tick {tick}: expected a record of {expected} rows, one per drone, found {found}")]
     Rows {

@@ -1,14 +1,9 @@
 //! How far the living drones are from the target shape, after the best translation and assignment.
 
 use crate::facts::RunFacts;
+use crate::tuning::{SOLVE_ALWAYS_DRONES_MAX, SOLVE_PERIOD_S};
 use skein_protocol::Vec2;
 use skein_protocol::matching::least_cost;
-
-/// Largest number of drones for which the assignment is solved in every tick in which the last assignment does not close
-/// the formation. Chosen by hand.
-const SOLVE_ALWAYS_MAX: usize = 64;
-/// Above [`SOLVE_ALWAYS_MAX`] drones, least time between two solutions, s. Chosen by hand.
-const SOLVE_PERIOD_S: f64 = 1.0;
 
 /// The error of a formation after the best translation and assignment.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,7 +110,7 @@ impl Closing {
             return true;
         }
         let due = self.solved_s.is_none_or(|solved_s| t_s - solved_s >= SOLVE_PERIOD_S);
-        if positions.len() > SOLVE_ALWAYS_MAX && !due {
+        if positions.len() > SOLVE_ALWAYS_DRONES_MAX && !due {
             return false;
         }
         self.slot_of = assign(&positions, &self.slots);

@@ -84,10 +84,11 @@ mod summary;
 mod testing;
 pub mod text;
 mod trace;
+mod tuning;
 mod vicinity;
 
 pub use completion::RunCompletion;
-pub use error::{DrawError, ReportError, TickError};
+pub use error::{DrawError, ReportError};
 pub use facts::{MissionEnd, RunFacts};
 pub use folder::{Manifest, ProcessEntry, Role, RunFolder};
 pub use recorder::Recorder;

@@ -3,11 +3,10 @@
 
 use crate::close::Sweep;
 use crate::summary::Metrics;
+use crate::tuning::CONNECTIVITY_DRONES_MAX;
 use nalgebra::DMatrix;
 use skein_protocol::Vec2;
 
-/// Largest number of drones for which connectivity is computed: its eigenvalues cost N³.
-const CONNECTIVITY_MAX: usize = 64;
 /// Speed below which a drone has no heading, m/s.
 const STANDING_MPS: f64 = 1e-9;
 
@@ -72,13 +71,13 @@ impl SwarmMetrics {
         let safety = Some(1.0 - f64::from(unsafe_pairs) / (n as f64 * (n as f64 - 1.0) / 2.0));
         let headings: Vec<Vec2> = velocities.iter().map(|&velocity| heading(velocity)).collect();
         let Some(range) = self.range_m else {
-            let connectivity = (n <= CONNECTIVITY_MAX).then_some(1.0);
+            let connectivity = (n <= CONNECTIVITY_DRONES_MAX).then_some(1.0);
             return Moment { order: Some(order_of_all(&headings)), safety, union: Some(1.0), connectivity };
         };
         let mut graph = Graph::new(n);
         self.sweep.pairs(positions, Some(range), |a, b, _| graph.link(a, b, &headings));
         let union = Some((n - graph.components()) as f64 / (n - 1) as f64);
-        let connectivity = (n <= CONNECTIVITY_MAX).then(|| self.connectivity(&graph.links));
+        let connectivity = (n <= CONNECTIVITY_DRONES_MAX).then(|| self.connectivity(&graph.links));
         Moment { order: Some(graph.order(&headings)), safety, union, connectivity }
     }
 
@@ -120,13 +119,13 @@ struct Graph {
     parent: Vec<usize>,
     heading_sum: Vec<Vec2>,
     moving: Vec<usize>,
-    /// One bit per neighbour; empty above [`CONNECTIVITY_MAX`] drones.
+    /// One bit per neighbour; empty above [`CONNECTIVITY_DRONES_MAX`] drones.
     links: Vec<u64>,
 }
 
 impl Graph {
     fn new(n: usize) -> Self {
-        let links = if n <= CONNECTIVITY_MAX { vec![0; n] } else { Vec::new() };
+        let links = if n <= CONNECTIVITY_DRONES_MAX { vec![0; n] } else { Vec::new() };
         Self { parent: (0..n).collect(), heading_sum: vec![Vec2::zeros(); n], moving: vec![0; n], links }
     }
 

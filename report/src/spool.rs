@@ -5,6 +5,7 @@
 //! padded to eight bytes.
 
 use crate::error::ReportError;
+use crate::tuning::{SPOOL_BLOCK_BYTES, SPOOL_BLOCKS, SPOOL_PIECE_BYTES};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use rustix::fs::{FallocateFlags, fallocate};
 use skein_protocol::record::RecordView;
@@ -14,12 +15,6 @@ use std::mem;
 use std::path::Path;
 use std::thread::JoinHandle;
 
-/// Size at which a block is handed to the thread, bytes.
-const BLOCK: usize = 64 << 10;
-/// Number of blocks, by which a slow disk may lag behind. They bound the memory used.
-const BLOCKS: usize = 128;
-/// Size of the pieces in which the file is read and its disk space is freed, bytes.
-const PIECE: usize = 1 << 20;
 const WORD: usize = size_of::<u64>();
 
 /// Appends records to the file.
@@ -34,14 +29,14 @@ pub(crate) struct Spool {
 impl Spool {
     /// Creates the file and starts the thread.
     pub(crate) fn create(path: &Path) -> io::Result<Self> {
-        Self::start(File::create(path)?, BLOCK)
+        Self::start(File::create(path)?, SPOOL_BLOCK_BYTES)
     }
 
     fn start(mut out: impl Write + Send + 'static, block_len: usize) -> io::Result<Self> {
-        let (full, filled) = bounded::<Vec<u8>>(BLOCKS);
-        let (emptied, empty) = bounded(BLOCKS);
+        let (full, filled) = bounded::<Vec<u8>>(SPOOL_BLOCKS);
+        let (emptied, empty) = bounded(SPOOL_BLOCKS);
         // The channel has room for all blocks: sending an empty one neither fails nor waits.
-        for _ in 1..BLOCKS {
+        for _ in 1..SPOOL_BLOCKS {
             drop(emptied.send(Vec::new()));
         }
         let write = move || {
@@ -106,12 +101,12 @@ pub(crate) fn consume(
         io::Result::Ok((file, left))
     };
     let (file, left) = open().map_err(ReportError::io(path))?;
-    let mut records = Records { input: BufReader::with_capacity(PIECE, &file), left, words: Vec::new() };
+    let mut records = Records { input: BufReader::with_capacity(SPOOL_PIECE_BYTES, &file), left, words: Vec::new() };
     let mut freed = 0;
     while let Some(record) = records.next().map_err(ReportError::io(path))? {
         take(record)?;
         let read = left - records.left;
-        let past = read - read % PIECE as u64;
+        let past = read - read % SPOOL_PIECE_BYTES as u64;
         if past > freed {
             // A file system without this operation keeps the space until the file is removed.
             let _ = fallocate(&file, FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE, freed, past - freed);

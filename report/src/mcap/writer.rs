@@ -8,6 +8,7 @@ use crate::mcap::foxglove::{
     FrameTransform, FrameTransforms, Log, Pose, PosesInFrame, Quaternion, SceneUpdate, Time, Vector3, WORLD,
 };
 use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, event_text, rounded};
+use crate::tuning::{FULL_RATE_DRONES, SAMPLE_RATE_HZ, SCENE_PERIOD};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
 use schemars::JsonSchema;
@@ -21,12 +22,6 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Samples per simulated second.
-const SAMPLE_RATE_HZ: f64 = 10.0;
-/// Number of drones above which the sample rate falls in proportion to the number.
-const FULL_RATE_DRONES: f64 = 100.0;
-/// Number of samples between two updates of danger zones, slots and links, which `/tf` does not move.
-const SCENE_PERIOD: u64 = 5;
 /// Compression level of zstd: the fastest, because a run must not wait for its recording.
 const COMPRESSION_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.

@@ -6,6 +6,7 @@ use crate::folder::RunFolder;
 use crate::geometry::outline;
 use crate::mcap;
 use crate::scene::{Sample, event_text};
+use crate::tuning::PAGE_POSITIONS_MAX;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -14,9 +15,6 @@ use serde::Serialize;
 use serde_json::json;
 use skein_protocol::record::{EventKind, RunEvent};
 use std::io::Write;
-
-/// Largest product of drones and samples in a page. Beyond it, samples are left out evenly.
-const MAX_POSITIONS: usize = 300_000;
 
 /// The first line of a run: its facts, and the outlines of the obstacles.
 #[must_use]
@@ -62,7 +60,7 @@ pub fn status_line(status: &str) -> String {
 pub(super) fn packed(folder: &RunFolder, facts: &RunFacts) -> Result<String, ReportError> {
     let (mut samples, mut lines) = (Vec::new(), vec![facts_line(facts)]);
     mcap::read(folder.path(), |sample| samples.push(sample), |event| lines.extend(event_line(&event)))?;
-    let step = (samples.len() * facts.drones as usize).div_ceil(MAX_POSITIONS).max(1);
+    let step = (samples.len() * facts.drones as usize).div_ceil(PAGE_POSITIONS_MAX).max(1);
     let last = samples.len().saturating_sub(1);
     let kept = samples.iter().enumerate().filter(|(place, _)| place % step == 0 || *place == last);
     lines.extend(kept.map(|(_, sample)| sample_line(sample)));

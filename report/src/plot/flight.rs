@@ -6,6 +6,7 @@ use super::tracks::{colours, frame};
 use crate::facts::RunFacts;
 use crate::geometry::outline;
 use crate::markup::escaped;
+use crate::tuning::ANIMATION_DRONES_MAX;
 use skein_protocol::Vec2;
 use std::fmt::Write;
 
@@ -17,14 +18,12 @@ const TITLE: f64 = 40.0;
 const SAMPLES_PER_KEY: usize = 5;
 /// Simulated time per time of the animation.
 const SPEED: f64 = 8.0;
-/// Largest number of drones: more would make the file too large.
-const DRONES_MAX: usize = 64;
 /// The symbol of a drone, which points along the flight direction, px.
 const ARROW: &str = "M9 0L-7 6L-3 0L-7 -6Z";
 
 /// Draws the animation. `None` without drones, and for a swarm that is too large.
 pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
-    if samples.tracks.is_empty() || samples.tracks.len() > DRONES_MAX {
+    if samples.tracks.is_empty() || samples.tracks.len() > ANIMATION_DRONES_MAX {
         return None;
     }
     let units_per_pixel = f64::from(px(1));

@@ -7,16 +7,10 @@ use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::formation;
 use crate::trace::{self, TraceRow};
+use crate::tuning::{PLOT_PERIOD_S, PLOT_POINTS_MAX, PLOT_SLOT_ERROR_DRONES_MAX};
 use skein_protocol::Vec2;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Time between two samples, s.
-const PERIOD_S: f64 = 0.1;
-/// Largest number of points of all tracks together, so that a plot of a thousand drones can still be opened.
-const MAX_POINTS: usize = 60_000;
-/// Largest number of drones for which the slot error is computed: the best assignment takes O(n³).
-const FORMATION_MAX: usize = 100;
 
 /// The data of the plots.
 #[derive(Default)]
@@ -60,7 +54,7 @@ impl Samples {
     pub(crate) fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
         let (mut samples, mut sweep, mut period) = (Self::default(), Sweep::default(), None);
         trace::read(path, |rows| {
-            let now = (rows[0].t_s / PERIOD_S + 1e-6).floor() as i64;
+            let now = (rows[0].t_s / PLOT_PERIOD_S + 1e-6).floor() as i64;
             samples.take(facts, rows, period.replace(now) != Some(now), &mut sweep);
         })?;
         for track in samples.tracks.values_mut() {
@@ -97,7 +91,7 @@ impl Samples {
             let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
             self.distance.extend(band(t_s, distances));
             self.energy.extend(band(t_s, rows.iter().map(|row| row.energy_j)));
-            if rows.len() <= FORMATION_MAX {
+            if rows.len() <= PLOT_SLOT_ERROR_DRONES_MAX {
                 self.formation.extend(formation::error(facts, &positions).map(|error| (t_s, error.largest_m)));
             }
         }
@@ -108,10 +102,10 @@ impl Samples {
         track.last_s < self.end_s
     }
 
-    /// Removes points evenly until no more than [`MAX_POINTS`] are left.
+    /// Removes points evenly until no more than [`PLOT_POINTS_MAX`] are left.
     fn thin(&mut self) {
         let points: usize = self.tracks.values().map(|track| track.points.len()).sum();
-        let step = points.div_ceil(MAX_POINTS).max(1);
+        let step = points.div_ceil(PLOT_POINTS_MAX).max(1);
         for track in self.tracks.values_mut() {
             let last = track.points.len() - 1;
             let mut place = 0;

@@ -4,6 +4,7 @@ use crate::facts::RunFacts;
 use crate::scene::frames;
 use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State, rounded};
 use crate::scene::slots::Slots;
+use crate::tuning::SAMPLE_FRAMES_MAX;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::payload::NO_ROUTE;
 use skein_protocol::radio::DropReason;
@@ -13,8 +14,6 @@ use std::collections::BTreeMap;
 
 /// Largest number of drones for which samples list every frame, with its delivery to every receiver.
 pub const MAX_LISTED_DRONES: usize = 64;
-/// Largest number of frames in a sample; the oldest frames beyond it are left out.
-const FRAMES_MAX: usize = 4096;
 
 /// Follows the records of a run and makes samples from them.
 pub struct Observer {
@@ -93,7 +92,7 @@ impl Observer {
             }
             add(&mut self.radio.sent, topic, 1);
         }
-        let surplus = self.radio.frames.len().saturating_sub(FRAMES_MAX);
+        let surplus = self.radio.frames.len().saturating_sub(SAMPLE_FRAMES_MAX);
         self.radio.frames.drain(..surplus);
     }
 
