@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
-# Spawns a swarm and flies it past one tree: so many drones, in this formation. See --help.
+# Starts a swarm of a given size and formation, and flies it past one tree. See --help.
 set -euo pipefail
 
 usage() {
     cat <<'HELP'
 Usage: scripts/spawn_swarm.sh [DRONES] [FORMATION] [SPACING_M] [OPTION]...
 
-Starts one process a drone and one for the world, and flies scenarios/open-field.toml.
+Starts one process per drone and one for the world, and flies scenarios/open-field.toml.
 
-  DRONES      how many [8]
+  DRONES      number of drones [8]
   FORMATION   nested-v, v, line, column, grid or circle [v]
   SPACING_M   metres between neighbours, at least 4 [8]
-  OPTION      anything from the first one that begins with a dash goes to `skein run`
+  OPTION      the first argument that begins with a dash, and all after it, are passed to
+              `skein run`
 
 Examples:
   scripts/spawn_swarm.sh 12 line

@@ -1,4 +1,4 @@
-//! `skein bench failover`: leaders are killed by both clocks, and what it prints is what happened.
+//! `skein bench failover` kills leaders by both clocks and prints what happened.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -23,19 +23,19 @@ fn number(row: &Value, key: &str) -> f64 {
     row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"))
 }
 
-/// Whatever the clock: so many died, no invariant broke, and the numbers hang together.
-fn assert_sane(row: &Value, clock: &str, kills: u64) {
+/// By either clock: this many leaders were killed, no invariant was broken, and the numbers are consistent.
+fn assert_consistent(row: &Value, clock: &str, kills: u64) {
     assert_eq!((&row["clock"], &row["violations"]), (&clock.into(), &0.into()), "{row}");
     assert!(row["kills"].as_u64().unwrap() <= kills && row["replaced"].as_u64() <= row["kills"].as_u64(), "{row}");
     let quantiles: Vec<f64> = ["p50_s", "p90_s", "p99_s", "max_s"].iter().map(|key| number(row, key)).collect();
     assert!(quantiles[0] > 0.03 && quantiles.is_sorted(), "{row}");
-    // A leader says fifty heartbeats a second, everybody ten beacons.
+    // A leader sends fifty heartbeats per second, every drone ten beacons.
     assert!((12.0..40.0).contains(&number(row, "frames_per_s")), "{row}");
     assert!(number(row, "bytes_per_s") > 50.0 * number(row, "frames_per_s"), "{row}");
 }
 
 #[test]
-fn leaders_die_in_lockstep_and_the_figures_are_the_same_each_time() {
+fn lockstep_gives_the_same_figures_each_time() {
     let place = Place::new();
     let args = ["--clock", "lockstep", "--kills", "12", "--loss", "0,0.5", "--delay", "0,0.1"];
     let first = rows(&bench(&place, &[&args[..], &["--out", "failover.json"]].concat()));
@@ -45,7 +45,7 @@ fn leaders_die_in_lockstep_and_the_figures_are_the_same_each_time() {
     for (row, (delay_s, loss, p99_s)) in
         first.iter().zip([(0.0, 0.0, 0.1), (0.0, 0.5, 1.0), (0.1, 0.0, 0.6), (0.1, 0.5, 1.5)])
     {
-        assert_sane(row, "lockstep", 12);
+        assert_consistent(row, "lockstep", 12);
         assert_eq!((number(row, "delay_s"), number(row, "loss")), (delay_s, loss));
         assert_eq!(
             (&row["kills"], &row["replaced"], &row["false_elections"]),
@@ -61,12 +61,12 @@ fn leaders_die_in_lockstep_and_the_figures_are_the_same_each_time() {
 }
 
 #[test]
-fn processes_are_killed_by_the_wall_clock_and_nothing_is_left() {
+fn killed_processes_leave_nothing_behind_by_the_wall_clock() {
     let place = Place::new();
     let rows = rows(&bench(&place, &["--clock", "realtime", "--quick", "--kills", "3", "--loss", "0"]));
     let [row] = &rows[..] else { panic!("{rows:?}") };
-    assert_sane(row, "realtime", 3);
-    // A machine that is too busy to keep time flies another mission.
+    assert_consistent(row, "realtime", 3);
+    // On a machine that is too busy to keep time, the flight is another one.
     if row["deadline_misses"] == 0 {
         assert_eq!(
             (&row["kills"], &row["replaced"], &row["false_elections"]),
@@ -77,7 +77,7 @@ fn processes_are_killed_by_the_wall_clock_and_nothing_is_left() {
 }
 
 #[test]
-fn what_cannot_be_flown_starts_nothing() {
+fn impossible_options_start_nothing() {
     let place = Place::new();
     let bad =
         [(&["--kills", "0"][..], "--kills"), (&["--loss", "2"], "radio.loss"), (&["--delay=-1"], "radio.delay_s")];

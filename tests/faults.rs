@@ -1,4 +1,4 @@
-//! Scheduled faults: every kind gives one digest in both runtimes, and those of processes are done to real processes.
+//! Scheduled faults: every kind gives one digest in both runtimes, and process faults are carried out on real processes.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use support::process::{Role, is_alive, pid_of, read, state};
 use support::{Flight, Place, eventually, faults};
 
-/// Every kind in a short flight, which ends by its time: what `--set fault=…` says, and what the summary has to tell.
+/// Every kind of fault in a short flight that ends by time-out: the value of `--set fault.0=…`, and what the summary must say.
 const KINDS: [(&str, &str, Option<u64>); 10] = [
     ("kind=\"kill\", on=\"detected\", target=\"leader\"", "kill", Some(0)),
     ("kind=\"freeze\", at_s=3, drone=4, for_s=2", "freeze", Some(4)),
@@ -62,7 +62,7 @@ fn every_kind_gives_one_digest_in_both_runtimes() {
 }
 
 #[test]
-fn frames_that_are_cut_off_are_counted_by_their_reason() {
+fn refused_frames_are_counted_by_reason() {
     let place = Place::new();
     let dropped = |fault: &str, out: &str| short(&place, fault, "inline", out)["messages"]["dropped"].clone();
     let wall = dropped(KINDS[6].0, "wall");
@@ -73,7 +73,7 @@ fn frames_that_are_cut_off_are_counted_by_their_reason() {
     }
 }
 
-/// Lockstep with short ticks, so that there is time to look at processes.
+/// Lockstep with short ticks, so that there is time to look at the processes.
 fn take_off(place: &Place, fault: &str) -> (Flight, Vec<Role>) {
     let set = format!("fault=[{{ {fault} }}]");
     let args = ["--set", "time.dt_s=0.0005", "--set", "time.timeout_s=8", "--set", &set];
@@ -83,7 +83,7 @@ fn take_off(place: &Place, fault: &str) -> (Flight, Vec<Role>) {
 }
 
 #[test]
-fn a_killed_process_is_gone_and_the_others_fly_on() {
+fn a_killed_process_has_ended_and_the_others_fly_on() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, "kind=\"kill\", at_s=1, drone=5");
     let pid = pid_of(&processes, "drone", Some(5));
@@ -108,7 +108,7 @@ fn a_frozen_process_is_stopped_and_continued() {
 }
 
 #[test]
-fn a_restarted_drone_has_another_process() {
+fn a_restarted_drone_has_a_new_process() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, "kind=\"restart\", at_s=1, drone=5, for_s=0.5");
     let first = pid_of(&processes, "drone", Some(5));

@@ -1,4 +1,4 @@
-//! One command flies the paper's missions: its numbers are met, and every way of flying one gives the same digest.
+//! One command flies the paper's missions. It meets the published numbers, and every way to fly a mission gives the same digest.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -9,14 +9,15 @@ use support::{Place, assert_near, number};
 
 const PAPER: [&str; 2] = ["--strategy", "congestion-aware-paper"];
 const SHORTEST: [&str; 2] = ["--strategy", "shortest-path"];
-/// Parts of the published times and energies that ours may be off.
+/// Greatest relative deviation from the published times and energies.
 const TIME: f64 = 0.05;
 const ENERGY: f64 = 0.04;
-/// The same for forecasts, s, and for what mirroring changes.
+/// Greatest deviation of a forecast, s.
 const FORECAST_S: f64 = 0.15;
+/// Greatest relative difference between a flight and its mirror image.
 const MIRROR: f64 = 0.005;
 
-/// What the reference gives for a geometry, obstacle on the right: centred, the paper's rule, shortest path.
+/// The published numbers of a geometry with the obstacle on the right: centred, the paper's rule, shortest path.
 struct Geometry {
     name: &'static str,
     pass_s: [f64; 3],
@@ -53,7 +54,7 @@ const GEOMETRIES: [Geometry; 3] = [
     },
 ];
 
-/// Inline and without a record: the fast way.
+/// Flies inline and without a record, which is fast.
 fn inline(name: &str, args: &[&str]) -> Value {
     Place::new().fly(name, &[&["--runtime", "inline", "--no-record"], args].concat())
 }
@@ -83,7 +84,7 @@ fn assert_safe(summary: &Value, separation_m: f64) {
 }
 
 #[test]
-fn ten_processes_fly_s2_as_the_reference_does() {
+fn ten_processes_fly_s2_as_published() {
     let place = Place::new();
     let done = place.take_off("s2-right", &PAPER).finish();
     assert_eq!(done.code, Some(0), "{done:?}");
@@ -113,7 +114,7 @@ fn centred_obstacles_split_the_swarm_in_halves() {
 }
 
 #[test]
-fn shifted_obstacles_send_six_round_the_short_side() {
+fn six_drones_pass_a_shifted_obstacle_on_its_short_side() {
     for geometry in &GEOMETRIES {
         let (right, left) = both_sides(geometry, &PAPER, [6, 2], 1);
         assert_near("energy", energy_j(&right), geometry.energy_j[0], ENERGY);
@@ -134,7 +135,7 @@ fn the_shortest_path_costs_more_time_and_energy() {
     }
 }
 
-/// Flies a geometry with its obstacle on either side; both must split and pass as the reference does.
+/// Flies a geometry with its obstacle on either side. Both flights must split and pass as published.
 fn both_sides(geometry: &Geometry, strategy: &[&str], wanted: [u32; 2], row: usize) -> (Value, Value) {
     let fly = |side: &str, wanted: [u32; 2]| {
         let name = format!("{}-{side}", geometry.name);
@@ -154,7 +155,7 @@ fn assert_forecast(summary: &Value, wanted_s: f64) {
 }
 
 #[test]
-fn fixed_splits_are_flown_as_told_and_the_best_is_the_rules() {
+fn fixed_splits_are_flown_and_the_rule_takes_the_best_of_them() {
     let times = ["4/4", "6/2", "8/0"].map(|told| {
         let summary = inline("s2-right", &["--strategy", &format!("fixed:{told}")]);
         let flown: Vec<u64> = split(&summary).as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
@@ -186,7 +187,7 @@ fn processes_and_inline_give_the_same_digest() {
 }
 
 #[test]
-fn delay_and_loss_change_the_digest_and_not_its_sameness() {
+fn both_runtimes_give_the_same_digest_with_delay_and_loss() {
     let rough = ["--set", "radio.delay_s=0.1", "--set", "radio.loss=0.2", "--seed"];
     let with = |seed| [&rough[..], &[seed]].concat();
     let digests = ["1", "2", "3"].map(|seed| assert_same_digest("s2-right", &with(seed), &[]));
@@ -201,7 +202,7 @@ fn delay_and_loss_change_the_digest_and_not_its_sameness() {
 }
 
 #[test]
-fn the_way_of_waiting_and_pinning_does_not_matter() {
+fn waiting_and_pinning_do_not_change_the_digest() {
     let ways: [&[&str]; 3] = [&["--wait", "yield"], &["--pin", "off"], &["--wait", "yield", "--pin", "off"]];
     for way in ways {
         assert_same_digest("s1-centred", &[], way);
@@ -209,7 +210,7 @@ fn the_way_of_waiting_and_pinning_does_not_matter() {
 }
 
 #[test]
-fn ten_flights_with_all_cores_busy_give_one_digest() {
+fn ten_flights_on_busy_cores_give_one_digest() {
     let busy = AtomicBool::new(true);
     let wanted = digest(&inline("s2-right", &[])).to_owned();
     std::thread::scope(|scope| {
@@ -224,7 +225,7 @@ fn ten_flights_with_all_cores_busy_give_one_digest() {
             let done = Place::new().take_off("s2-right", &[]).finish();
             (done.code == Some(0)).then(|| digest(&done.summary()).to_owned())
         };
-        // The threads must end before anything fails, or the failure would wait for them for ever.
+        // The threads must end before an assertion fails. Otherwise the failing test would wait for them for ever.
         let found: Vec<_> = (0..10).map(|_| std::panic::catch_unwind(fly)).collect();
         busy.store(false, Ordering::Relaxed);
         for digest in found {

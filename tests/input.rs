@@ -1,5 +1,5 @@
-//! Bad input is refused with 2, in words that say where and what was expected, and nothing is started; good input gives
-//! the files and outputs that scripts rely on.
+//! Bad input ends with exit code 2 and a message that says where it is and what was expected, and starts nothing. Good
+//! input gives the files and outputs that scripts rely on.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use support::{Done, Place, json as read_json, names, paper};
 
-/// A mission of two seconds in simulated time, to be flown without obstacle.
+/// A mission without obstacles that ends after two simulated seconds.
 const SHORT: &str = "[formation]\nshape = \"v\"\ndrones = 3\nspacing_m = 60\n[time]\ntimeout_s = 2\n";
 const BOX: &str = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\n";
 
-/// Neither help nor a panic: a message for people, on stderr alone, and no process, domain or folder.
+/// The command ended with code 2 and a readable message on stderr alone. It made no process, domain or folder.
 fn assert_refused(place: &Place, done: &Done, wanted: &[&str]) {
     assert_eq!(done.code, Some(2), "{done:?}");
     assert_eq!(done.stdout, "", "{done:?}");
@@ -23,7 +23,7 @@ fn assert_refused(place: &Place, done: &Done, wanted: &[&str]) {
     place.assert_untouched(done);
 }
 
-/// `run` and `check` refuse the same files in the same words.
+/// `run` and `check` refuse a file with the same message.
 fn refused(content: &[u8], wanted: &[&str]) {
     let place = Place::new();
     std::fs::write(place.join("bad.toml"), content).unwrap();
@@ -33,7 +33,7 @@ fn refused(content: &[u8], wanted: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_scenario() {
+fn files_that_hold_no_scenario_are_refused() {
     refused(b"", &["bad.toml:1:1: formation: ", "required"]);
     refused(b"\x7fELF\x02\x01\x00\xff\xfe\x00\x80", &["bad.toml:1:", "expected UTF-8 text"]);
     refused(b"[formation\n", &["bad.toml:1:"]);
@@ -75,7 +75,7 @@ fn obstacles_must_have_a_size_and_keep_clear_of_slots() {
 }
 
 #[test]
-fn arguments_that_make_no_sense() {
+fn arguments_without_a_meaning_are_refused() {
     let cases: [(&[&str], &[&str]); 14] = [
         (&["--set", "drone"], &["--set", "expected key.path=value"]),
         (&["--set", "drone.speed=3"], &["drone.speed: unknown key", "`speed_mps`"]),
@@ -130,7 +130,7 @@ fn an_existing_folder_is_refused_unless_forced() {
 }
 
 #[test]
-fn a_goal_that_is_not_reached_in_time_gives_1() {
+fn a_goal_that_is_not_reached_in_time_gives_exit_code_1() {
     let place = Place::new();
     std::fs::write(place.join("short.toml"), SHORT).unwrap();
     for runtime in ["processes", "inline"] {
@@ -178,7 +178,7 @@ fn help_version_schemas_completions_and_manual_go_to_stdout() {
     }
 }
 
-/// Each required key is there and of a type that the schema allows; no key is there that it does not know.
+/// The value has every required key, each with a type that the schema allows, and no other key.
 fn assert_valid(value: &Value, schema: &Value, root: &Value, at: &str) {
     let name = schema["$ref"].as_str();
     if let Some(pointer) = name.and_then(|name| name.strip_prefix('#')) {
@@ -245,7 +245,7 @@ fn the_summary_follows_its_schema_and_its_contract() {
 }
 
 #[test]
-fn quiet_is_quiet_and_colour_is_for_terminals() {
+fn quiet_prints_nothing_and_colour_is_for_terminals() {
     let place = Place::new();
     let scenario = paper("s1-centred");
     let quiet = place.run(&["run", &scenario, "--quiet", "--runtime", "inline"]);
@@ -273,9 +273,9 @@ fn no_color_is_honoured_on_a_terminal() {
         command.output().ok().map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
     };
     let (Some(with), Some(without)) = (terminal(false), terminal(true)) else {
-        return eprintln!("no `script` here: colours were not looked at");
+        return eprintln!("skipped: the command `script` is missing");
     };
-    // Moving the cursor is no colour: those sequences end in `m`.
+    // Only sequences that end in `m` set a colour. Others move the cursor.
     let coloured = |text: &str| {
         let mut sequences = text.split("\u{1b}[").skip(1);
         sequences.any(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';').starts_with('m'))
@@ -285,7 +285,7 @@ fn no_color_is_honoured_on_a_terminal() {
 }
 
 #[test]
-fn a_runs_folder_holds_what_was_promised() {
+fn a_runs_folder_holds_all_documented_files() {
     let place = Place::new();
     let done = place.run(&["run", &paper("s2-right"), "--json"]);
     let (summary, folder) = (done.summary(), place.join("runs/s2-right-1"));
@@ -305,7 +305,7 @@ fn a_runs_folder_holds_what_was_promised() {
     assert_eq!(lines.next(), Some("t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j"));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == 9));
-    assert_eq!(rows.len() as u64, 8 * summary["ticks"].as_u64().unwrap(), "a row a drone and tick");
+    assert_eq!(rows.len() as u64, 8 * summary["ticks"].as_u64().unwrap(), "one row per drone and tick");
     let last: f64 = rows[rows.len() - 1][0].parse().unwrap();
     assert_eq!(json!(last), summary["sim_s"]);
     let events = std::fs::read_to_string(folder.join("events.jsonl")).unwrap();
@@ -318,7 +318,7 @@ fn a_runs_folder_holds_what_was_promised() {
 }
 
 #[test]
-fn without_a_record_there_is_a_summary_alone() {
+fn without_a_record_only_the_summary_is_written() {
     let place = Place::new();
     std::fs::write(place.join("short.toml"), SHORT).unwrap();
     place.run(&["run", "short.toml", "--no-record", "--quiet", "--out", "out"]);

@@ -1,5 +1,5 @@
-//! Life and death: interruptions end cleanly, killed launchers and worlds leave no process behind, and a mission flies
-//! on without a drone that was killed.
+//! Interruptions end a run cleanly, killed launchers and worlds leave no process behind, and a mission continues without a
+//! drone that was killed.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -10,12 +10,12 @@ use std::time::{Duration, Instant};
 use support::process::{Role, is_alive, pid_of, shared_files, signal, state};
 use support::{Done, Flight, Place, eventually, faults, number};
 
-/// Wall clock, fast, for what must happen in flight: S2 takes some three seconds.
+/// A fast wall clock, for tests that act during the flight: S2 takes about three seconds.
 const REALTIME: [&str; 2] = ["--clock", "realtime:20"];
-/// Lockstep with short ticks, so that the flight takes some seconds too.
+/// Lockstep with short ticks, so that the flight takes some seconds as well.
 const LOCKSTEP: [&str; 4] = ["--clock", "lockstep", "--set", "time.dt_s=0.0005"];
-/// Processes of a launcher that was killed may live for so long.
-const LAST_WORDS: Duration = Duration::from_secs(2);
+/// Processes of a killed launcher must have ended after this.
+const END_LIMIT: Duration = Duration::from_secs(2);
 
 fn take_off(place: &Place, args: &[&str]) -> (Flight, Vec<Role>) {
     let mut flight = place.take_off("s2-right", args);
@@ -27,7 +27,7 @@ fn summary_file(place: &Place) -> Value {
     support::json(place.join("out/summary.json"))
 }
 
-/// Ended by a signal that the launcher took: code, summary, nothing left.
+/// The launcher ended on a signal: it has the exit code, it wrote its summary, and nothing is left.
 fn assert_aborted(place: &Place, done: &Done, code: i32) {
     assert_eq!(done.code, Some(code), "{done:?}");
     assert_eq!(summary_file(place)["outcome"], "aborted", "{done:?}");
@@ -84,15 +84,15 @@ fn inline_runs_are_interrupted_too() {
     assert_eq!(summary_file(&place)["outcome"], "aborted");
 }
 
-/// No process of the run lives two seconds later.
+/// No process of the run lives longer than two seconds.
 fn assert_all_die(processes: &[Role], since: Instant) {
     eventually("all processes of the run end", || processes.iter().all(|process| !is_alive(process.pid)));
-    assert!(since.elapsed() < LAST_WORDS, "they lived for {:?}", since.elapsed());
+    assert!(since.elapsed() < END_LIMIT, "they lived for {:?}", since.elapsed());
 }
 
-/// What a killed launcher leaves is found, and removed by `clean` or by the next run.
+/// What a killed launcher leaves behind is removed by `clean` or by the next run.
 #[test]
-fn a_killed_launcher_takes_its_processes_along_and_the_next_run_cleans_up() {
+fn processes_end_with_a_killed_launcher_and_the_next_run_cleans_up() {
     for (clock, cleaner) in [(&LOCKSTEP[..], "clean"), (&REALTIME[..], "clean"), (&REALTIME[..], "run")] {
         let place = Place::new();
         let (mut flight, processes) = take_off(&place, clock);
@@ -127,7 +127,7 @@ fn when_all_are_killed_the_next_run_works() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, &REALTIME);
     let (killed, launcher) = (Instant::now(), flight.pid());
-    // The launcher last: until then it looks after the others. Some may have been ended by it.
+    // The launcher is killed last. Until then it may end some of the others itself.
     let all: Vec<String> = processes.iter().rev().map(|process| process.pid.to_string()).collect();
     let script = format!("kill -s KILL {}", all.join(" "));
     std::process::Command::new("sh").args(["-c", &script]).status().unwrap();
@@ -152,10 +152,10 @@ fn without_its_world_a_run_is_aborted() {
     }
 }
 
-/// Simulated seconds a second in flights from which a drone is taken.
+/// Simulated seconds per second in flights that lose a drone.
 const SPEED: f64 = 10.0;
 
-/// Ends a drone's process at about a time of the flight, later on a busy machine, and gives the summary.
+/// Ends a drone's process at about this time of the flight, later on a busy machine. Returns the summary.
 fn without(drone: u64, at_s: f64, how: &str) -> Value {
     let place = Place::new();
     let (flight, processes) = take_off(&place, &["--clock", &format!("realtime:{SPEED}")]);
@@ -173,7 +173,7 @@ fn without(drone: u64, at_s: f64, how: &str) -> Value {
     summary
 }
 
-/// The one fault of the run, in its events as in its summary.
+/// The run has this one fault, in its events and in its summary.
 fn assert_unscheduled(folder: &Path, summary: &Value, drone: u64, kind: &str) {
     let events = faults(folder);
     assert_eq!(events.len(), 1, "{events:?}");
@@ -187,7 +187,7 @@ fn assert_unscheduled(folder: &Path, summary: &Value, drone: u64, kind: &str) {
 }
 
 #[test]
-fn a_member_killed_in_cruise_is_missed_and_the_mission_flies_on() {
+fn a_member_killed_in_cruise_is_lost_and_the_mission_continues() {
     let summary = without(7, 1.0, "KILL");
     assert_eq!(summary["drones"], 8, "as many as there were at the start");
     let split = summary["stages"][0]["split"].as_array().unwrap();
@@ -195,14 +195,14 @@ fn a_member_killed_in_cruise_is_missed_and_the_mission_flies_on() {
 }
 
 #[test]
-fn a_member_killed_in_the_queue_is_missed_and_the_mission_flies_on() {
+fn a_member_killed_in_the_queue_is_lost_and_the_mission_continues() {
     without(3, 20.0, "KILL");
 }
 
 #[test]
-fn a_member_killed_while_reforming_is_missed_and_the_mission_flies_on() {
+fn a_member_killed_while_reforming_is_lost_and_the_mission_continues() {
     without(3, 40.0, "KILL");
-    // Drone 3 then hovers where another one has to pass by.
+    // Drone 3 then hovers where another drone has to pass.
     without(3, 46.0, "KILL");
 }
 
@@ -224,12 +224,12 @@ fn a_leader_killed_in_the_queue_or_while_reforming_does_not_end_the_mission() {
 }
 
 #[test]
-fn a_drone_that_ends_in_another_way_is_dead_as_well() {
+fn a_drone_process_that_ends_by_another_signal_is_dead_as_well() {
     without(6, 5.0, "TERM");
 }
 
 #[test]
-fn a_drone_killed_in_lockstep_is_missed_too() {
+fn a_drone_killed_in_lockstep_is_lost_and_the_mission_continues() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, &LOCKSTEP);
     flight.wait_until(1.0);
@@ -240,7 +240,7 @@ fn a_drone_killed_in_lockstep_is_missed_too() {
 }
 
 #[test]
-fn a_stopped_drone_is_hung_in_lockstep_and_the_mission_flies_on() {
+fn a_stopped_drone_is_hung_in_lockstep_and_the_mission_continues() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, &LOCKSTEP);
     flight.wait_until(1.0);
@@ -253,7 +253,7 @@ fn a_stopped_drone_is_hung_in_lockstep_and_the_mission_flies_on() {
 }
 
 #[test]
-fn a_stopped_drone_holds_nobody_up_by_the_wall_clock() {
+fn a_stopped_drone_does_not_delay_the_others_by_the_wall_clock() {
     let place = Place::new();
     let (mut flight, processes) = take_off(&place, &REALTIME);
     flight.wait_until(1.0);

@@ -1,4 +1,4 @@
-//! The page in a real browser: the report of a run, and a live swarm.
+//! The page in a real browser: the report of a run, and a running swarm.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -9,18 +9,18 @@ use std::process::{Child, Stdio};
 use support::Place;
 use support::browser::Browser;
 
-/// A fingerprint of what the canvas shows, and how many of its points are not empty.
+/// A hash of the picture on the canvas, and the number of its points that are not empty.
 const SEEN: &str = "(() => { const c = document.getElementById('scene');
     const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
     let sum = 0, some = 0; for (let i = 0; i < d.length; i += 4) { if (d[i + 3]) some++; sum = (sum * 31 + d[i] + d[i + 3]) | 0; }
     return [sum, some]; })()";
 
-/// Waits for the next picture.
+/// Waits until the page has drawn the next picture.
 fn pictured(browser: &mut Browser) {
     browser.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))");
 }
 
-/// Chooses a drone as a person does.
+/// Selects a drone as a user does.
 fn choose(browser: &mut Browser, drone: u32) {
     browser.value(&format!(
         "(() => {{ const s = document.getElementById('selected'); s.value = '{drone}';
@@ -41,7 +41,7 @@ fn a_report_replays_offline() {
     pictured(&mut browser);
     let start = browser.value(SEEN);
     assert!(start[1].as_u64().unwrap() > 1000, "the canvas is empty: {start}");
-    // The slider, moved as by hand.
+    // This moves the slider as a user does.
     browser.value(
         "(() => { const t = document.getElementById('time'); t.value = 20; t.dispatchEvent(new Event('input')); return true; })()",
     );
@@ -71,7 +71,7 @@ fn a_report_replays_offline() {
     assert_eq!(browser.requests.iter().filter(elsewhere).collect::<Vec<_>>(), Vec::<&String>::new());
 }
 
-/// `skein view`, ended when dropped.
+/// A running `skein view`. Dropping this ends it.
 struct View {
     child: Child,
     url: String,
@@ -85,7 +85,7 @@ impl View {
         Self { child, url: url.trim().to_owned() }
     }
 
-    /// The status line of the answer to a request.
+    /// Sends a request and returns the status line of the answer.
     fn ask(&self, lines: &[&str]) -> String {
         let address = self.url.trim_start_matches("http://").trim_end_matches('/');
         let mut stream = TcpStream::connect(address).unwrap();
@@ -103,7 +103,7 @@ impl Drop for View {
 }
 
 #[test]
-fn a_live_swarm_is_seen_flying() {
+fn the_page_shows_a_running_swarm() {
     let place = Place::new();
     let Some(mut browser) = Browser::start(&place.join("profile")) else { return };
     let view = View::start(&place, &[]);
@@ -131,7 +131,7 @@ fn a_live_swarm_is_seen_flying() {
 }
 
 #[test]
-fn strangers_are_refused() {
+fn requests_from_other_origins_are_refused() {
     let place = Place::new();
     let view = View::start(&place, &[]);
     assert!(view.url.starts_with("http://127.0.0.1:"), "{}", view.url);

@@ -1,4 +1,4 @@
-//! Every drone is a process of its own, in a domain of its own, by either clock.
+//! Every drone is a process, every run has a domain of its own, by either clock.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use support::process::{group, is_alive, pid_of, shared_files};
 use support::{Done, Place, names, number, paper};
 
-/// Wall clock, fast: the flight of S2 takes some five seconds.
+/// A fast wall clock: the flight of S2 takes about five seconds.
 const REALTIME: [&str; 2] = ["--clock", "realtime:10"];
-/// A formation of three that ends after about five simulated seconds: it has nothing to avoid.
+/// A formation of three without obstacles. Its mission ends after about five simulated seconds.
 const SHORT: &str = "name = \"short\"\n[formation]\nshape = \"v\"\ndrones = 3\nspacing_m = 60\n\
     [mission]\nend = \"goal\"\ngoal_m = [50, 0]\n";
 
@@ -28,7 +28,7 @@ fn reached(done: &Done) -> Value {
 }
 
 #[test]
-fn ten_processes_live_while_it_flies_and_are_gone_after() {
+fn ten_processes_live_during_the_flight_and_have_ended_after_it() {
     let place = Place::new();
     let mut flight = place.take_off("s2-right", &REALTIME);
     let processes = flight.processes();
@@ -47,7 +47,7 @@ fn ten_processes_live_while_it_flies_and_are_gone_after() {
         let words: Vec<&[u8]> = runs.split(|&byte| byte == 0).collect();
         assert_eq!(words[1], word.as_bytes(), "{process:?}");
     }
-    // A terminal's Ctrl-C reaches the launcher's group, and must reach the launcher alone.
+    // Ctrl-C in a terminal reaches the launcher's process group. It must reach only the launcher.
     let launcher = group(flight.pid());
     assert!(processes[1..].iter().all(|process| group(process.pid) != launcher), "{processes:?}");
     assert!(!shared_files(flight.pid()).is_empty(), "its shared memory is not named skein_<pid>_");
@@ -79,7 +79,7 @@ fn the_wall_clock_gives_lockstep_s_digest_unless_it_missed_a_tick() {
     assert_eq!(lockstep["deadline_misses"], 0);
     assert_eq!(lockstep["clock"], "lockstep");
     let mut missed = 0.0;
-    // A tick may be missed whenever this machine is busy: several tries.
+    // A busy machine may miss a tick, so there are several tries.
     for _ in 0..5 {
         let done = place.run(&["run", &scenario, "--json", "--clock", "realtime:5"]);
         let realtime = reached(&done);
@@ -97,12 +97,12 @@ fn the_wall_clock_gives_lockstep_s_digest_unless_it_missed_a_tick() {
 }
 
 #[test]
-fn a_clock_too_fast_misses_ticks_and_says_so() {
+fn a_clock_that_is_too_fast_misses_ticks_and_reports_them() {
     let place = Place::new();
     let done = place.run(&["run", &short(&place), "--json", "--out", "out", "--clock", "realtime:100000"]);
     let summary = done.summary();
     assert!(number(&summary, "/deadline_misses") > 0.0, "{summary}");
-    // Without answers nobody steers: whatever comes of it, code and outcome say the same.
+    // Drones that miss ticks do not steer. The outcome may be any, but the exit code must agree with it.
     let code = match summary["outcome"].as_str() {
         Some("reached") => 0,
         Some("timeout") => 1,

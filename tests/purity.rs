@@ -1,4 +1,4 @@
-//! What a crate may know: pure crates no clock, thread, file or iceoryx2, and dependencies run one way.
+//! What a crate may depend on: pure crates know no clock, thread, file or iceoryx2, and dependencies run one way.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
@@ -9,7 +9,7 @@ use std::process::Command;
 
 const PURE: [&str; 5] = ["protocol", "leader", "agent", "world", "scenario"];
 
-/// What each package may name directly among ours.
+/// The workspace packages that each package may depend on.
 const DIRECTIONS: [(&str, &[&str]); 9] = [
     ("skein-protocol", &[]),
     ("skein-leader", &["skein-protocol"]),
@@ -45,7 +45,7 @@ const DIRECTIONS: [(&str, &[&str]); 9] = [
     ),
 ];
 
-/// Packages that bring processes, threads, files, clocks, sockets or the system's randomness along.
+/// Packages that give access to processes, threads, files, clocks, sockets or the system's randomness.
 const IMPURE: [&str; 24] = [
     "async-std",
     "chrono",
@@ -73,7 +73,7 @@ const IMPURE: [&str; 24] = [
     "web-time",
 ];
 
-/// What a pure crate's source must not name.
+/// Words that the sources of a pure crate must not contain.
 const FORBIDDEN: [&str; 21] = [
     "Instant",
     "SystemTime",
@@ -107,8 +107,8 @@ fn packages() -> Vec<Package> {
     command.manifest_path(root().join("Cargo.toml")).no_deps().exec().unwrap().packages
 }
 
-/// Packages that one of ours needs when it runs, with all that those need: for itself, since features that another
-/// package turns on are not its fault. Procedural macros run in the compiler.
+/// All packages that one of ours needs at run time, with its own features only. Procedural macros run in the compiler and do
+/// not count.
 fn needs(package: &str) -> BTreeSet<String> {
     let mut command = Command::new(env!("CARGO"));
     command.args(["tree", "-p", package, "--all-features", "-e", "normal,no-proc-macro", "--prefix", "none"]);
@@ -125,7 +125,7 @@ fn pure_crates_need_nothing_impure() {
         let impure: Vec<_> = all.iter().filter(|n| n.starts_with("iceoryx2") || IMPURE.contains(&n.as_str())).collect();
         assert!(impure.is_empty(), "{pure} needs {impure:?}");
     }
-    // The same look finds them where they are.
+    // The check finds impure packages where there are some.
     let bus = needs("skein-bus");
     assert!(bus.contains("iceoryx2") && bus.contains("rustix"), "{bus:?}");
 }
@@ -184,10 +184,10 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let test = path.file_stem().is_some_and(|stem| stem == "tests" || stem == "testing");
-        match path.is_dir() {
-            true => sources(&path, found),
-            false if !test && path.extension().is_some_and(|extension| extension == "rs") => found.push(path),
-            false => {}
+        if path.is_dir() {
+            sources(&path, found);
+        } else if !test && path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
         }
     }
 }

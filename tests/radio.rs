@@ -1,4 +1,4 @@
-//! Whatever the air does, processes and inline fly the same mission to the bit, and the summary tells what was heard.
+//! With every radio model, both runtimes give the same digest, and the summary counts what was received.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -6,7 +6,7 @@ mod support;
 use serde_json::Value;
 use support::{Place, number, paper};
 
-/// Ten seconds of S2 over this `[radio]`: as far as the first plans.
+/// Flies S2 with this `[radio]` for ten seconds, until after the first plans.
 fn fly(place: &Place, runtime: &str, radio: &str) -> Value {
     let scenario = std::fs::read_to_string(paper("s2-right")).unwrap();
     let file = place.join("s2-radio.toml");
@@ -16,7 +16,7 @@ fn fly(place: &Place, runtime: &str, radio: &str) -> Value {
     done.summary()
 }
 
-/// Flies in both runtimes; gives the summary.
+/// Flies in both runtimes and asserts that the digests are equal. Returns the summary.
 fn same(radio: &str) -> Value {
     let [processes, inline] = ["processes", "inline"].map(|runtime| fly(&Place::new(), runtime, radio));
     for key in ["digest", "ticks", "energy_j", "messages"] {
@@ -58,7 +58,7 @@ fn every_preset_gives_one_digest_in_both_runtimes() {
 }
 
 #[test]
-fn the_summary_tells_drops_by_reason_and_copies_apart() {
+fn the_summary_counts_drops_by_reason_and_duplicates_apart() {
     let place = Place::new();
     let twice = fly(&place, "inline", "duplicate = 1");
     let ideal = fly(&place, "inline", "");

@@ -1,4 +1,4 @@
-//! `skein reproduce`: the published numbers beside ours.
+//! `skein reproduce` puts the published numbers beside ours.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use support::{Place, assert_near, names};
 
-/// REPRODUCTION's numbers and the tolerance of each: a part of it, or an absolute one.
+/// The published numbers and the tolerance of each, relative or absolute.
 enum Within {
     Part(f64),
     Absolute(f64),
@@ -71,7 +71,7 @@ fn reproduced(place: &Place) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn the_published_numbers_are_met_and_the_report_is_whole() {
+fn the_published_numbers_are_met_and_the_report_is_complete() {
     let place = Place::new();
     let rows = reproduced(&place);
     numbers(&rows);
@@ -143,26 +143,26 @@ fn report(place: &Place) {
     }
     let csv = fs::read_to_string(place.join("paper/results.csv")).unwrap();
     let mut failed = csv.lines().skip(1).filter(|line| line.split(',').nth(4) != Some("reached"));
-    // With the safe distance that close to the spacing, half a second to react leaves no room for the formation.
+    // The safe distance is close to the spacing. With a reaction time of half a second the formation has no room.
     assert!(failed.all(|line| line.starts_with("s1-right") && line.contains("reaction_time_s=0.5")), "{csv}");
     assert_eq!(csv.lines().filter(|line| line.contains("--seed")).count(), 8 * 2 * 3);
     let gain = fs::read_to_string(place.join("paper/gain.csv")).unwrap();
     assert_eq!(gain.lines().count(), 1 + 4 * 4 * 2, "a line a place and rule: {gain}");
 }
 
-/// What the paper leaves open, shown both ways (REPRODUCTION.md: what was learned).
+/// What the paper leaves open, flown both ways.
 fn beside_the_paper(rows: &BTreeMap<String, Value>) {
     let ours = |id: &str| rows[id]["ours"].as_f64().unwrap_or_else(|| panic!("{id} has no number"));
     let ratio = |case: &str| {
         ours(&format!("{case}.shortest-path.total")) / ours(&format!("{case}.congestion-aware-paper.total"))
     };
-    // The gain needs the queue: without its law it shrinks in open space, and turns.
+    // The gain depends on the queue. Without the queue law it shrinks in open space and may become a loss.
     for scenario in ["s1-right", "s2-right", "s3b-right"] {
         let [with, without] = ["true", "false"].map(|queue| ratio(&format!("ablation.{scenario}.queue-{queue}")));
         assert!(with > 1.1 && without < with - 0.05, "{scenario}: {with}, {without}");
     }
     assert!(ratio("ablation.s1-right.queue-false") < 1.0 && ratio("ablation.s3b-right.queue-false") < 1.0);
-    // In a gap for one drone it is real with the law; without it whoever goes through crowds, by either rule.
+    // In a gap for one drone the gain is real with the law. Without it, drones crowd in the gap by either rule.
     assert!(ratio("narrow.gap-40.queue-true") > 1.1);
     for strategy in ["congestion-aware-paper", "shortest-path"] {
         let energy = |queue: &str| ours(&format!("narrow.gap-40.queue-{queue}.{strategy}.total"));
@@ -172,19 +172,19 @@ fn beside_the_paper(rows: &BTreeMap<String, Value>) {
     for geometry in ["S1", "S2"] {
         assert!(ratio(&format!("ends.{geometry}.goal")) < ratio(&format!("ends.{geometry}.hold")));
     }
-    // Least time is not least energy: somewhere the gain is negative.
+    // Least time is not least energy: in some cases the gain is negative.
     assert!(ours("gain.energy.congestion-aware-paper.least") < -1.0);
     assert!(ours("gain.energy.congestion-aware-paper.most") > 10.0);
-    // A time to react costs hardly anything where there is room, and no distance.
+    // Where there is room, a reaction time costs little energy and breaks no distance.
     let reacting = |t_c: &str, what: &str| ours(&format!("E4.S2.congestion-aware-paper.t_c-{t_c}.{what}"));
     assert!(["0.2", "0.5"].iter().all(|t_c| (reacting(t_c, "total") / reacting("0", "total") - 1.0).abs() < 0.05));
     assert!(["0", "0.2", "0.5"].iter().all(|t_c| reacting(t_c, "separation") >= 37.0));
-    // The swarm is torn apart at the wide obstacle, less so at the two small ones, and whole again at the end.
+    // The formation is deformed most at the wide obstacle, less at the two small ones, and not at the end.
     assert!(ours("E6.disturbance.1") > 2.0 * ours("E6.disturbance.2") && ours("E6.disturbance.2") > 10.0);
     assert!(ours("E6.bending") > 100.0 && (ours("R5.disturbance") - 43.0).abs() < 4.0);
 }
 
-/// The command of a row gives its number.
+/// The command of a row gives the row's number again.
 fn commands(place: &Place, rows: &BTreeMap<String, Value>) {
     let row = &rows["R3.S2.time"];
     let command =
@@ -195,7 +195,7 @@ fn commands(place: &Place, rows: &BTreeMap<String, Value>) {
     assert!((time_s - row["ours"].as_f64().unwrap()).abs() < 1e-3, "{time_s}, {row}");
 }
 
-/// An existing folder is refused, and one that is not a report's also with --force.
+/// An existing folder is refused. With --force it is replaced only if it is the folder of a report.
 fn folders(place: &Place) {
     let refused = place.run(&["reproduce", "--quick", "--out", "paper"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");

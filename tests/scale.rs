@@ -1,4 +1,4 @@
-//! Several drones a process, and what a tick asks of the system.
+//! Several drones per process, and the system calls of a tick.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -19,7 +19,7 @@ fn formation(place: &Place, drones: u32, timeout_s: f64) -> String {
 }
 
 #[test]
-fn drones_that_share_a_process_fly_as_they_do_alone() {
+fn drones_that_share_a_process_fly_as_with_one_process_each() {
     let place = Place::new();
     let scenario = formation(&place, 10, 6.0);
     let fly = |out: &str, more: &[&str]| -> Value {
@@ -42,7 +42,7 @@ fn drones_that_share_a_process_fly_as_they_do_alone() {
 }
 
 #[test]
-fn a_fault_of_one_process_needs_a_process_of_one_drone() {
+fn a_process_fault_needs_one_process_per_drone() {
     let place = Place::new();
     let scenario = formation(&place, 4, 6.0);
     let with_fault = place.join("fault.toml");
@@ -54,7 +54,7 @@ fn a_fault_of_one_process_needs_a_process_of_one_drone() {
 }
 
 #[test]
-fn a_swarm_that_does_not_fit_is_told_how_many_do() {
+fn a_swarm_that_is_too_large_is_refused_with_the_largest_size_that_fits() {
     let place = Place::new();
     let scenario = formation(&place, 64, 6.0);
     let skein = env!("CARGO_BIN_EXE_skein");
@@ -67,7 +67,7 @@ fn a_swarm_that_does_not_fit_is_told_how_many_do() {
     assert!(!out.exists(), "nothing was begun");
 }
 
-/// System calls of a whole run by `strace`; `None` where there is none, or it may not trace.
+/// System calls of a whole run, counted by `strace`. `None` if `strace` is missing or may not trace.
 fn calls(place: &Place, scenario: &str, wait: &str) -> Option<BTreeMap<String, u64>> {
     let table = place.join(&format!("calls-{wait}"));
     let traced = Command::new("strace")
@@ -88,7 +88,7 @@ fn calls(place: &Place, scenario: &str, wait: &str) -> Option<BTreeMap<String, u
 }
 
 #[test]
-fn a_steady_tick_makes_no_system_call_but_the_barrier_s() {
+fn a_steady_tick_makes_no_system_calls_except_those_of_the_barrier() {
     let place = Place::new();
     let flights = [formation(&place, 4, 8.0), formation(&place, 4, 24.0)];
     let Some(counts) = flights.iter().map(|flight| calls(&place, flight, "block")).collect::<Option<Vec<_>>>() else {
@@ -96,7 +96,7 @@ fn a_steady_tick_makes_no_system_call_but_the_barrier_s() {
         return;
     };
     let ticks = 16.0 / 0.02;
-    // The launcher looks around every millisecond; everybody else waits for somebody.
+    // The launcher polls every millisecond. All others wait for each other.
     let own = ["futex", "epoll_wait", "epoll_pwait2", "epoll_pwait", "restart_syscall"];
     for (name, &count) in &counts[1] {
         let more = count as f64 - counts[0].get(name).copied().unwrap_or(0) as f64;
@@ -109,7 +109,7 @@ fn a_steady_tick_makes_no_system_call_but_the_barrier_s() {
 }
 
 #[test]
-fn the_bench_tells_each_case_and_its_ratio_to_the_floor() {
+fn the_bench_prints_each_case_and_its_ratio_to_the_baseline() {
     let place = Place::new();
     let args = ["bench", "runtime", "--drones", "2", "--rounds", "1", "--quick", "--compare", "uds", "--json"];
     let done = place.run(&args);

@@ -1,4 +1,4 @@
-//! Looking on: observers that come and go, recordings that are equal, replays, terminal tools.
+//! Observers, recordings, replays and terminal tools.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -13,7 +13,7 @@ use support::process::signal;
 const SLOW: [&str; 2] = ["--set", "time.dt_s=0.001"];
 
 #[test]
-fn observers_come_and_go_and_the_digest_stays() {
+fn observers_do_not_change_the_digest() {
     let place = Place::new();
     let alone = place.fly("s2-right", &[&SLOW[..], &["--runtime", "inline", "--no-record", "--out", "alone"]].concat());
     let mut flight = place.take_off("s2-right", &SLOW);
@@ -25,7 +25,7 @@ fn observers_come_and_go_and_the_digest_stays() {
         let line: Value = serde_json::from_str(seen.stdout.lines().next().unwrap()).unwrap();
         assert_eq!(line["topic"], topic);
     }
-    // One that dies with a full buffer leaves the swarm alone as well.
+    // An observer that dies with a full buffer does not disturb the swarm either.
     let dies = place.start(&["topic", "hz", "record"]);
     std::thread::sleep(std::time::Duration::from_millis(300));
     signal("KILL", dies.pid());
@@ -83,8 +83,8 @@ fn equal_runs_make_equal_recordings_in_both_runtimes() {
     assert!(again.stdout.contains("one/report.html"), "{again:?}");
 }
 
-/// What Python's package finds in a recording.
-const LOOK: &str = "
+/// Prints what the Python package mcap reads from a recording.
+const SCRIPT: &str = "
 import json, sys
 from mcap.reader import make_reader
 with open(sys.argv[1], 'rb') as file:
@@ -98,14 +98,14 @@ with open(sys.argv[1], 'rb') as file:
 ";
 
 #[test]
-fn pythons_package_reads_a_recording() {
+fn the_python_package_mcap_reads_a_recording() {
     if !Command::new("python3").args(["-c", "import mcap.reader"]).output().is_ok_and(|tried| tried.status.success()) {
         eprintln!("skipped: no Python package `mcap` on this machine (pip install mcap)");
         return;
     }
     let place = Place::new();
     place.fly("s1-left", &["--runtime", "inline", "--out", "out"]);
-    let read = Command::new("python3").args(["-c", LOOK]).arg(place.join("out/run.mcap")).output().unwrap();
+    let read = Command::new("python3").args(["-c", SCRIPT]).arg(place.join("out/run.mcap")).output().unwrap();
     assert!(read.status.success(), "{}", String::from_utf8_lossy(&read.stderr));
     let found: Value = serde_json::from_slice(&read.stdout).unwrap();
     assert_eq!(found["attachments"][0], "scenario.json");
@@ -115,7 +115,7 @@ fn pythons_package_reads_a_recording() {
 }
 
 #[test]
-fn the_doctor_says_how_many_fit() {
+fn doctor_prints_how_many_drones_fit() {
     let place = Place::new();
     let found = place.run(&["doctor", "--json"]).summary();
     let limits = found["limits"].as_array().unwrap();

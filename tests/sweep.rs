@@ -1,5 +1,5 @@
-//! Sweeps: interrupted and killed ones are resumed without losing or repeating a run, bad ones fly nothing, and a row's
-//! command repeats its run.
+//! A sweep that was interrupted or killed resumes without losing or repeating a run, a bad experiment flies nothing, and the
+//! command of a row repeats its run.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
@@ -30,7 +30,7 @@ fn read(place: &Place, path: &str) -> String {
     fs::read_to_string(place.join(path)).unwrap()
 }
 
-/// The fields of runs.csv by column; no field of these tests has a comma but quoted reasons.
+/// The rows of runs.csv as fields by column. In these tests only quoted reasons contain commas.
 fn csv(text: &str) -> Vec<Vec<(String, String)>> {
     let mut lines = text.lines().map(fields);
     let head = lines.next().unwrap();
@@ -55,7 +55,7 @@ fn field<'a>(row: &'a [(String, String)], name: &str) -> &'a str {
 }
 
 #[test]
-fn interrupted_and_killed_and_resumed_it_ends_like_an_undisturbed_one() {
+fn a_resumed_sweep_gives_the_same_files_as_an_undisturbed_one() {
     let place = Place::new();
     let file = experiment(&place, "e.toml", "seeds = 6");
     let undisturbed = place.run(&["sweep", &file, "--out", "whole"]);
@@ -124,7 +124,7 @@ fn rows_are_tidy_and_their_commands_repeat_them_by_processes() {
 }
 
 #[test]
-fn swarms_of_processes_give_the_rows_of_inline_ones() {
+fn both_runtimes_give_the_same_rows() {
     let place = Place::new();
     let more = "seeds = [5]\nruntime = \"processes\"";
     let done = place.run(&["sweep", &experiment(&place, "processes.toml", more), "--quiet"]);
@@ -137,7 +137,7 @@ fn swarms_of_processes_give_the_rows_of_inline_ones() {
 }
 
 #[test]
-fn interrupted_swarms_of_processes_are_gone() {
+fn an_interrupted_sweep_leaves_no_process_behind() {
     let place = Place::new();
     let file = experiment(&place, "e.toml", "seeds = [5]\nruntime = \"processes\"");
     let slow = ["sweep", &file, "--out", "s", "--set", "time.dt_s=0.0005"];
@@ -161,7 +161,7 @@ fn a_failing_run_is_a_row_and_the_sweep_is_complete() {
     assert!(rows.iter().all(|row| field(row, "outcome") == "timeout" && !field(row, "reason").is_empty()), "{rows:?}");
     assert!(done.stdout.contains("0.0 % [0.0, 65.8]"), "{done:?}");
 
-    // 38.2 m and 37 m: some jitters put two drones too close to each other, which is found when a seed is drawn.
+    // The spacing is 38.2 m and the safe distance 37 m. Some seeds draw starts that are too close to each other.
     let jitter = ["--set", "formation.spacing_m=38.2", "--set", "formation.start_jitter_m=0.9"];
     let text = format!("scenario = {:?}\nseeds = 40\n", paper("s2-right"));
     fs::write(place.join("jitter.toml"), text).unwrap();
@@ -174,7 +174,7 @@ fn a_failing_run_is_a_row_and_the_sweep_is_complete() {
 }
 
 #[test]
-fn bad_experiments_fly_nothing_and_other_folders_are_refused() {
+fn bad_experiments_fly_nothing_and_foreign_folders_are_refused() {
     let place = Place::new();
     let file = experiment(&place, "e.toml", "seeds = 1");
     let done = place.run(&["sweep", &file, "--set", "radio.los=0.5"]);

@@ -1,11 +1,11 @@
-//! The trivial pilot: it flies on and says where it is. What the runtime costs is measured with it.
+//! The trivial pilot, with which the cost of the runtime is measured.
 
 use skein_agent::{Command, Heard, Pilot};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::{MAX_PLACES, Pose, QueuePlace};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
 
-/// A drone that does nothing but beacon.
+/// A pilot that commands no acceleration and broadcasts its pose at a fixed period.
 #[derive(Clone, Copy, Debug)]
 pub struct BeaconPilot {
     me: DroneId,
@@ -14,7 +14,7 @@ pub struct BeaconPilot {
 }
 
 impl BeaconPilot {
-    /// One that says a beacon every `beacon_ticks`.
+    /// A pilot that broadcasts its pose every `beacon_ticks` ticks, at least 1.
     #[must_use]
     pub fn new(me: DroneId, incarnation: u32, beacon_ticks: u64) -> Self {
         Self { me, incarnation, beacon_ticks: beacon_ticks.max(1) }

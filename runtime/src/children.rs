@@ -1,15 +1,17 @@
-//! The processes a launcher has started. All are gone when this is dropped.
+//! The child processes of a launcher.
 
-use crate::drone_process::DroneRange;
-use crate::supervisor::{Launch, ProcessInfo};
-use crate::{Clock, PilotKind, RuntimeError};
+use crate::child_args::{ChildArgs, lighten};
+use crate::clock::Clock;
+use crate::drone_range::DroneRange;
+use crate::error::RuntimeError;
+use crate::launch::{ProcessInfo, ProcessRole};
+use crate::pilot_kind::PilotKind;
 use rustix::event::{Timespec, epoll};
 use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
-use skein_bus::{Control, Domain, PinMode};
 use skein_protocol::DroneId;
 use std::fmt;
-use std::os::fd::OwnedFd;
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -17,12 +19,12 @@ use std::time::Duration;
 
 /// What a child process is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
+pub(crate) enum ChildRole {
     World,
     Drones(DroneRange),
 }
 
-impl fmt::Display for Role {
+impl fmt::Display for ChildRole {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::World => f.write_str("the world"),
@@ -34,72 +36,66 @@ impl fmt::Display for Role {
     }
 }
 
-/// Settings of the C library, in the environment.
-const TUNABLES: &str = "GLIBC_TUNABLES";
-/// No restartable sequences, which nobody here uses: the kernel would look at and write a page of the process at each switch
-/// to it, cold by then.
-const NO_RSEQ: &str = "glibc.pthread.rseq=0";
-
-/// Spares a child what costs it at each switch and nobody uses.
-pub fn lighten(command: &mut Command) {
-    command.env(TUNABLES, tunables(std::env::var(TUNABLES).ok()));
-}
-
-/// The settings for a child: of one that is there twice the last counts, so nothing that somebody set is overruled.
-fn tunables(inherited: Option<String>) -> String {
-    match inherited.filter(|settings| !settings.is_empty()) {
-        Some(settings) => format!("{NO_RSEQ}:{settings}"),
-        None => NO_RSEQ.to_owned(),
-    }
-}
-
 struct Running {
-    role: Role,
+    role: ChildRole,
     child: Child,
-    /// Closed with it: then nobody watches it any more.
+    /// Watched by [`Children::ends`] for as long as it is open.
     _pidfd: OwnedFd,
 }
 
 impl Running {
-    fn is_of(&self, drone: DroneId) -> bool {
-        matches!(self.role, Role::Drones(range) if range.ids().any(|id| id == drone))
+    fn flies(&self, drone: DroneId) -> bool {
+        matches!(self.role, ChildRole::Drones(range) if range.ids().any(|id| id == drone))
+    }
+
+    fn pid(&self) -> Pid {
+        Pid::from_child(&self.child)
     }
 }
 
-/// Processes that were started and not yet reaped.
+/// Processes that were started and not yet reaped. Dropping this kills and reaps all of them.
 pub(crate) struct Children {
     executable: PathBuf,
-    domain: PathBuf,
-    control: i32,
-    pin: PinMode,
+    args: ChildArgs,
     pilot: PilotKind,
     running: Vec<Running>,
-    /// Tells of ends; what it costs does not depend on how many there are.
+    /// Reports the ends of processes. The cost of a wait does not depend on their number.
     ends: OwnedFd,
 }
 
 impl Children {
-    pub(crate) fn new(launch: &Launch<'_>, domain: &Domain, control: &Control) -> Result<Self, RuntimeError> {
-        let ends = epoll::create(epoll::CreateFlags::CLOEXEC);
-        Ok(Self {
-            executable: launch.executable.clone(),
-            domain: domain.path().to_owned(),
-            // The segment that the launcher made has a descriptor.
-            control: control.fd().unwrap_or(-1),
-            pin: launch.pin,
-            pilot: launch.pilot,
-            running: Vec::new(),
-            ends: ends.map_err(|error| RuntimeError::system("watching processes")(error.into()))?,
-        })
+    /// No processes yet. All that are started get these arguments.
+    pub(crate) fn new(executable: PathBuf, args: ChildArgs, pilot: PilotKind) -> Result<Self, RuntimeError> {
+        let ends = epoll::create(epoll::CreateFlags::CLOEXEC)
+            .map_err(|error| RuntimeError::system("watching processes")(error.into()))?;
+        Ok(Self { executable, args, pilot, running: Vec::new(), ends })
     }
 
-    /// Starts a process. To be called from one thread that lives as long as the run: children die with the thread that
-    /// started them.
-    pub(crate) fn spawn(&mut self, role: Role, clock: Clock) -> Result<(), RuntimeError> {
+    /// Starts a process. Call this from one thread that lives as long as the run: a child dies with the thread that
+    /// started it.
+    pub(crate) fn spawn(&mut self, role: ChildRole, clock: Clock) -> Result<(), RuntimeError> {
+        let mut child = self
+            .command(role, clock)
+            .spawn()
+            .map_err(RuntimeError::system(format!("starting {role} as {}", self.executable.display())))?;
+        match watch(&self.ends, &child) {
+            Ok(pidfd) => {
+                self.running.push(Running { role, child, _pidfd: pidfd });
+                Ok(())
+            }
+            Err(error) => {
+                // No one else would end it.
+                let _ = (child.kill(), child.wait());
+                Err(RuntimeError::system(format!("watching {role}"))(error.into()))
+            }
+        }
+    }
+
+    fn command(&self, role: ChildRole, clock: Clock) -> Command {
         let mut command = Command::new(&self.executable);
         match role {
-            Role::World => command.args(["world", "--clock", &clock.to_string()]),
-            Role::Drones(DroneRange { first, count, incarnation, first_tick }) => command.args([
+            ChildRole::World => command.args(["world", "--clock", &clock.to_string()]),
+            ChildRole::Drones(DroneRange { first, count, incarnation, first_tick }) => command.args([
                 "drone",
                 "--pilot",
                 self.pilot.name(),
@@ -113,36 +109,15 @@ impl Children {
                 &first_tick.to_string(),
             ]),
         };
-        command.arg("--domain").arg(&self.domain);
-        command.args(["--control", &self.control.to_string(), "--parent", &std::process::id().to_string()]);
-        command.args(["--pin", if self.pin == PinMode::Auto { "auto" } else { "off" }]);
+        self.args.append_to(&mut command);
         // A terminal's Ctrl-C must reach the launcher alone, and stdout is the launcher's.
         command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
         lighten(&mut command);
-        let child = command
-            .spawn()
-            .map_err(RuntimeError::system(format!("starting {role} as {}", self.executable.display())))?;
-        let pid = Pid::from_child(&child);
-        let watch = |pidfd: OwnedFd| {
-            let none = epoll::EventData::new_u64(0);
-            epoll::add(&self.ends, &pidfd, none, epoll::EventFlags::IN).map(|()| pidfd)
-        };
-        let pidfd = pidfd_open(pid, PidfdFlags::empty()).and_then(watch);
-        // Owned by `running` even if watching fails, so that it is killed and reaped.
-        let pidfd = match pidfd {
-            Ok(pidfd) => pidfd,
-            Err(error) => {
-                let mut child = child;
-                let _ = (child.kill(), child.wait());
-                return Err(RuntimeError::system(format!("watching {role}"))(error.into()));
-            }
-        };
-        self.running.push(Running { role, child, _pidfd: pidfd });
-        Ok(())
+        command
     }
 
-    /// Waits, at most `limit`, until a process has ended; reaps all that have, and tells how they ended.
-    pub(crate) fn wait_any(&mut self, limit: Duration) -> Vec<(Role, ExitStatus)> {
+    /// Waits for a process to end, at most `limit`. Reaps all processes that have ended and returns how they ended.
+    pub(crate) fn wait_any(&mut self, limit: Duration) -> Vec<(ChildRole, ExitStatus)> {
         let timeout = Timespec { tv_sec: limit.as_secs() as _, tv_nsec: limit.subsec_nanos().into() };
         let mut one = [epoll::Event { flags: epoll::EventFlags::empty(), data: epoll::EventData::new_u64(0) }];
         if !matches!(epoll::wait(&self.ends, &mut one[..], Some(&timeout)), Ok(1..)) {
@@ -159,43 +134,44 @@ impl Children {
         ended
     }
 
-    /// Kills a drone's process and reaps it; all drones that were in it, `None` if there is none.
+    /// Kills the process of a drone and reaps it. Returns all drones that were in it, or `None` if there is no such process.
     pub(crate) fn kill_drone(&mut self, drone: DroneId) -> Option<DroneRange> {
-        let place = self.running.iter().position(|running| running.is_of(drone))?;
-        let mut running = self.running.remove(place);
-        // It may have ended by itself just now: the wait tells either way.
+        let index = self.running.iter().position(|running| running.flies(drone))?;
+        let mut running = self.running.remove(index);
+        // The process may have ended by itself just now. The wait succeeds either way.
         let _ = running.child.kill();
-        let Role::Drones(range) = running.role else { return None };
+        let ChildRole::Drones(range) = running.role else { return None };
         running.child.wait().is_ok().then_some(range)
     }
 
-    /// Stops a drone's process; true once it is stopped, false if there is none.
+    /// Stops the process of a drone and waits until it is stopped. Returns false if there is no such process.
     pub(crate) fn freeze_drone(&self, drone: DroneId) -> bool {
         let Some(pid) = self.pid_of(drone) else { return false };
-        // Not reaped here, should it have ended: that is the watcher's.
+        // A process that has ended instead is left for `wait_any` to reap.
         let wanted = WaitIdOptions::STOPPED | WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
         let wait = || retry_on_intr(|| waitid(WaitId::Pid(pid), wanted));
         let stopped = || wait().ok().flatten().is_some_and(|status| status.stopped());
         kill_process(pid, Signal::STOP).is_ok() && stopped()
     }
 
-    /// Lets a drone's process go on; false if there is none.
+    /// Continues the stopped process of a drone. Returns false if there is no such process.
     pub(crate) fn resume_drone(&self, drone: DroneId) -> bool {
         self.pid_of(drone).is_some_and(|pid| kill_process(pid, Signal::CONT).is_ok())
     }
 
-    /// Lets all processes that are stopped go on, so that they can end.
+    /// Continues all stopped processes, so that they can end.
     pub(crate) fn resume_all(&self) {
         for running in &self.running {
-            // Whoever has ended needs no signal.
-            let _ = kill_process(Pid::from_child(&running.child), Signal::CONT);
+            // This fails only for a process that has ended, which needs no signal.
+            let _ = kill_process(running.pid(), Signal::CONT);
         }
     }
 
     fn pid_of(&self, drone: DroneId) -> Option<Pid> {
-        self.running.iter().find(|running| running.is_of(drone)).map(|running| Pid::from_child(&running.child))
+        self.running.iter().find(|running| running.flies(drone)).map(Running::pid)
     }
 
+    /// Kills and reaps all processes.
     pub(crate) fn kill_all(&mut self) {
         for running in &mut self.running {
             let _ = running.child.kill();
@@ -205,15 +181,17 @@ impl Children {
         }
     }
 
-    pub(crate) fn any(&self) -> bool {
-        !self.running.is_empty()
+    /// Whether no process is left.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.running.is_empty()
     }
 
+    /// The processes that are left, once per drone.
     pub(crate) fn list(&self) -> impl Iterator<Item = ProcessInfo> + '_ {
         self.running.iter().flat_map(|running| {
             let (role, ids) = match running.role {
-                Role::World => ("world", vec![None]),
-                Role::Drones(range) => ("drone", range.ids().map(|id| Some(id.0)).collect()),
+                ChildRole::World => (ProcessRole::World, vec![None]),
+                ChildRole::Drones(range) => (ProcessRole::Drone, range.ids().map(|id| Some(id.0)).collect()),
             };
             let pid = running.child.id();
             ids.into_iter().map(move |id| ProcessInfo { role, id, pid })
@@ -227,15 +205,9 @@ impl Drop for Children {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_somebody_set_is_kept_and_comes_last() {
-        assert_eq!(tunables(None), NO_RSEQ);
-        assert_eq!(tunables(Some(String::new())), NO_RSEQ);
-        let set = "glibc.pthread.rseq=1".to_owned();
-        assert_eq!(tunables(Some(set)), "glibc.pthread.rseq=0:glibc.pthread.rseq=1");
-    }
+/// Adds a process to those whose end is reported.
+fn watch(ends: impl AsFd, child: &Child) -> rustix::io::Result<OwnedFd> {
+    let pidfd = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
+    epoll::add(ends, &pidfd, epoll::EventData::new_u64(0), epoll::EventFlags::IN)?;
+    Ok(pidfd)
 }

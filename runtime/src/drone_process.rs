@@ -1,102 +1,38 @@
-//! A drone's process, or that of several: it waits for a tick, hears, steps its pilots, speaks, answers.
+//! A drone process: it waits for a tick, receives, steps its pilots, sends and answers. It flies one drone or several.
 
+use crate::child_args::ChildArgs;
+use crate::drone_factory::DroneFactory;
+use crate::drone_range::DroneRange;
+use crate::error::RuntimeError;
+use crate::mission;
 use crate::pilot_host::{PilotHost, StepScratch};
-use crate::{PilotKind, RuntimeError, mission};
+use crate::pilot_kind::PilotKind;
 use skein_bus::{
-    BusError, Control, Domain, DownlinkSubscriber, DroneEndpoint, PinMode, SHARD_DRONES, Services, TickSignal,
-    UplinkHeader, UplinkPublisher, pin_to_core, raise_file_limit,
+    BusError, Control, Domain, DownlinkSubscriber, DroneEndpoint, SHARD_DRONES, Services, TickSignal, UplinkHeader,
+    UplinkPublisher, pin_to_core, raise_file_limit,
 };
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, Message, SimTime, Tick};
 use skein_scenario::Scenario;
-use std::os::fd::RawFd;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What the launcher tells a child process in its arguments.
-#[derive(Clone, Debug)]
-pub struct ChildArgs {
-    /// Folder of the run's domain.
-    pub domain: PathBuf,
-    /// Number of the control segment's descriptor.
-    pub control: RawFd,
-    /// Process id of the launcher.
-    pub parent: u32,
-    /// Whether to keep to one core.
-    pub pin: PinMode,
-}
-
-impl ChildArgs {
-    /// Ties this process to its launcher: it dies with it.
-    ///
-    /// # Errors
-    /// [`RuntimeError::Process`] if the launcher is gone already.
-    pub fn bind_to_parent(&self) -> Result<(), RuntimeError> {
-        use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-        set_parent_process_death_signal(Some(Signal::KILL))
-            .map_err(|error| RuntimeError::system("asking to die with the launcher")(error.into()))?;
-        // The launcher may have died before that call.
-        if getppid().map(|pid| pid.as_raw_nonzero().get().unsigned_abs()) != Some(self.parent) {
-            return Err(RuntimeError::Process(format!("the launcher, process {}, is gone", self.parent)));
-        }
-        Ok(())
-    }
-
-    /// The scenario as the launcher resolved it.
-    ///
-    /// # Errors
-    /// [`RuntimeError::System`], [`RuntimeError::Process`] if the file is no scenario.
-    pub fn scenario(&self) -> Result<Scenario, RuntimeError> {
-        let path = scenario_path(&self.domain);
-        let text = std::fs::read(&path).map_err(RuntimeError::system(format!("reading {}", path.display())))?;
-        serde_json::from_slice(&text)
-            .map_err(|error| RuntimeError::Process(format!("{} is no scenario: {error}", path.display())))
-    }
-}
-
-/// Where the launcher puts the resolved scenario for its children.
-#[must_use]
-pub fn scenario_path(domain: &Path) -> PathBuf {
-    domain.join("scenario.json")
-}
-
-/// The drones of one process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DroneRange {
-    /// The first of them.
-    pub first: DroneId,
-    /// How many, by id.
-    pub count: u32,
-    /// Which start of this process it is, from 1.
-    pub incarnation: u32,
-    /// The first tick it answers.
-    pub first_tick: Tick,
-}
-
-impl DroneRange {
-    /// Their ids.
-    pub fn ids(&self) -> impl Iterator<Item = DroneId> + use<> {
-        (self.first.0..self.first.0 + self.count).map(DroneId)
-    }
-}
-
-/// Runs drones of a swarm until their mission ends, with pilots of this kind.
+/// Flies drones with a built-in pilot until the mission ends.
 ///
 /// # Errors
-/// [`RuntimeError`]; the launcher sees the process end.
+/// [`RuntimeError`]; the launcher notices that the process has ended.
 pub fn run(args: &ChildArgs, range: DroneRange, pilot: PilotKind) -> Result<(), RuntimeError> {
     fly(args, range, |scenario, id| {
         let start = SimTime(range.first_tick as i64 * mission::dt_ns(scenario));
-        mission::DroneFactory::new(scenario, pilot).pilot_host(id, range.incarnation, start)
+        DroneFactory::new(scenario, pilot).pilot_host(id, range.incarnation, start)
     })
 }
 
-/// Runs drones with a pilot of one's own.
+/// Flies drones with a pilot of the caller's until the mission ends. `make` makes each of them.
 ///
 /// # Errors
-/// [`RuntimeError`].
+/// [`RuntimeError`]; the launcher notices that the process has ended.
 pub fn fly(
     args: &ChildArgs,
     range: DroneRange,
@@ -109,23 +45,94 @@ pub fn fly(
     pin_to_core(control.core_of(range.first.index()), args.pin)?;
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", range.first))?;
-    let seat = |id: DroneId| -> Result<DroneHandle, RuntimeError> {
+    let mut drones = Vec::with_capacity(range.count as usize);
+    for id in range.ids() {
         let barrier = DroneEndpoint::new(Arc::clone(&control), id.index())?.bound();
-        Ok(DroneHandle { id, pilot_host: make(&scenario, id), barrier, slot: Slot::default() })
-    };
-    let handles: Vec<DroneHandle> = range.ids().map(seat).collect::<Result<_, _>>()?;
-    let shard = |id: DroneId| id.index() / SHARD_DRONES;
-    let shards = shard(range.first)..=handles.last().map_or(0, |seat| shard(seat.id));
-    let mut process = DroneProcess {
-        first_shard: *shards.start(),
-        speaks: shards.map(|shard| services.uplink_publisher(shard * SHARD_DRONES)).collect::<Result<_, _>>()?,
-        hears: services.downlink_subscriber()?,
-        incarnation: range.incarnation,
-        handles,
-        desk: StepScratch::default(),
-    };
-    process.handles.iter().for_each(|seat| seat.barrier.announce(range.incarnation));
+        drones.push(DroneHandle { id, pilot_host: make(&scenario, id), barrier, slot: Slot::default() });
+    }
+    let mut process = DroneProcess::new(&services, range.incarnation, drones)?;
+    process.announce();
     process.fly()
+}
+
+/// The shard of the uplink on which a drone sends.
+fn shard(id: DroneId) -> usize {
+    id.index() / SHARD_DRONES
+}
+
+/// The drones of this process, and the ports that they share.
+struct DroneProcess {
+    incarnation: u32,
+    downlink: DownlinkSubscriber,
+    /// One publisher per shard, from `first_shard` on.
+    uplinks: Vec<UplinkPublisher>,
+    first_shard: usize,
+    drones: Vec<DroneHandle>,
+    scratch: StepScratch,
+}
+
+impl DroneProcess {
+    fn new(services: &Services, incarnation: u32, drones: Vec<DroneHandle>) -> Result<Self, RuntimeError> {
+        let shard_of = |drone: Option<&DroneHandle>| drone.map_or(0, |drone| shard(drone.id));
+        let (first_shard, last_shard) = (shard_of(drones.first()), shard_of(drones.last()));
+        let uplinks = (first_shard..=last_shard).map(|shard| services.uplink_publisher(shard * SHARD_DRONES));
+        Ok(Self {
+            incarnation,
+            uplinks: uplinks.collect::<Result<_, _>>()?,
+            downlink: services.downlink_subscriber()?,
+            first_shard,
+            drones,
+            scratch: StepScratch::default(),
+        })
+    }
+
+    /// Tells the launcher that the drones are ready.
+    fn announce(&self) {
+        for drone in &self.drones {
+            drone.barrier.announce(self.incarnation);
+        }
+    }
+
+    fn fly(&mut self) -> Result<(), RuntimeError> {
+        loop {
+            let Some((first, others)) = self.drones.split_first_mut() else { return Ok(()) };
+            let TickSignal::Tick(tick) = first.barrier.wait_tick(|| true) else { return Ok(()) };
+            for drone in others {
+                drone.barrier.join_tick(tick);
+            }
+            self.answer(tick)?;
+        }
+    }
+
+    /// Reads the downlinks up to that of `tick`, and answers that one.
+    fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
+        let resume_from = self.drones.first().map_or(0, |drone| drone.barrier.resume_from());
+        while let Some(sample) = self.downlink.receive()? {
+            if sample.tick() < resume_from {
+                // Its frames were sent while this process was stopped: they are lost.
+                continue;
+            }
+            let down = DownlinkView::parse(sample.bytes())
+                .map_err(|source| RuntimeError::Downlink { tick: sample.tick(), source })?;
+            if sample.tick() < tick {
+                for drone in &mut self.drones {
+                    drone.pilot_host.receive_late(&down, &mut self.scratch, drone.barrier.stats_mut());
+                }
+                continue;
+            }
+            for drone in &mut self.drones {
+                let header = UplinkHeader { tick, source: drone.id.0, incarnation: self.incarnation };
+                let uplink = &self.uplinks[shard(drone.id) - self.first_shard];
+                drone.step(&down, &mut self.scratch, header, uplink)?;
+            }
+            // The world waits for drones in the order of their ids. Once the first has answered, all have.
+            for drone in self.drones.iter_mut().rev() {
+                drone.barrier.finish(tick, &drone.slot);
+            }
+            break;
+        }
+        Ok(())
+    }
 }
 
 /// One drone of the process.
@@ -136,71 +143,26 @@ struct DroneHandle {
     slot: Slot,
 }
 
-/// The drones of this process, and the ports that they share.
-struct DroneProcess {
-    incarnation: u32,
-    hears: DownlinkSubscriber,
-    /// One a shard, from the first one's on.
-    speaks: Vec<UplinkPublisher>,
-    first_shard: usize,
-    handles: Vec<DroneHandle>,
-    desk: StepScratch,
-}
-
-impl DroneProcess {
-    fn fly(&mut self) -> Result<(), RuntimeError> {
-        loop {
-            let Some((first, others)) = self.handles.split_first_mut() else { return Ok(()) };
-            let TickSignal::Tick(tick) = first.barrier.wait_tick(|| true) else { return Ok(()) };
-            others.iter_mut().for_each(|seat| _ = seat.barrier.join_tick(tick));
-            self.answer(tick)?;
-        }
-    }
-
-    /// Reads the downlinks up to the newest, and answers that one.
-    fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
-        let desk = &mut self.desk;
-        let resume_from = self.handles.first().map_or(0, |seat| seat.barrier.resume_from());
-        while let Some(sample) = self.hears.receive()? {
-            if sample.tick() < resume_from {
-                // Sent while this process was stopped: nobody heard it.
-                continue;
-            }
-            let down = DownlinkView::parse(sample.bytes())
-                .map_err(|error| RuntimeError::Process(format!("drone process: {error}")))?;
-            if sample.tick() < tick {
-                self.handles
-                    .iter_mut()
-                    .for_each(|seat| seat.pilot_host.overhear(&down, desk, seat.barrier.stats_mut()));
-                continue;
-            }
-            for seat in &mut self.handles {
-                let header = UplinkHeader { tick, source: seat.id.0, incarnation: self.incarnation };
-                seat.step(&down, desk, header, &self.speaks[seat.id.index() / SHARD_DRONES - self.first_shard])?;
-            }
-            // The world waits for them in turn: when the first has answered, all have.
-            self.handles.iter_mut().rev().for_each(|seat| _ = seat.barrier.finish(tick, &seat.slot));
-            break;
-        }
-        Ok(())
-    }
-}
-
 impl DroneHandle {
+    /// Steps the pilot and sends what it says.
     fn step(
         &mut self,
         down: &DownlinkView<'_>,
-        desk: &mut StepScratch,
+        scratch: &mut StepScratch,
         header: UplinkHeader,
-        speaks: &UplinkPublisher,
+        uplink: &UplinkPublisher,
     ) -> Result<(), RuntimeError> {
         let watch = self.barrier.stopwatch();
         let lap = watch.start();
-        let said = self.pilot_host.step(down, desk, &mut self.slot, self.barrier.stats_mut());
+        let said = self.pilot_host.step(down, scratch, &mut self.slot, self.barrier.stats_mut());
         if !said.is_empty() {
-            let encode = |(frame, message): (&mut Frame, &Message)| *frame = message.encode();
-            match speaks.send(header, said.len(), |out| out.iter_mut().zip(said).for_each(encode)) {
-                // By the wall clock only: the world is far behind, what is said is lost.
+            let encode_all = |out: &mut [Frame]| {
+                for (frame, message) in out.iter_mut().zip(said) {
+                    *frame = Message::encode(message);
+                }
+            };
+            match uplink.send(header, said.len(), encode_all) {
+                // This happens by the wall clock only: the world is far behind, and these frames are lost.
                 Err(BusError::Full { .. }) => {}
                 sent => sent?,
             }

@@ -1,37 +1,96 @@
-//! What keeps a run from starting.
+//! What keeps a run from being started or carried through.
 
 use skein_bus::BusError;
+use skein_protocol::downlink::DownlinkError;
 use skein_protocol::shape::ShapeError;
+use skein_protocol::{DroneId, Tick};
 use skein_world::WorldError;
+use std::path::PathBuf;
+use std::process::ExitStatus;
+use std::time::Duration;
 use thiserror::Error;
 
 /// Why a run could not be started or carried through.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// The scenario makes no world.
+    /// No world can be made of the scenario.
     #[error("the scenario makes no world: {0}")]
     Scenario(#[from] WorldError),
-    /// An obstacle of the scenario is none.
+    /// An obstacle of the scenario has an impossible shape.
     #[error("the scenario makes no world: {0}")]
     Shape(ShapeError),
-    /// Shared memory, services or the barrier failed.
+    /// Shared memory, a service or the barrier failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A process could not be started, or ended before the first tick.
+    /// The launcher ended before its child process was set up.
+    #[error("expected the launcher as parent process, but process {pid} has ended")]
+    LauncherGone {
+        /// Process id of the launcher.
+        pid: u32,
+    },
+    /// The scenario file of a run's domain holds something else.
+    #[error("{}: expected the resolved scenario of a run, as this version writes it: {source}", path.display())]
+    ScenarioFile {
+        /// The file.
+        path: PathBuf,
+        /// Where it differs.
+        source: serde_json::Error,
+    },
+    /// A process ended before the first tick.
+    #[error("{process} ended before the first tick: {status}")]
+    EndedEarly {
+        /// Which process, in words.
+        process: String,
+        /// How it ended.
+        status: ExitStatus,
+    },
+    /// Processes took too long to get ready.
+    #[error("only {ready} of {drones} drones were ready after {waited:.0?}")]
+    NotReady {
+        /// Drones that were ready; those after the first one that was not do not count.
+        ready: usize,
+        /// Drones of the swarm.
+        drones: usize,
+        /// How long the launcher waited.
+        waited: Duration,
+    },
+    /// The caller's `Launch::on_ready` failed.
     #[error("{0}")]
-    Process(String),
+    OnReady(Box<dyn std::error::Error + Send + Sync>),
+    /// A drone got no new process.
+    #[error("drone {drone} was not started again: expected a process of incarnation {incarnation} to be ready")]
+    NotRestarted {
+        /// The drone.
+        drone: DroneId,
+        /// The incarnation that the new process should have.
+        incarnation: u32,
+    },
+    /// A downlink sample cannot be read.
+    #[error("downlink of tick {tick}: {source}")]
+    Downlink {
+        /// The tick of the sample.
+        tick: Tick,
+        /// What is wrong with it.
+        source: DownlinkError,
+    },
+    /// Frames are missing.
+    #[error("uplink shard {shard}: expected all frames that its drones announced, but some did not arrive")]
+    MissingFrames {
+        /// The shard of the uplink.
+        shard: usize,
+    },
     /// A file or a system call failed.
     #[error("{what}: {source}")]
     System {
         /// What was tried.
         what: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl RuntimeError {
-    /// An error of the system while doing `what`.
+    /// Makes an error of the operating system an error while doing `what`.
     pub fn system(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Self {
         let what = what.into();
         move |source| Self::System { what, source }

@@ -1,31 +1,27 @@
-//! The inline runtime: the same pilots and the same world, stepped by function calls in one thread. The oracle for
-//! determinism, and the engine for large sweeps.
+//! The inline runtime: it steps the same pilots and the same world by function calls in one thread. It is the reference
+//! for determinism, and the engine of large sweeps.
 
+use crate::drone_factory::DroneFactory;
+use crate::error::RuntimeError;
+use crate::mission;
 use crate::pilot_host::{PilotHost, StepScratch};
-use crate::{PilotKind, RunEnd, RuntimeError, mission};
+use crate::pilot_kind::PilotKind;
+use crate::run_end::RunEnd;
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::RecordSink;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_scenario::Scenario;
+use skein_world::World;
 use skein_world::faults::ProcessCommand;
 use std::time::Instant;
 
-/// One drone and what it answered in the current tick.
-struct DroneHandle {
-    /// `None`: its process is gone.
-    pilot_host: Option<PilotHost>,
-    frozen: bool,
-    slot: Slot,
-    frames: Vec<Frame>,
-    stats: LinkStats,
-}
-
-/// Flies a mission in this thread. `interrupted` is asked in every tick whether to stop: it gives the signal's number.
+/// Flies a mission with the paper's pilot in this thread. `interrupted` is called once per tick; it returns the number of a
+/// signal that should stop the run.
 ///
 /// # Errors
-/// [`RuntimeError::Scenario`] if no world can be made of the scenario.
+/// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made of the scenario.
 pub fn run(
     scenario: &Scenario,
     sink: &mut dyn RecordSink,
@@ -34,87 +30,131 @@ pub fn run(
     run_with(scenario, PilotKind::Swarm, sink, interrupted)
 }
 
-/// The same with pilots of another kind.
+/// As [`run`], with a pilot of the given kind.
 ///
 /// # Errors
-/// [`RuntimeError::Scenario`] if no world can be made of the scenario.
+/// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made of the scenario.
 pub fn run_with(
     scenario: &Scenario,
     pilot: PilotKind,
     sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
-    let (yard, mut desk) = (mission::DroneFactory::new(scenario, pilot), StepScratch::default());
+    let mut end = RunEnd::default();
     let started = Instant::now();
-    let mut world = mission::world(scenario)?;
-    let seat = |id| DroneHandle {
-        pilot_host: Some(yard.pilot_host(DroneId(id), 1, SimTime::ZERO)),
-        frozen: false,
-        slot: Slot::default(),
-        frames: Vec::new(),
-        stats: LinkStats::default(),
-    };
-    let mut handles: Vec<DroneHandle> = (0..scenario.formation.drones).map(seat).collect();
-    let startup_s = started.elapsed().as_secs_f64();
-    let (opened, mut signal, mut sink_error) = (Instant::now(), None, None);
-    while world.ended().is_none() {
-        let start = world.now();
-        world.process_commands().iter().for_each(|&order| {
-            carry_out(order, &mut handles, |id, incarnation| yard.pilot_host(id, incarnation, start))
-        });
-        let down = world.downlink().view();
-        handles.iter_mut().for_each(|seat| seat.answer(&down, &mut desk));
-        for (seat, id) in handles.iter().zip(0..).filter(|(seat, _)| seat.flies()) {
-            world.take_slot(DroneId(id), &seat.slot);
-            world.take_frames(DroneId(id), &seat.frames);
-        }
-        world.advance();
-        keep(sink, &world, &mut sink_error);
-        signal = interrupted();
-        if let Some(number) = signal {
-            world.abort(&format!("interrupted by signal {number}"));
+    let mut swarm = InlineSwarm::new(scenario, pilot)?;
+    end.startup_s = started.elapsed().as_secs_f64();
+    let opened = Instant::now();
+    while swarm.world.ended().is_none() {
+        swarm.tick();
+        record(sink, &swarm.world, &mut end.sink_error);
+        end.signal = interrupted();
+        if let Some(number) = end.signal {
+            swarm.world.abort(&format!("interrupted by signal {number}"));
         }
     }
     let wall_s = opened.elapsed().as_secs_f64();
-    let mut stats = LinkStats::default();
-    handles.iter().for_each(|seat| stats.merge(&seat.stats));
-    world.finish(&stats, wall_s);
-    keep(sink, &world, &mut sink_error);
-    Ok(RunEnd { startup_s, signal, sink_error, ..RunEnd::default() })
+    let stats = swarm.stats();
+    swarm.world.finish(&stats, wall_s);
+    record(sink, &swarm.world, &mut end.sink_error);
+    Ok(end)
 }
 
-impl DroneHandle {
-    /// Whether it has a process, and one that is not stopped.
+/// Hands the world's record to the sink. An error stops the recording, never the mission.
+fn record(sink: &mut dyn RecordSink, world: &World, error: &mut Option<String>) {
+    if error.is_none() {
+        *error = sink.take(world.record()).err().map(|error| error.to_string());
+    }
+}
+
+/// The world and all drones of a mission.
+struct InlineSwarm<'s> {
+    factory: DroneFactory<'s>,
+    world: World,
+    drones: Vec<InlineDrone>,
+    scratch: StepScratch,
+}
+
+impl<'s> InlineSwarm<'s> {
+    fn new(scenario: &'s Scenario, pilot: PilotKind) -> Result<Self, RuntimeError> {
+        let factory = DroneFactory::new(scenario, pilot);
+        let world = mission::world(scenario)?;
+        let new_drone = |id| InlineDrone::new(factory.pilot_host(DroneId(id), 1, SimTime::ZERO));
+        let drones = (0..scenario.formation.drones).map(new_drone).collect();
+        Ok(Self { factory, world, drones, scratch: StepScratch::default() })
+    }
+
+    fn tick(&mut self) {
+        let start = self.world.now();
+        for &command in self.world.process_commands() {
+            carry_out(command, &mut self.drones, &self.factory, start);
+        }
+        let down = self.world.downlink().view();
+        for drone in &mut self.drones {
+            drone.step(&down, &mut self.scratch);
+        }
+        for (drone, id) in self.drones.iter().zip(0..).filter(|(drone, _)| drone.flies()) {
+            self.world.take_slot(DroneId(id), &drone.slot);
+            self.world.take_frames(DroneId(id), &drone.frames);
+        }
+        self.world.advance();
+    }
+
+    /// What all radio receivers have counted.
+    fn stats(&self) -> LinkStats {
+        let mut sum = LinkStats::default();
+        for drone in &self.drones {
+            sum.merge(&drone.stats);
+        }
+        sum
+    }
+}
+
+/// Does to a pilot what the supervisor does to a process.
+fn carry_out(command: ProcessCommand, drones: &mut [InlineDrone], factory: &DroneFactory<'_>, start: SimTime) {
+    match command {
+        ProcessCommand::Kill(id) => {
+            let drone = &mut drones[id.index()];
+            (drone.pilot_host, drone.frozen) = (None, false);
+        }
+        ProcessCommand::Freeze(id) => drones[id.index()].frozen = true,
+        ProcessCommand::Resume(id) => drones[id.index()].frozen = false,
+        ProcessCommand::Restart(id, incarnation) => {
+            drones[id.index()].pilot_host = Some(factory.pilot_host(id, incarnation, start));
+        }
+    }
+}
+
+/// One drone and its answer to the current tick.
+struct InlineDrone {
+    /// `None` once it was killed.
+    pilot_host: Option<PilotHost>,
+    frozen: bool,
+    slot: Slot,
+    frames: Vec<Frame>,
+    stats: LinkStats,
+}
+
+impl InlineDrone {
+    fn new(pilot_host: PilotHost) -> Self {
+        Self {
+            pilot_host: Some(pilot_host),
+            frozen: false,
+            slot: Slot::default(),
+            frames: Vec::new(),
+            stats: LinkStats::default(),
+        }
+    }
+
+    /// Whether its pilot is neither killed nor frozen.
     fn flies(&self) -> bool {
         self.pilot_host.is_some() && !self.frozen
     }
 
-    fn answer(&mut self, down: &DownlinkView<'_>, desk: &mut StepScratch) {
+    fn step(&mut self, down: &DownlinkView<'_>, scratch: &mut StepScratch) {
         let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
-        let said = pilot_host.step(down, desk, &mut self.slot, &mut self.stats);
+        let said = pilot_host.step(down, scratch, &mut self.slot, &mut self.stats);
         self.frames.clear();
         self.frames.extend(said.iter().map(Message::encode));
-    }
-}
-
-/// Does to a pilot what the process runtime does to a process; `make` makes a new one.
-fn carry_out(order: ProcessCommand, handles: &mut [DroneHandle], make: impl Fn(DroneId, u32) -> PilotHost) {
-    match order {
-        ProcessCommand::Kill(id) => {
-            let seat = &mut handles[id.index()];
-            (seat.pilot_host, seat.frozen) = (None, false);
-        }
-        ProcessCommand::Freeze(id) => handles[id.index()].frozen = true,
-        ProcessCommand::Resume(id) => handles[id.index()].frozen = false,
-        ProcessCommand::Restart(id, incarnation) => {
-            handles[id.index()].pilot_host = Some(make(id, incarnation));
-        }
-    }
-}
-
-/// An error stops the recording, never the mission.
-fn keep(sink: &mut dyn RecordSink, world: &skein_world::World, error: &mut Option<String>) {
-    if error.is_none() {
-        *error = sink.take(world.record()).err().map(|error| error.to_string());
     }
 }

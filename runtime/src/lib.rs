@@ -1,45 +1,94 @@
-//! How pilots and world are run: each a process of its own, or inline in one thread; in lockstep or by the wall clock.
+//! Runs a mission: it steps the world and the pilots, tick by tick, and hands the record of each tick to a sink.
 //!
-//! | module | what |
-//! |---|---|
-//! | [`mission`] | from a scenario to world, pilots and radios |
-//! | [`pilot_host`] | what both runtimes put around a pilot: radio, queue, tally |
-//! | [`beacon`] | the trivial pilot, to measure the runtime with |
-//! | [`inline`] | all in one thread |
-//! | [`supervisor`] | starts a process for the world and one for each drone, and looks after them |
-//! | [`world_process`], [`drone_process`] | what those processes do |
-//! | [`clock`] | lockstep and wall clock |
+//! There are two runtimes. Both step the same [`PilotHost`]s and the same `World`, so that a scenario and a seed give the
+//! same digest in both:
+//!
+//! - [`inline::run`] calls everything in one thread. It is the reference for determinism, and the fastest way to fly many
+//!   missions.
+//! - [`supervisor::run`] starts one process for the world and one for each drone (or for several). They exchange frames
+//!   and states through shared memory, and faults of the scenario kill, stop and restart real processes. The processes
+//!   call [`world_process::run`] and [`drone_process::run`].
+//!
+//! A [`Clock`] paces the ticks. In lockstep, each tick waits for every living drone. By the wall clock, a drone that is
+//! late keeps its last command.
+//!
+//! [`mission`] turns a `Scenario` into the world and into the parameters of the pilots. [`DroneFactory`] makes one
+//! [`PilotHost`] per drone: a pilot, its radio receiver and what it counts in a tick. A program that steps the world
+//! itself, such as a test, needs only these two modules.
+//!
+//! The crate deliberately does not know how a drone decides (`skein-agent`), what the truth is (`skein-world`), how shared
+//! memory works (`skein-bus`), or what the files of a run look like (`skein-report`).
+//!
+//! # Example
+//!
+//! Five drones fly past a tree. The sink reads the end of the mission from the record.
+//!
+//! ```
+//! use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
+//! use skein_runtime::inline;
+//! use skein_scenario::{Scenario, ScenarioSource};
+//!
+//! #[derive(Default)]
+//! struct LastOutcome(Option<Outcome>);
+//!
+//! impl RecordSink for LastOutcome {
+//!     fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
+//!         let events = record.parse_events(|line| serde_json::from_slice(line).map_err(|error| error.to_string()))?;
+//!         for event in events {
+//!             if let EventKind::End { outcome, .. } = event.what {
+//!                 self.0 = Some(outcome);
+//!             }
+//!         }
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let text = r#"
+//!     [formation]
+//!     drones = 5
+//!
+//!     [[obstacle]]
+//!     shape = "circle"
+//!     centre_m = [150, 5]
+//!     radius_m = 10
+//! "#;
+//! let scenario = Scenario::parse(text, ScenarioSource { name: "tree.toml", stem: "tree" }, &[])?;
+//! let mut sink = LastOutcome::default();
+//! inline::run(&scenario, &mut sink, || None)?;
+//! assert_eq!(sink.0, Some(Outcome::Reached));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-pub mod beacon;
+mod beacon;
+mod child_args;
 mod children;
-pub mod clock;
+mod clock;
+mod drone_factory;
 pub mod drone_process;
+mod drone_range;
 mod error;
+mod fault_plan;
 pub mod inline;
+mod launch;
 pub mod mission;
-pub mod pilot_host;
-mod plan;
+mod pacer;
+mod pilot_host;
+mod pilot_kind;
 mod radio_receiver;
+mod run_end;
 pub mod run_facts;
+pub mod scenario_file;
 pub mod supervisor;
+mod tuning;
 pub mod world_process;
 
-pub use children::lighten;
-pub use clock::Clock;
+pub use beacon::BeaconPilot;
+pub use child_args::{ChildArgs, lighten};
+pub use clock::{Clock, ClockError};
+pub use drone_factory::DroneFactory;
+pub use drone_range::DroneRange;
 pub use error::RuntimeError;
-pub use mission::PilotKind;
-
-/// How a run ended, beside what its record tells.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RunEnd {
-    /// From the call to the first tick opened, s of wall time.
-    pub startup_s: f64,
-    /// System calls of the barrier: the world's, and those of all drones.
-    pub calls: [u64; 2],
-    /// The signal that interrupted it.
-    pub signal: Option<i32>,
-    /// Why the recording stopped early.
-    pub sink_error: Option<String>,
-    /// What of the environment failed while it flew: the world's death, a service that broke.
-    pub failure: Option<String>,
-}
+pub use launch::{Launch, ProcessInfo, ProcessRole};
+pub use pilot_host::{PilotHost, StepScratch};
+pub use pilot_kind::PilotKind;
+pub use run_end::RunEnd;

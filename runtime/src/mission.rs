@@ -1,21 +1,18 @@
-//! From a scenario to what flies it: the world, the drones' parameters, their cockpits. Both runtimes start here.
+//! Turns a scenario into a world and into the parameters of the pilots.
 
-use crate::beacon::BeaconPilot;
-use crate::pilot_host::PilotHost;
-use crate::{RuntimeError, plan};
+use crate::error::RuntimeError;
+use crate::fault_plan::fault_plan;
+use skein_agent::PilotParams;
 use skein_agent::detection::Braking;
 use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::{RANGING_FACTOR, SafetyParams};
-use skein_agent::{Pilot, PilotParams, SwarmPilot};
 use skein_leader::election::ElectionParams;
 use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
-use skein_protocol::radio::Radio;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use skein_scenario::{End, Failsafe, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
-use std::sync::Arc;
 
 /// Number of drones in a scenario.
 #[must_use]
@@ -23,16 +20,16 @@ pub fn drones(scenario: &Scenario) -> usize {
     scenario.formation.drones as usize
 }
 
-/// Length of a tick, ns.
+/// Length of a tick, ns of simulated time.
 #[must_use]
 pub fn dt_ns(scenario: &Scenario) -> i64 {
     (scenario.time.dt_s * 1e9).round() as i64
 }
 
-/// The world at the start of the mission: every drone at its start, at nominal speed along the flight.
+/// The world at the start of the mission: every drone is at its start and flies at nominal speed along x.
 ///
 /// # Errors
-/// [`RuntimeError::Scenario`], [`RuntimeError::Shape`]; none for a scenario that was checked.
+/// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`]. A checked scenario gives no error.
 pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
     let drone = &scenario.drone;
     let params = WorldParams {
@@ -58,7 +55,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         arrival_error_m: scenario.mission.arrival_error_m,
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
-        faults: plan::faults(scenario),
+        faults: fault_plan(scenario),
     };
     let velocity = Vec2::new(drone.speed_mps, 0.0);
     let starts: Vec<(Vec2, Vec2)> = scenario.starts().into_iter().map(|position| (position, velocity)).collect();
@@ -66,7 +63,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
     Ok(World::new(params, &starts, &shapes)?)
 }
 
-/// Where the mission ends, as the drones know it.
+/// Where the mission ends, as the pilots know it.
 #[must_use]
 pub fn destination(scenario: &Scenario) -> Destination {
     match (scenario.mission.end, scenario.mission.goal_m) {
@@ -75,7 +72,7 @@ pub fn destination(scenario: &Scenario) -> Destination {
     }
 }
 
-/// What one drone is told before it starts.
+/// The parameters of one pilot. `incarnation` counts the processes of the drone, from 1; `start` is the time of its first tick.
 #[must_use]
 pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotParams {
     let (drone, protocol) = (&scenario.drone, &scenario.protocol);
@@ -146,60 +143,4 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         destination: destination(scenario),
         debounce_s: scenario.protocol.debounce_s,
     }
-}
-
-/// What flies a drone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PilotKind {
-    /// The paper's pilot.
-    #[default]
-    Swarm,
-    /// The trivial one, [`BeaconPilot`].
-    Beacon,
-}
-
-impl PilotKind {
-    /// Its name in a child's arguments.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Swarm => "swarm",
-            Self::Beacon => "beacon",
-        }
-    }
-}
-
-/// Makes the drones of a swarm, or of a process, which share what is the same for all.
-pub struct DroneFactory<'s> {
-    scenario: &'s Scenario,
-    kind: PilotKind,
-    radio: Arc<Radio>,
-}
-
-impl<'s> DroneFactory<'s> {
-    /// Makes drones with pilots of this kind.
-    #[must_use]
-    pub fn new(scenario: &'s Scenario, kind: PilotKind) -> Self {
-        Self { scenario, kind, radio: Arc::new(scenario.radio()) }
-    }
-
-    /// One drone, ready for the tick that begins at `start`.
-    #[must_use]
-    pub fn pilot_host(&self, me: DroneId, incarnation: u32, start: SimTime) -> PilotHost {
-        let pilot: Box<dyn Pilot> = match self.kind {
-            PilotKind::Swarm => Box::new(SwarmPilot::new(pilot_params(self.scenario, me, incarnation, start))),
-            PilotKind::Beacon => Box::new(BeaconPilot::new(me, incarnation, self.beacon_ticks())),
-        };
-        PilotHost::new(me, self.scenario.time.dt_s, Arc::clone(&self.radio), pilot)
-    }
-
-    fn beacon_ticks(&self) -> u64 {
-        (self.scenario.protocol.beacon_period_s / self.scenario.time.dt_s).round() as u64
-    }
-}
-
-/// One drone with the paper's pilot, ready for the tick that begins at `start`.
-#[must_use]
-pub fn pilot_host(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotHost {
-    DroneFactory::new(scenario, PilotKind::Swarm).pilot_host(me, incarnation, start)
 }

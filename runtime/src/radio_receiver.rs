@@ -1,8 +1,8 @@
-//! A drone's radio: what of the air it hears, and when.
+//! A drone's radio receiver: which frames it receives, and when.
 
 use skein_agent::Heard;
 use skein_protocol::digest::Digest;
-use skein_protocol::downlink::{DownlinkView, SensesHeader};
+use skein_protocol::downlink::{DownlinkView, Senses, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::message::Topic;
@@ -20,54 +20,58 @@ pub(crate) struct Pending {
     due: SimTime,
     source: DroneId,
     sequence: u32,
-    /// Whether it was delivered before.
-    again: bool,
+    /// Whether it is the second copy of a duplicated frame.
+    duplicate: bool,
     place: Place,
 }
 
-/// Where a frame on its way is: most are heard in the tick in which they come in, and read where they lie.
+/// Where a frame on its way is stored. Most frames are due in the tick in which they come in, and are read in the downlink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Place {
-    /// In the downlink at hand.
-    Here(u32),
-    /// In [`RadioReceiver::kept`].
+    /// At this index of the current downlink.
+    Downlink(u32),
+    /// At this index of [`RadioReceiver::kept`].
     Kept(u32),
 }
 
-/// A drone's radio, and the frames on their way to it.
+/// A drone's radio receiver, and the frames on their way to it.
 pub(crate) struct RadioReceiver {
     me: DroneId,
     dt_ns: i64,
     radio: Arc<Radio>,
-    airs: ReceiverChannels,
-    /// How far it hears each topic, m.
+    channels: ReceiverChannels,
+    /// Greatest distance from which it receives each topic, m.
     reach_m: [f64; Topic::ALL.len()],
-    /// Due in a later tick than they come in: the one due first is the first.
+    /// Frames that are due in a later tick than they came in, the earliest first.
     pending: BinaryHeap<Reverse<Pending>>,
-    /// Their frames, and the places among them that are free.
+    /// Copies of the pending frames.
     kept: Vec<AirFrame>,
+    /// Indices of `kept` that are free.
     free: Vec<u32>,
-    /// Heard, heard for the second time, and refused since the last [`RadioReceiver::tally`].
+    /// Counts since the last [`RadioReceiver::tally`].
     tally: Tally,
 }
 
-/// What a radio counted in a tick.
+/// What a receiver counted in a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
-    pub heard: u32,
-    pub duplicates: u32,
-    pub dropped: [u32; DROP_REASONS],
-    /// Over who said what was heard, and its number, in the order in which it was heard. What it says the world knows.
-    pub hash: u64,
+    /// Frames delivered to the pilot.
+    pub(crate) heard: u32,
+    /// Second copies delivered to the pilot.
+    pub(crate) duplicates: u32,
+    /// Frames that were not received, by [`DropReason`].
+    pub(crate) dropped: [u32; DROP_REASONS],
+    /// Hash of source and sequence number of each delivered frame, in order. The world knows the contents.
+    pub(crate) hash: u64,
 }
 
 impl RadioReceiver {
-    pub fn new(me: DroneId, dt_ns: i64, radio: Arc<Radio>) -> Self {
+    pub(crate) fn new(me: DroneId, dt_ns: i64, radio: Arc<Radio>) -> Self {
         Self {
             me,
             dt_ns,
             reach_m: Topic::ALL.map(|topic| radio.reach_m(topic, me)),
-            airs: radio.channels_at(me),
+            channels: radio.channels_at(me),
             radio,
             pending: BinaryHeap::new(),
             kept: Vec::new(),
@@ -76,13 +80,14 @@ impl RadioReceiver {
         }
     }
 
-    /// What was counted since the last call.
-    pub fn tally(&mut self) -> Tally {
+    /// Returns what was counted since the last call.
+    pub(crate) fn tally(&mut self) -> Tally {
         std::mem::take(&mut self.tally)
     }
 
-    /// Takes up what will be heard: what is due by `now` goes to `arrived`, the rest is kept.
-    pub fn receive(
+    /// Decides for each frame of a downlink whether and when this drone receives it. Frames that are due by `now` go to
+    /// `arrived`; the others are kept.
+    pub(crate) fn receive(
         &mut self,
         down: &DownlinkView<'_>,
         now: SimTime,
@@ -90,93 +95,92 @@ impl RadioReceiver {
         stats: &mut LinkStats,
     ) {
         let Some(own) = down.drones.get(self.me.index()) else { return };
+        let air = Arriving { own, frames: down.frames, now };
         if own.link_faults != LinkFaults::default() || !self.hears_nearby(&down.nearby.locality) {
-            let frames = 0..down.frames.len();
-            frames.for_each(|place| _ = self.take_up((own, now), down.frames, place, arrived, stats));
+            for index in 0..down.frames.len() {
+                self.receive_frame(&air, index, arrived, stats);
+            }
             return;
         }
-        let mut looked = 0;
+        let mut examined = 0;
         let here = own.position_m.into();
-        down.nearby.each(here, |place| looked += self.take_up((own, now), down.frames, place, arrived, stats));
+        down.nearby.each(here, |index| examined += usize::from(self.receive_frame(&air, index, arrived, stats)));
         let from = |id| down.frames.partition_point(|frame| frame.source.0 < id);
         let others = down.frames.len() - (from(self.me.0 + 1) - from(self.me.0));
-        self.drop_frames(DropReason::Range, (others - looked) as u32, stats);
+        self.drop_frames(DropReason::Range, (others - examined) as u32, stats);
     }
 
-    /// Whether what is sorted by place is all this drone hears of these topics.
+    /// Whether this drone receives the topics that are sorted by place from nearby cells only.
     fn hears_nearby(&self, locality: &Locality) -> bool {
         let within = |(topic, reach_m): (Topic, f64)| !locality.holds(topic as u16) || reach_m <= locality.cell_m;
         locality.topics != 0 && Topic::ALL.into_iter().zip(self.reach_m).all(within)
     }
 
-    /// Takes up one frame of somebody else; the number of those that there were, 1 or 0.
-    fn take_up(
+    /// Decides about one frame. Returns whether there is such a frame and another drone has sent it.
+    fn receive_frame(
         &mut self,
-        (own, now): (&SensesHeader, SimTime),
-        frames: &[AirFrame],
-        place: usize,
+        air: &Arriving<'_>,
+        index: usize,
         arrived: &mut Vec<Pending>,
         stats: &mut LinkStats,
-    ) -> usize {
-        let Some(frame) = frames.get(place).filter(|frame| frame.source != self.me) else { return 0 };
-        if let Some(reason) = own.drop_reason(frame) {
+    ) -> bool {
+        let Some(frame) = air.frames.get(index).filter(|frame| frame.source != self.me) else { return false };
+        if let Some(reason) = air.own.drop_reason(frame) {
             self.drop_frames(reason, 1, stats);
-            return 1;
+            return true;
         }
-        match self.radio.delivery_at(&self.airs, frame, own.position_m.into(), self.dt_ns) {
+        match self.radio.delivery_at(&self.channels, frame, air.own.position_m.into(), self.dt_ns) {
             Delivery::Drop(reason) => self.drop_frames(reason, 1, stats),
             Delivery::Deliver { due, again } => {
-                self.expect(frame, place as u32, (due, false), now, arrived);
-                again.into_iter().for_each(|due| self.expect(frame, place as u32, (due, true), now, arrived));
+                let (source, sequence) = (frame.source, frame.sequence);
+                let place = Place::Downlink(index as u32);
+                let first = Pending { due, source, sequence, duplicate: false, place };
+                self.expect(first, frame, air.now, arrived);
+                if let Some(due) = again {
+                    self.expect(Pending { due, duplicate: true, ..first }, frame, air.now, arrived);
+                }
             }
         }
-        1
+        true
     }
 
-    fn expect(
-        &mut self,
-        frame: &AirFrame,
-        index: u32,
-        (due, again): (SimTime, bool),
-        now: SimTime,
-        arrived: &mut Vec<Pending>,
-    ) {
-        let pending = |place| Pending { due, source: frame.source, sequence: frame.sequence, again, place };
-        if due <= now {
-            arrived.push(pending(Place::Here(index)));
+    /// Puts a frame of the current downlink where it belongs: to `arrived` if it is due, otherwise to those that are kept.
+    fn expect(&mut self, pending: Pending, frame: &AirFrame, now: SimTime, arrived: &mut Vec<Pending>) {
+        if pending.due <= now {
+            arrived.push(pending);
         } else {
             let place = Place::Kept(self.keep(frame));
-            self.pending.push(Reverse(pending(place)));
+            self.pending.push(Reverse(Pending { place, ..pending }));
         }
     }
 
     fn keep(&mut self, frame: &AirFrame) -> u32 {
-        if let Some(place) = self.free.pop() {
-            self.kept[place as usize] = *frame;
-            return place;
+        if let Some(index) = self.free.pop() {
+            self.kept[index as usize] = *frame;
+            return index;
         }
         self.kept.push(*frame);
         self.kept.len() as u32 - 1
     }
 
-    /// Takes what is due at `now`, in the order (due, source, sequence), a second copy after the first; `here`: the frames
-    /// of the downlink at hand, tick `tick`'s.
-    pub fn deliver<'a>(
+    /// Delivers what is due at the time of the downlink to `heard`, in the order (due, source, sequence), a second copy after
+    /// the first. `arrived` holds what the downlink itself brought.
+    pub(crate) fn deliver<'a>(
         &'a mut self,
-        (tick, now): (u64, SimTime),
-        here: &'a [AirFrame],
+        senses: &Senses<'_>,
+        frames: &'a [AirFrame],
         arrived: &mut Vec<Pending>,
         heard: &mut Vec<Heard<'a>>,
         stats: &mut LinkStats,
     ) {
-        while self.pending.peek().is_some_and(|Reverse(next)| next.due <= now) {
+        while self.pending.peek().is_some_and(|Reverse(next)| next.due <= senses.now) {
             arrived.extend(self.pending.pop().map(|Reverse(pending)| pending));
         }
         arrived.sort_unstable();
         let Self { kept, free, tally, .. } = self;
-        for &Pending { source, sequence, again, place, .. } in arrived.iter() {
+        for &Pending { source, sequence, duplicate, place, .. } in arrived.iter() {
             let air: &'a AirFrame = match place {
-                Place::Here(index) => &here[index as usize],
+                Place::Downlink(index) => &frames[index as usize],
                 Place::Kept(index) => {
                     free.push(index);
                     &kept[index as usize]
@@ -185,16 +189,16 @@ impl RadioReceiver {
             match MessageRef::read(&air.frame) {
                 Ok(message) => {
                     tally.hash = Digest::chain(tally.hash, u64::from(source.0) << 32 | u64::from(sequence));
-                    if again {
+                    if duplicate {
                         tally.duplicates += 1;
                         stats.duplicates += 1;
                     } else {
                         tally.heard += 1;
-                        stats.delay(tick.saturating_sub(air.tick));
+                        stats.delay(senses.tick.saturating_sub(air.tick));
                     }
                     heard.push(Heard { source, message });
                 }
-                Err(_) if again => {}
+                Err(_) if duplicate => {}
                 Err(_) => {
                     stats.malformed += 1;
                     tally.dropped[DropReason::Malformed as usize] += 1;
@@ -208,4 +212,11 @@ impl RadioReceiver {
         self.tally.dropped[reason as usize] += count;
         stats.dropped[reason as usize] += u64::from(count);
     }
+}
+
+/// The frames of a downlink, as they arrive at one drone.
+struct Arriving<'a> {
+    own: &'a SensesHeader,
+    frames: &'a [AirFrame],
+    now: SimTime,
 }

@@ -1,99 +1,38 @@
-//! The launcher's part of a run in processes: it makes the domain, starts the world and the drones, records, and looks
-//! after them until the last one has ended.
+//! The launcher's part of a run in processes. It creates the domain, starts the world and the drones, records, carries out
+//! what the world requests of processes, and ends when all of them have ended.
 
-use crate::children::{Children, Role};
-use crate::drone_process::{DroneRange, scenario_path};
+use crate::child_args::ChildArgs;
+use crate::children::{ChildRole, Children};
+use crate::drone_range::DroneRange;
+use crate::error::RuntimeError;
+use crate::launch::{Launch, ProcessInfo, ProcessRole};
+use crate::run_end::RunEnd;
+use crate::tuning::{END_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, SUPERVISOR_POLL};
 use crate::world_process::DISMISSED;
-use crate::{Clock, PilotKind, RunEnd, RuntimeError, mission};
+use crate::{mission, scenario_file};
 use skein_bus::{
-    Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, WaitMode,
-    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
+    Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, WorldState,
+    allowed_cores, clean_dead_nodes, raise_file_limit,
 };
 use skein_protocol::record::{RecordSink, RecordView};
 use skein_protocol::{DroneId, Tick};
-use skein_scenario::Scenario;
-use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
-/// How a run in processes is started.
-pub struct Launch<'a> {
-    /// What is flown.
-    pub scenario: &'a Scenario,
-    /// What paces it.
-    pub clock: Clock,
-    /// Whether processes keep to one core each.
-    pub pin: PinMode,
-    /// How they wait for each other.
-    pub wait: WaitMode,
-    /// What flies the drones.
-    pub pilot: PilotKind,
-    /// Drones in a process, from 1. With more than one no fault of the scenario may end or stop a process.
-    pub per_process: u32,
-    /// The executable that knows the roles `world` and `drone`.
-    pub executable: PathBuf,
-    /// Told who is there: once all are ready and before the first tick, and again, with those that are gone, when a
-    /// drone got a new process.
-    pub on_ready: &'a mut dyn FnMut(&[ProcessInfo]) -> Result<(), String>,
-    /// Asked about once a millisecond whether to stop: it gives the signal's number.
-    pub interrupted: &'a mut dyn FnMut() -> Option<i32>,
-}
-
-/// A process of a run.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProcessInfo {
-    /// `launcher`, `world` or `drone`.
-    pub role: &'static str,
-    /// The drone's number; `None` for the others.
-    pub id: Option<u32>,
-    /// Its process id.
-    pub pid: u32,
-}
-
-/// Processes that are not ready after this were kept from it: the base, and more for each drone.
-const START_LIMIT: Duration = Duration::from_secs(20);
-const START_LIMIT_PER_DRONE: Duration = Duration::from_millis(100);
-/// How long processes may take to end by themselves.
-const END_LIMIT: Duration = Duration::from_secs(2);
-/// Between two looks at records, orders and signals; a death is noticed at once.
-const LOOK: Duration = Duration::from_millis(1);
-
-/// Flies a mission, a process each for the world and every drone, and hands each tick's record to `sink`.
+/// Flies a mission with one process for the world and one for each drone (or for [`Launch::per_process`] of them), and
+/// hands the record of each tick to `sink`.
 ///
 /// # Errors
-/// [`RuntimeError`] if it could not be started. What goes wrong in flight stands in [`RunEnd::failure`].
+/// [`RuntimeError`] if the run could not be started. What fails in flight is in [`RunEnd::failure`].
 pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, RuntimeError> {
     let started = Instant::now();
     raise_file_limit()?;
-    let drones = mission::drones(launch.scenario);
     let domain = Domain::create(&launch.scenario.name)?;
-    let per_process = launch.per_process.max(1) as usize;
-    let cores = match launch.pin {
-        PinMode::Auto => allowed_cores()?.min(drones.div_ceil(per_process) + 1),
-        PinMode::Off => 1,
-    };
-    let control = Control::create(ControlSpec { drones, cores, per_process, wait: launch.wait })?;
-    let services = Services::create(&domain, drones, per_process, "launcher")?;
-    let record = services.record_subscriber()?;
-    let path = scenario_path(domain.path());
-    let json = serde_json::to_vec(launch.scenario).map_err(|error| RuntimeError::Process(error.to_string()))?;
-    std::fs::write(&path, json).map_err(RuntimeError::system(format!("writing {}", path.display())))?;
-    let mut supervisor = Supervisor {
-        children: Children::new(&launch, &domain, &control)?,
-        end: RunEnd::default(),
-        domain: &domain,
-        processes: Vec::new(),
-        incarnations: vec![1; drones],
-        world_ended: None,
-        control,
-        record,
-        sink,
-        launch,
-    };
-    supervisor.start(drones)?;
+    let mut supervisor = Supervisor::new(launch, &domain, sink)?;
+    supervisor.start()?;
     supervisor.end.startup_s = started.elapsed().as_secs_f64();
     supervisor.watch();
-    supervisor.wind_up();
+    supervisor.shut_down();
     Ok(supervisor.end)
 }
 
@@ -104,60 +43,112 @@ struct Supervisor<'l, 's, 'd> {
     record: RecordSubscriber,
     sink: &'s mut dyn RecordSink,
     children: Children,
-    /// All that were started.
+    /// All that were started, those that have ended included.
     processes: Vec<ProcessInfo>,
-    /// Of each drone's newest process.
+    /// The incarnation of each drone's newest process.
     incarnations: Vec<u32>,
     world_ended: Option<ExitStatus>,
     end: RunEnd,
+    /// Keeps the services open for as long as the run lasts.
+    _services: Services,
 }
 
-impl Supervisor<'_, '_, '_> {
-    /// Starts everybody, waits until all are ready, tells who is there, and lets the world begin.
-    fn start(&mut self, drones: usize) -> Result<(), RuntimeError> {
-        self.children.spawn(Role::World, self.launch.clock)?;
-        let (drones_u32, step) = (drones as u32, self.launch.per_process.max(1));
-        for first in (0..drones_u32).step_by(step as usize) {
-            let count = step.min(drones_u32 - first);
-            let range = DroneRange { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
-            self.children.spawn(Role::Drones(range), self.launch.clock)?;
+impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
+    /// Sets up what the processes share, and starts none.
+    fn new(launch: Launch<'l>, domain: &'d Domain, sink: &'s mut dyn RecordSink) -> Result<Self, RuntimeError> {
+        let drones = mission::drones(launch.scenario);
+        let per_process = launch.per_process.max(1) as usize;
+        let cores = match launch.pin {
+            PinMode::Auto => allowed_cores()?.min(drones.div_ceil(per_process) + 1),
+            PinMode::Off => 1,
+        };
+        let control = Control::create(ControlSpec { drones, cores, per_process, wait: launch.wait })?;
+        let services = Services::create(domain, drones, per_process, "launcher")?;
+        let record = services.record_subscriber()?;
+        scenario_file::write(domain.path(), launch.scenario)?;
+        let args = ChildArgs {
+            domain: domain.path().to_owned(),
+            // A segment that this process has created always has a descriptor.
+            control: control.fd().unwrap_or(-1),
+            parent: std::process::id(),
+            pin: launch.pin,
+        };
+        Ok(Self {
+            children: Children::new(launch.executable.clone(), args, launch.pilot)?,
+            launch,
+            domain,
+            control,
+            record,
+            sink,
+            processes: Vec::new(),
+            incarnations: vec![1; drones],
+            world_ended: None,
+            end: RunEnd::default(),
+            _services: services,
+        })
+    }
+
+    fn drones(&self) -> usize {
+        self.incarnations.len()
+    }
+
+    /// Starts all processes, waits until they are ready, reports them to the caller, and lets the world begin.
+    fn start(&mut self) -> Result<(), RuntimeError> {
+        self.spawn_all()?;
+        if !self.wait_ready()? {
+            return Ok(());
         }
-        let limit = Instant::now() + START_LIMIT + START_LIMIT_PER_DRONE * drones as u32;
+        self.record.connect()?;
+        self.processes.push(ProcessInfo { role: ProcessRole::Launcher, id: None, pid: std::process::id() });
+        self.processes.extend(self.children.list());
+        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::OnReady)?;
+        self.control.give_go();
+        Ok(())
+    }
+
+    fn spawn_all(&mut self) -> Result<(), RuntimeError> {
+        self.children.spawn(ChildRole::World, self.launch.clock)?;
+        let (drones, per_process) = (self.drones() as u32, self.launch.per_process.max(1));
+        for first in (0..drones).step_by(per_process as usize) {
+            let count = per_process.min(drones - first);
+            let range = DroneRange { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
+            self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
+        }
+        Ok(())
+    }
+
+    /// Waits until all processes are ready. Returns false if a signal interrupted the wait.
+    fn wait_ready(&mut self) -> Result<bool, RuntimeError> {
+        let (begun, drones) = (Instant::now(), self.drones());
+        let limit = START_LIMIT + START_LIMIT_PER_DRONE * drones as u32;
         let mut ready = 0;
         while ready < drones || self.control.world_state() == WorldState::Starting {
-            if let Some((role, how)) = self.children.wait_any(LOOK).into_iter().next() {
-                return Err(RuntimeError::Process(format!("{role} ended before the first tick: {how}")));
+            if let Some((role, status)) = self.children.wait_any(SUPERVISOR_POLL).into_iter().next() {
+                return Err(RuntimeError::EndedEarly { process: role.to_string(), status });
             }
             if let Some(signal) = (self.launch.interrupted)() {
                 self.end.signal = Some(signal);
-                return Ok(());
+                return Ok(false);
             }
-            if Instant::now() > limit {
-                let waited = limit.elapsed() + START_LIMIT;
-                return Err(RuntimeError::Process(format!(
-                    "only {ready} of {drones} drones were ready after {waited:.0?}"
-                )));
+            let waited = begun.elapsed();
+            if waited > limit {
+                return Err(RuntimeError::NotReady { ready, drones, waited });
             }
             while ready < drones && self.control.ready(ready).is_some() {
                 ready += 1;
             }
         }
-        self.record.connect()?;
-        self.processes.push(ProcessInfo { role: "launcher", id: None, pid: std::process::id() });
-        self.processes.extend(self.children.list());
-        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::Process)?;
-        self.control.give_go();
-        Ok(())
+        Ok(true)
     }
 
-    /// Records and looks after everybody until the world has ended, or does not end although it was asked to.
+    /// Records and serves the world's requests until the world has ended, or does not end although it was asked to.
     fn watch(&mut self) {
         let mut asked = None;
         loop {
             self.reap();
-            if let Some(how) = self.world_ended {
+            if let Some(status) = self.world_ended {
                 self.take_records(true);
-                self.end.failure = Some(format!("the world ended in flight: {how}"));
+                self.end.failure = Some(format!("the world ended in flight: {status}"));
                 return;
             }
             let finished = self.control.world_state() == WorldState::Finished;
@@ -166,7 +157,7 @@ impl Supervisor<'_, '_, '_> {
                 self.control.request_stop(DISMISSED);
                 return;
             }
-            self.carry_out_orders();
+            self.serve_request();
             if let (None, Some(signal)) = (self.end.signal, (self.launch.interrupted)()) {
                 self.end.signal = Some(signal);
             }
@@ -180,8 +171,8 @@ impl Supervisor<'_, '_, '_> {
         }
     }
 
-    /// Takes what the world has recorded: with `all`, however long a slow disk takes. Otherwise that keeps nobody from
-    /// being looked after; in lockstep the world waits then.
+    /// Hands records to the sink: all that are there with `all`, however slow the disk is, otherwise only while the sink is
+    /// ready. A slow sink therefore does not delay the supervisor. In lockstep the world waits for it.
     fn take_records(&mut self, all: bool) {
         while all || self.sink.ready() {
             let sample = match self.record.receive() {
@@ -200,19 +191,25 @@ impl Supervisor<'_, '_, '_> {
         }
     }
 
-    /// Waits a little for processes to end, and tells the world of drones that have.
+    /// Waits shortly for processes to end, and marks the drones of those that have ended as dead.
     fn reap(&mut self) {
-        for (role, how) in self.children.wait_any(LOOK) {
+        for (role, status) in self.children.wait_any(SUPERVISOR_POLL) {
             match role {
-                Role::Drones(range) => range.ids().for_each(|id| self.control.mark_dead(id.index())),
-                Role::World => self.world_ended = Some(how),
+                ChildRole::Drones(range) => self.mark_dead(range),
+                ChildRole::World => self.world_ended = Some(status),
             }
         }
     }
 
-    /// What the world asks for in a tick. The reply to a restart is the new incarnation, to all else 1; 0 if there is no
-    /// such process.
-    fn carry_out_orders(&mut self) {
+    fn mark_dead(&self, range: DroneRange) {
+        for id in range.ids() {
+            self.control.mark_dead(id.index());
+        }
+    }
+
+    /// Carries out what the world requests, and replies: with the new incarnation to a restart, with 1 to anything else,
+    /// and with 0 if there is no such process.
+    fn serve_request(&mut self) {
         let Some(ProcessRequest { kind, drone, tick }) = self.control.next_request(Duration::ZERO) else { return };
         let reply = match kind {
             RequestKind::Kill => u32::from(self.kill(drone)),
@@ -225,7 +222,7 @@ impl Supervisor<'_, '_, '_> {
                 u32::from(self.children.resume_drone(drone))
             }
             RequestKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
-                tracing::error!(%error, "drone {drone} was not started again");
+                tracing::error!(%error, "restarting drone {drone} failed");
                 0
             }),
         };
@@ -234,43 +231,48 @@ impl Supervisor<'_, '_, '_> {
 
     fn kill(&mut self, drone: DroneId) -> bool {
         let killed = self.children.kill_drone(drone);
-        killed.into_iter().flat_map(|range| range.ids()).for_each(|id| self.control.mark_dead(id.index()));
+        if let Some(range) = killed {
+            self.mark_dead(range);
+        }
         killed.is_some()
     }
 
-    /// Starts a new process for a dead drone and waits until it is ready to answer `tick`; gives its incarnation.
+    /// Starts a new process for a dead drone and waits until it is ready to answer `first_tick`. Returns its incarnation.
     fn restart(&mut self, id: DroneId, first_tick: Tick) -> Result<u32, RuntimeError> {
         let drone = id.index();
-        let nobody = || RuntimeError::Process(format!("there is no drone {id}"));
-        let incarnation = self.incarnations.get(drone).ok_or_else(nobody)? + 1;
-        // Its predecessor still has its places in the services.
+        let incarnation = self.incarnations.get(drone).map_or(0, |incarnation| incarnation + 1);
+        let failed = || RuntimeError::NotRestarted { drone: id, incarnation };
+        if incarnation == 0 {
+            return Err(failed());
+        }
+        // The ended process still holds its places in the services.
         clean_dead_nodes(self.domain)?;
         self.control.revive(drone, first_tick);
         let range = DroneRange { first: id, count: 1, incarnation, first_tick };
-        self.children.spawn(Role::Drones(range), self.launch.clock)?;
+        self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
         let limit = Instant::now() + START_LIMIT;
         while self.control.ready(drone) != Some(incarnation) {
             self.reap();
             if self.control.is_dead(drone) || self.world_ended.is_some() || Instant::now() > limit {
-                return Err(RuntimeError::Process("its new process did not get ready".to_owned()));
+                return Err(failed());
             }
         }
         self.incarnations[drone] = incarnation;
         self.processes.extend(self.children.list().filter(|process| process.id == Some(id.0)));
-        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::Process)?;
+        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::OnReady)?;
         Ok(incarnation)
     }
 
-    /// Nobody outlives the run: drones end by themselves when the mission is closed, or are killed.
-    fn wind_up(&mut self) {
+    /// Ends all processes: drones end by themselves when the mission is closed, and those that do not are killed.
+    fn shut_down(&mut self) {
         self.control.close();
         self.children.resume_all();
         if self.end.failure.is_some() {
             self.children.kill_all();
         }
         let limit = Instant::now() + END_LIMIT;
-        while self.children.any() && Instant::now() < limit {
-            self.children.wait_any(LOOK);
+        while !self.children.is_empty() && Instant::now() < limit {
+            self.children.wait_any(SUPERVISOR_POLL);
         }
         self.children.kill_all();
         self.take_records(true);

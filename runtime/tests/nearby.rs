@@ -1,4 +1,4 @@
-//! What is sorted by place is what would have been heard otherwise, and counted the same.
+//! A drone receives and counts the same frames whether the downlink sorts them by place or not.
 
 use proptest::prelude::*;
 use skein_agent::{Command, Heard, Pilot};
@@ -9,9 +9,9 @@ use skein_protocol::payload::Leadership;
 use skein_protocol::radio::{ChannelModel, Radio, Range, Rule};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::pilot_host::{PilotHost, StepScratch};
+use skein_runtime::{PilotHost, StepScratch};
 
-/// Does nothing.
+/// A pilot that does nothing.
 struct Idle;
 
 impl Pilot for Idle {
@@ -24,10 +24,11 @@ impl Pilot for Idle {
     }
 }
 
-fn said(leads: bool) -> Message {
-    match leads {
-        true => Message::Leadership(Leadership { kind: 1, ..bytemuck::Zeroable::zeroed() }),
-        false => Message::Pose(bytemuck::Zeroable::zeroed()),
+fn message(leads: bool) -> Message {
+    if leads {
+        Message::Leadership(Leadership { kind: 1, ..bytemuck::Zeroable::zeroed() })
+    } else {
+        Message::Pose(bytemuck::Zeroable::zeroed())
     }
 }
 
@@ -36,7 +37,7 @@ fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
     let frame = |(&(position_m, leads), id): (&([f64; 2], bool), u32)| AirFrame {
         source: DroneId(id),
         position_m,
-        frame: said(leads).encode(),
+        frame: message(leads).encode(),
         ..bytemuck::Zeroable::zeroed()
     };
     let (drones, frames) = (points.iter().map(sense).collect(), points.iter().zip(0..).map(frame).collect());
@@ -45,7 +46,7 @@ fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
     down
 }
 
-fn hear(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
+fn receive(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
     let mut pilot_host = PilotHost::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     pilot_host.step(&down.view(), &mut StepScratch::default(), &mut slot, &mut stats);
@@ -55,7 +56,7 @@ fn hear(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
-    fn sorted_or_not_a_drone_hears_and_drops_the_same(
+    fn a_drone_receives_the_same_from_a_sorted_downlink(
         points in prop::collection::vec(([-300f64..300.0, -300f64..300.0], any::<bool>()), 40..120),
         far in 0u32..40,
         loss in 0.0..0.5,
@@ -71,7 +72,7 @@ proptest! {
         sorted.seal(1, SimTime(20_000_000));
         prop_assert!(sorted.index.locality.topics != 0);
         for me in 0..points.len() as u32 {
-            let (expected, found) = (hear(me, &radio, &plain), hear(me, &radio, &sorted));
+            let (expected, found) = (receive(me, &radio, &plain), receive(me, &radio, &sorted));
             prop_assert_eq!(expected.0, found.0);
             prop_assert!(expected.1 == found.1);
         }

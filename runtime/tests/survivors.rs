@@ -1,51 +1,47 @@
-//! Whatever goes wrong, those who still fly keep their distances and get there.
-#![allow(clippy::unwrap_used)]
+//! After any fault, the drones that still fly keep their distances and reach the goal.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod support;
 
 use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
 use skein_runtime::inline;
-use skein_scenario::{Scenario, ScenarioSource};
+use support::scenario;
 
-/// How a mission ended, why, and after how many ticks.
+/// How a mission ended.
 #[derive(Default)]
-struct Ending(Option<(Outcome, String)>, usize);
+struct Ending {
+    outcome: Option<Outcome>,
+    reason: String,
+    ticks: usize,
+}
 
 impl RecordSink for Ending {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
-        self.1 += 1;
-        for event in record
-            .parse_events(|line| serde_json::from_slice(line))
-            .map_err(|error: serde_json::Error| error.to_string())?
-        {
+        self.ticks += 1;
+        let parse = |line: &[u8]| serde_json::from_slice(line).map_err(|error| error.to_string());
+        for event in record.parse_events(parse)? {
             if let EventKind::End { outcome, reason, .. } = event.what {
-                self.0 = Some((outcome, reason));
+                (self.outcome, self.reason) = (Some(outcome), reason);
             }
         }
         Ok(())
     }
 }
 
-fn fly(name: &str, keys: &[(&str, &str)]) -> (Outcome, String) {
-    watch(name, keys).0.unwrap()
-}
-
-fn watch(name: &str, keys: &[(&str, &str)]) -> Ending {
-    let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(&path).unwrap();
-    let keys: Vec<(String, String)> = keys.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
-    let scenario = Scenario::parse(&text, ScenarioSource { name: &path, stem: "flight" }, &keys).unwrap();
+fn fly(name: &str, keys: &[(&str, &str)]) -> Ending {
     let mut ending = Ending::default();
-    inline::run(&scenario, &mut ending, || None).unwrap();
+    inline::run(&scenario(name, keys), &mut ending, || None).unwrap();
     ending
 }
 
-/// Flies each set of faults; all have to get there safely.
-fn all_get_there(name: &str, faults: impl Iterator<Item = Vec<String>>) {
+/// Flies a mission with each set of faults. All must reach the goal with every distance kept.
+fn all_reach_the_goal(name: &str, faults: impl Iterator<Item = Vec<String>>) {
     let mut failed = Vec::new();
     for plan in faults {
         let names: Vec<String> = (0..plan.len()).map(|i| format!("fault.{i}")).collect();
         let keys: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(plan.iter().map(String::as_str)).collect();
-        let (outcome, reason) = fly(name, &keys);
-        if outcome != Outcome::Reached {
+        let Ending { outcome, reason, .. } = fly(name, &keys);
+        if outcome != Some(Outcome::Reached) {
             failed.push(format!("{plan:?}: {outcome:?}, {reason}"));
         }
     }
@@ -53,33 +49,33 @@ fn all_get_there(name: &str, faults: impl Iterator<Item = Vec<String>>) {
 }
 
 #[test]
-fn a_newcomer_goes_round_a_body_that_it_never_heard() {
+fn a_restarted_drone_flies_round_a_dead_body_that_it_never_heard() {
     let kill = r#"{ kind = "kill", at_s = 10, target = "leader" }"#;
     let restart = |at_s: u32| format!(r#"{{ kind = "restart", at_s = {at_s}, for_s = 5, target = "member" }}"#);
-    all_get_there("paper/s2-right", (11..25).step_by(3).map(|at_s| vec![kill.to_owned(), restart(at_s)]));
+    all_reach_the_goal("paper/s2-right", (11..25).step_by(3).map(|at_s| vec![kill.to_owned(), restart(at_s)]));
 }
 
 #[test]
-fn a_body_in_a_gap_sends_the_queue_behind_it_another_way() {
+fn a_dead_body_in_a_gap_sends_the_queue_behind_it_another_way() {
     let kill = |at_s: u32| vec![format!(r#"{{ kind = "kill", at_s = {at_s}, target = "first-in-queue" }}"#)];
-    all_get_there("narrow/gap", (14..=34).step_by(4).map(kill));
+    all_reach_the_goal("narrow/gap", (14..=34).step_by(4).map(kill));
 }
 
 #[test]
-fn who_follows_one_that_stops_dead_is_not_pushed_into_it_by_those_behind() {
+fn a_drone_behind_one_that_stops_is_not_pushed_into_it_by_the_queue() {
     let kill = vec![r#"{ kind = "kill", at_s = 38, target = "first-in-queue" }"#.to_owned()];
-    all_get_there("paper/forest", std::iter::once(kill));
+    all_reach_the_goal("paper/forest", std::iter::once(kill));
 }
 
 #[test]
-fn halves_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
+fn parts_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
     for sides in ["[[0], [1, 2, 3, 4, 5, 6, 7]]", "[[0, 1], [2, 3], [4, 5], [6, 7]]"] {
         let cut = format!(r#"{{ kind = "partition", on = "reforming", after_s = 1, for_s = 10, sides = {sides} }}"#);
-        all_get_there("paper/forest", std::iter::once(vec![cut]));
+        all_reach_the_goal("paper/forest", std::iter::once(vec![cut]));
     }
 }
 
-/// A fault to the end, to whoever leads and to a member, at three moments.
+/// A fault that lasts to the end, on the leader and on a member, at three moments.
 fn to_the_end(kind: &str) -> impl Iterator<Item = Vec<String>> {
     let moments = ["leader-elected", "queued", "reforming"].into_iter();
     let cells = moments.flat_map(|on| ["leader", "member"].map(|target| (on, target)));
@@ -89,43 +85,44 @@ fn to_the_end(kind: &str) -> impl Iterator<Item = Vec<String>> {
 }
 
 #[test]
-fn who_is_never_heard_again_joins_the_formation_all_the_same() {
-    all_get_there("paper/s2-right", to_the_end("mute"));
-    all_get_there("narrow/door", to_the_end("mute"));
+fn a_drone_that_is_never_heard_again_joins_the_formation() {
+    all_reach_the_goal("paper/s2-right", to_the_end("mute"));
+    all_reach_the_goal("narrow/door", to_the_end("mute"));
 }
 
 #[test]
-fn who_never_hears_again_is_given_the_place_where_it_stands() {
-    all_get_there("paper/s2-right", to_the_end("deaf"));
-    all_get_there("narrow/door", to_the_end("deaf"));
+fn a_drone_that_never_hears_again_gets_the_slot_where_it_is() {
+    all_reach_the_goal("paper/s2-right", to_the_end("deaf"));
+    all_reach_the_goal("narrow/door", to_the_end("deaf"));
 }
 
 #[test]
-fn who_was_cut_off_does_not_stay_in_the_way_once_it_hears_the_others_again() {
+fn a_drone_that_was_cut_off_leaves_the_way_once_it_hears_the_others_again() {
     let cut = r#"{ kind = "partition", on = "queued", after_s = 1, for_s = 30, sides = [[0], [1, 2, 3, 4, 5, 6, 7]] }"#;
     for seed in ["1", "3", "4"] {
-        let (outcome, reason) =
-            fly("paper/s1-right", &[("seed", seed), ("formation.start_jitter_m", "1"), ("fault.0", cut)]);
-        assert_eq!(outcome, Outcome::Reached, "seed {seed}: {reason}");
+        let keys = [("seed", seed), ("formation.start_jitter_m", "1"), ("fault.0", cut)];
+        let Ending { outcome, reason, .. } = fly("paper/s1-right", &keys);
+        assert_eq!(outcome, Some(Outcome::Reached), "seed {seed}: {reason}");
     }
 }
 
-/// Planned anew by a part's leader who does not know yet how all of it fly, the queue would lose its order: 64 s.
+/// A group leader that plans before it knows how all of its group fly would change the order of the queue. The mission would
+/// then take 64 s.
 #[test]
-fn a_queue_keeps_its_order_while_parts_are_on_the_air() {
+fn a_queue_keeps_its_order_while_assignments_are_being_sent() {
     let keys =
         [("seed", "9"), ("formation.start_jitter_m", "5"), ("radio.preset", "\"lte\""), ("time.timeout_s", "58")];
-    assert_eq!(fly("paper/s2-right", &keys).0, Outcome::Reached);
+    assert_eq!(fly("paper/s2-right", &keys).outcome, Some(Outcome::Reached));
 }
 
 #[test]
-fn a_queue_keeps_its_order_though_parts_of_the_plan_are_lost() {
-    // Over this radio a burst of loss often takes somebody's part away from the leader of its group alone.
+fn a_queue_keeps_its_order_when_assignments_are_lost() {
+    // On this radio, a burst of loss often costs a group leader the assignment of a member that all others have.
     let ticks = |preset: &str, seed: &str| {
         let keys = [("radio.preset", preset), ("seed", seed), ("formation.start_jitter_m", "5")];
-        let Ending(end, ticks) = watch("paper/s2-right", &keys);
-        assert_eq!(end.unwrap().0, Outcome::Reached);
-        ticks as f64
+        let ending = fly("paper/s2-right", &keys);
+        assert_eq!(ending.outcome, Some(Outcome::Reached));
+        ending.ticks as f64
     };
     for seed in ["3", "5", "6", "10"] {
         let (ideal, lte) = (ticks("\"ideal\"", seed), ticks("\"lte\"", seed));

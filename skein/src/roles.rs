@@ -3,8 +3,7 @@
 use crate::cli::{self, DroneArgs, WorldArgs};
 use crate::exit::{Exit, Failure};
 use skein_protocol::DroneId;
-use skein_runtime::drone_process::{self, ChildArgs, DroneRange};
-use skein_runtime::world_process;
+use skein_runtime::{ChildArgs, DroneRange, drone_process, world_process};
 
 /// Runs the world.
 pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
@@ -15,8 +14,8 @@ pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
 /// Runs one drone.
 pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
     let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
-    let crew = DroneRange { first: DroneId(id), count, incarnation, first_tick };
-    let run = drone_process::run(&child(&args.child), crew, args.pilot.into());
+    let range = DroneRange { first: DroneId(id), count, incarnation, first_tick };
+    let run = drone_process::run(&child(&args.child), range, args.pilot.into());
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
 }
 

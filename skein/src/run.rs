@@ -9,8 +9,7 @@ use crate::progress::Progress;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::supervisor::{self, Launch, ProcessInfo};
-use skein_runtime::{PilotKind, RunEnd, RuntimeError, inline};
+use skein_runtime::{Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -98,14 +97,14 @@ fn fly(
     interrupt: &Interrupt,
     sink: &mut dyn RecordSink,
 ) -> Result<RunEnd, RuntimeError> {
-    let launcher = ProcessInfo { role: "launcher", id: None, pid: std::process::id() };
+    let launcher = ProcessInfo { role: ProcessRole::Launcher, id: None, pid: std::process::id() };
     let mut on_ready = |processes: &[ProcessInfo]| {
         let entries: Vec<ProcessEntry> = processes.iter().map(entry).collect();
-        folder.write_processes(&entries).map_err(|error| error.to_string())
+        Ok(folder.write_processes(&entries)?)
     };
     match args.runtime {
         RuntimeChoice::Inline => {
-            on_ready(&[launcher]).map_err(RuntimeError::Process)?;
+            on_ready(&[launcher]).map_err(RuntimeError::OnReady)?;
             inline::run(scenario, sink, || interrupt.signal())
         }
         RuntimeChoice::Processes => {
@@ -129,9 +128,9 @@ fn fly(
 
 fn entry(process: &ProcessInfo) -> ProcessEntry {
     let role = match process.role {
-        "world" => Role::World,
-        "drone" => Role::Drone,
-        _ => Role::Launcher,
+        ProcessRole::World => Role::World,
+        ProcessRole::Drone => Role::Drone,
+        ProcessRole::Launcher => Role::Launcher,
     };
     ProcessEntry { role, id: process.id, pid: process.pid }
 }

@@ -1,4 +1,4 @@
-//! Headless Chromium, driven over its DevTools socket.
+//! Drives a headless Chromium through its DevTools socket.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
@@ -9,23 +9,23 @@ use std::time::{Duration, Instant};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-/// Whatever takes longer than this hangs.
+/// An answer that takes longer than this never comes.
 const WATCHDOG: Duration = Duration::from_secs(90);
 
-/// A browser with one page, gone when this is dropped.
+/// A browser with one page. Dropping this ends it.
 pub struct Browser {
     child: Child,
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     session: String,
     next: u64,
-    /// Addresses that the page asked for.
+    /// Addresses that the page has requested.
     pub requests: Vec<String>,
-    /// Errors that the page had, or wrote to its console.
+    /// Errors of the page, and errors and warnings on its console.
     pub errors: Vec<String>,
 }
 
 impl Browser {
-    /// Starts Chromium; `None`, said on stderr, where there is none.
+    /// Starts Chromium. Returns `None`, and says so on stderr, if there is none.
     pub fn start(profile: &Path) -> Option<Self> {
         let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(|name| spawn(name, profile));
         let Some(mut child) = found else {
@@ -34,7 +34,7 @@ impl Browser {
         };
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
         let address = lines.find_map(|line| line.strip_prefix("DevTools listening on ").map(str::to_owned));
-        // Whatever else it says must not fill the pipe.
+        // The pipe must not fill up with further output.
         std::thread::spawn(move || lines.for_each(drop));
         let (socket, _) = tungstenite::connect(address.expect("Chromium ended before it listened")).unwrap();
         let MaybeTlsStream::Plain(stream) = socket.get_ref() else { panic!("a plain socket was asked for") };
@@ -75,7 +75,7 @@ impl Browser {
         }
     }
 
-    /// Takes a size for the page, in pixels.
+    /// Sets the size of the page, in pixels.
     pub fn resize(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", size);

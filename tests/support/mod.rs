@@ -1,4 +1,4 @@
-//! A place of its own for each test, and the `skein` binary started in it under a watchdog.
+//! Gives each test a working folder of its own, and starts the `skein` binary in it under a watchdog.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 pub mod browser;
@@ -16,12 +16,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Whatever takes longer than this hangs.
+/// A command that takes longer than this hangs.
 const WATCHDOG: Duration = Duration::from_secs(120);
-/// Between two looks at something that is waited for.
-const LOOK: Duration = Duration::from_millis(2);
+/// Time between two polls.
+const POLL: Duration = Duration::from_millis(2);
 
-/// A working folder and a domain that no other test shares.
+/// A working folder with a domain that no other test shares.
 pub struct Place(TempDir);
 
 impl Place {
@@ -57,7 +57,7 @@ impl Place {
         self.start(args).finish()
     }
 
-    /// Flies a paper scenario into the folder `out` and gives its summary.
+    /// Flies a paper scenario and returns its summary.
     pub fn fly(&self, name: &str, args: &[&str]) -> Value {
         let scenario = paper(name);
         let done = self.run(&[&["run", &scenario, "--json"], args].concat());
@@ -70,14 +70,14 @@ impl Place {
         self.start(&[&["run", &paper(name), "--json", "--out", "out"], args].concat())
     }
 
-    /// What is in the domain's root beside its lock: runs that live or were left behind.
+    /// The runs in the domain's root: those that live, and those that were left behind.
     pub fn runs_in_domain(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.join("x/skein")) else { return Vec::new() };
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
         names.filter(|name| name != "lock").collect()
     }
 
-    /// Nothing was started or made: neither a domain nor a run's folder.
+    /// The command has started nothing and made neither a domain nor a run's folder.
     pub fn assert_untouched(&self, known: &Done) {
         assert!(!self.join("x/skein").exists(), "a domain was made: {known:?}");
         assert!(!self.join("runs").exists() && !self.join("out").exists(), "a run's folder was made: {known:?}");
@@ -103,7 +103,7 @@ impl Done {
     }
 }
 
-/// A command under way. Its processes are gone when this is dropped.
+/// A running command. Dropping this kills it with all its processes.
 pub struct Flight {
     child: Child,
     out: PathBuf,
@@ -117,14 +117,14 @@ impl Flight {
         self.child.id()
     }
 
-    /// Its processes, once all are ready: launcher, world, drones by number.
+    /// Waits until all processes are ready. Returns the launcher, the world and the drones by number.
     pub fn processes(&mut self) -> Vec<Role> {
         let file = self.out.join("processes.json");
         self.wait_for(&file);
         process::read(&file)
     }
 
-    /// Waits for a file of the run's folder.
+    /// Waits until a file of the run's folder exists.
     pub fn wait_for(&mut self, file: &Path) {
         let since = Instant::now();
         while !file.exists() {
@@ -134,11 +134,11 @@ impl Flight {
                 let said = self.stderr.take().map(|thread| thread.join().unwrap());
                 panic!("`{}`: no {} after {:?}; {ended:?}, {said:?}", self.args, file.display(), since.elapsed());
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL);
         }
     }
 
-    /// Waits until what is recorded has come to `t_s`: the writer's buffer makes it late by some ticks.
+    /// Waits until the recording has reached `t_s`. The writer's buffer delays it by some ticks.
     pub fn wait_until(&mut self, t_s: f64) {
         let (file, done) = (self.out.join("flight.spool"), self.out.join("summary.json"));
         self.wait_for(&file);
@@ -147,7 +147,7 @@ impl Flight {
         });
     }
 
-    /// Waits for its end, and makes sure that it left no process and nothing in shared memory.
+    /// Waits for its end, and asserts that it has left no process and nothing in shared memory.
     pub fn finish(mut self) -> Done {
         let done = self.end();
         if let Ok(text) = fs::read(self.out.join("processes.json"))
@@ -173,7 +173,7 @@ impl Flight {
                 let _ = (self.child.kill(), self.child.wait());
                 panic!("`{}` hangs; it said {:?}", self.args, self.stderr.take().map(|thread| thread.join()));
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL);
         };
         let text = |thread: Option<JoinHandle<String>>| thread.map(|t| t.join().unwrap()).unwrap_or_default();
         let (stdout, stderr) = (text(self.stdout.take()), text(self.stderr.take()));
@@ -187,8 +187,8 @@ impl Drop for Flight {
     }
 }
 
-/// The time of the last whole record in a spool, s. A record is its length, its tick, its time in ns and more; all in
-/// words of eight bytes.
+/// The time of the last complete record in a spool, s. A record begins with its length, its tick and its time in ns, each a
+/// word of eight bytes.
 fn recorded_s(spool: &[u8]) -> f64 {
     let word = |at: usize| Some(u64::from_ne_bytes(spool.get(at..at + 8)?.try_into().ok()?));
     let (mut at, mut now_ns) = (0, 0);
@@ -207,12 +207,12 @@ fn drain(mut from: impl Read + Send + 'static) -> JoinHandle<String> {
     })
 }
 
-/// Waits until something holds; fails with `what` if it never does.
+/// Waits until a condition holds; fails with `what` if it never does.
 pub fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
     let since = Instant::now();
     while !holds() {
         assert!(since.elapsed() < WATCHDOG, "never true: {what}");
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL);
     }
 }
 
@@ -227,7 +227,7 @@ pub fn number(summary: &Value, pointer: &str) -> f64 {
     value.unwrap_or_else(|| panic!("{pointer} is no number in {summary}"))
 }
 
-/// Within a part of what is wanted.
+/// Asserts that a number differs from the expected one by at most this part of it.
 pub fn assert_near(what: &str, found: f64, wanted: f64, part: f64) {
     assert!((found - wanted).abs() <= wanted * part, "{what}: {found}, wanted {wanted} within {} %", part * 100.0);
 }

@@ -1,4 +1,4 @@
-//! Looking at, and signalling, processes that a test has started.
+//! Inspects and signals processes that a test has started.
 
 use serde_json::Value;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub fn parse(text: &[u8]) -> Vec<Role> {
     entries.iter().map(role).collect()
 }
 
-/// The process of a role; of a drone, by its number.
+/// The process id of a role. A drone is named by its number as well.
 pub fn pid_of(processes: &[Role], role: &str, id: Option<u64>) -> u32 {
     let found = processes.iter().find(|process| process.role == role && process.id == id);
     found.unwrap_or_else(|| panic!("no {role} {id:?} in {processes:?}")).pid
@@ -40,12 +40,12 @@ pub fn signal(name: &str, pid: u32) {
     assert!(status.success(), "`{script}` failed: the process is gone");
 }
 
-/// Neither gone nor a zombie.
+/// Whether the process exists and is no zombie.
 pub fn is_alive(pid: u32) -> bool {
     stat(pid).is_some_and(|fields| fields[0] != "Z" && fields[0] != "X")
 }
 
-/// `R`, `S`, `T` (stopped) …
+/// The state of a process: `R`, `S`, `T` (stopped) …
 pub fn state(pid: u32) -> String {
     stat(pid).unwrap_or_else(|| panic!("process {pid} is gone")).swap_remove(0)
 }
@@ -62,7 +62,7 @@ fn stat(pid: u32) -> Option<Vec<String>> {
     Some(fields.split(' ').map(str::to_owned).collect())
 }
 
-/// What a launcher's run has in shared memory.
+/// The files of a launcher's run in shared memory.
 pub fn shared_files(launcher: u32) -> Vec<String> {
     let prefix = format!("skein_{launcher}_");
     super::names("/dev/shm").into_iter().filter(|name| name.starts_with(&prefix)).collect()

@@ -3,7 +3,7 @@
 use super::flown::{Flown, fly, parse, position};
 use skein_protocol::record::Outcome;
 
-/// Obstacles 40 m wide, abreast, this far apart, m.
+/// A flight past `count` obstacles abreast, each 40 m wide, with gaps of `gap_m`.
 fn abreast(count: usize, gap_m: f64) -> Flown {
     let mut text = "strategy = \"congestion-aware-paper\"\n[formation]\nspacing_m = 35\n[mission]\nend = \"goal\"\n\
                     goal_m = [420, 0]\n[drone]\nsafe_distance_m = 25\n"
@@ -17,13 +17,13 @@ fn abreast(count: usize, gap_m: f64) -> Flown {
     flown
 }
 
-/// Drones that pass between the outermost edges of the obstacles.
+/// Number of drones that pass within this distance of the axis.
 fn between(flown: &Flown, half_width_m: f64) -> usize {
     flown.crossings(200.0).iter().filter(|(_, _, row)| position(row).y.abs() < half_width_m).count()
 }
 
 #[test]
-fn e5_k_obstacles_have_one_route_more_and_drones_take_those_between() {
+fn e5_k_obstacles_give_k_plus_one_routes_and_drones_take_the_gaps() {
     for count in 1..=3 {
         let flown = abreast(count, 60.0);
         assert_eq!(flown.routes() as usize, count + 1);
@@ -33,10 +33,10 @@ fn e5_k_obstacles_have_one_route_more_and_drones_take_those_between() {
 }
 
 #[test]
-fn a4_a_gap_not_wider_than_the_clearance_on_both_sides_is_closed_and_the_obstacles_enveloped() {
-    // The clearance is 15 m on either side of a drone.
+fn a4_a_gap_narrower_than_twice_the_clearance_is_closed() {
+    // The clearance is 15 m on both sides of a drone.
     let (open, closed) = (abreast(2, 34.0), abreast(2, 29.0));
     assert_eq!((open.routes(), closed.routes()), (3, 2));
     assert!(between(&open, 57.0) > 0);
-    assert_eq!(between(&closed, 54.5), 0, "somebody took the closed gap");
+    assert_eq!(between(&closed, 54.5), 0, "a drone took the closed gap");
 }

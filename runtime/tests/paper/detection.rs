@@ -1,4 +1,4 @@
-//! The global routine and obstacle detection: A1, A2, E1 to E4.
+//! The mission's routine and obstacle detection: A1, A2, E1 to E4.
 
 use super::flown::{Flown, fly_file, scenario, velocity};
 use skein_agent::detection::Braking;
@@ -7,7 +7,7 @@ use skein_protocol::record::EventKind;
 use skein_scenario::{Scenario, ScenarioSource};
 
 #[test]
-fn a1_the_routine_is_flown_in_its_order() {
+fn a1_the_steps_of_the_routine_follow_each_other() {
     let flown = fly_file("paper/s2-right", &[]);
     let phase =
         |wanted: Phase| move |what: &EventKind| matches!(what, EventKind::Grouping { phase, .. } if *phase == wanted);
@@ -38,7 +38,7 @@ fn a2_an_obstacle_is_detected_in_the_tick_in_which_it_is_in_range() {
 }
 
 #[test]
-fn e1_to_e4_a_scenario_stops_as_the_equations_say_and_must_see_that_far() {
+fn e1_to_e4_a_scenario_has_the_stopping_distance_of_the_equations_and_must_sense_that_far() {
     let s2 = |t_c: &str| scenario("paper/s2-right", &[("drone.reaction_time_s", t_c)]);
     for (t_c, stopping_m) in [("0", 10.0), ("0.3", 13.0)] {
         let flown = s2(t_c);
@@ -47,7 +47,8 @@ fn e1_to_e4_a_scenario_stops_as_the_equations_say_and_must_see_that_far() {
         assert!((braking.stopping_m(10.0) - stopping_m).abs() < 1e-9);
         assert!((flown.stopping_distance_m() - stopping_m).abs() < 1e-9);
     }
-    // It has to stop 15 m before what it sees: 25 m without t_c, 30 m with half a second.
+    // A drone must be able to stop 15 m before an obstacle that it senses. That takes 25 m without t_c, and 30 m with half a
+    // second.
     let text = s2("0").to_toml().unwrap();
     let with = |t_c: &str| {
         let sets = [("drone.reaction_time_s", t_c), ("sensors.detection_range_m", "26")];
@@ -59,14 +60,14 @@ fn e1_to_e4_a_scenario_stops_as_the_equations_say_and_must_see_that_far() {
     assert!(refused.contains("detection_range_m"), "{refused}");
 }
 
-/// When the first drone turns off the course, s.
+/// When the first drone leaves the course, s.
 fn turns_s(flown: &Flown) -> f64 {
     let turned = |(_, rows): &&(f64, Vec<_>)| rows.iter().any(|row| velocity(row).y.abs() > 0.05);
     flown.ticks.iter().find(turned).unwrap().0
 }
 
 #[test]
-fn e4_a_time_to_react_delays_the_drone_and_widens_what_it_keeps() {
+fn e4_a_reaction_time_delays_the_drone_and_increases_its_distances() {
     let (quick, slow) =
         (fly_file("paper/s2-right", &[]), fly_file("paper/s2-right", &[("drone.reaction_time_s", "0.4")]));
     let [decided, later] = [&quick, &slow].map(|flown| turns_s(flown) - flown.grouping().1);

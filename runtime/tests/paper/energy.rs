@@ -14,12 +14,12 @@ fn p1_power_is_the_papers_and_hovering_costs_a_third_more_than_cruising() {
 #[test]
 fn e7_energy_is_the_sum_of_power_over_all_drones_and_ticks() {
     let flown = fly_file("paper/s2-right", &[]);
-    // Over a tick a drone takes the power of the speed at which it began it, 10 m/s in the first.
+    // In a tick a drone uses the power of its speed at the beginning of the tick: 10 m/s in the first one.
     let first = 8.0 * power_w(10.0);
     let rest = flown.ticks[..flown.ticks.len() - 1].iter().flat_map(|(_, rows)| rows);
     let sum_j = (first + rest.map(|row| power_w(velocity(row).norm())).sum::<f64>()) * 0.02;
-    let told_j: f64 = flown.ticks.last().unwrap().1.iter().map(|row| row.energy_j).sum();
-    assert!((told_j / sum_j - 1.0).abs() < 1e-9, "{told_j} J told, {sum_j} J summed");
+    let recorded_j: f64 = flown.ticks.last().unwrap().1.iter().map(|row| row.energy_j).sum();
+    assert!((recorded_j / sum_j - 1.0).abs() < 1e-9, "{recorded_j} J recorded, {sum_j} J summed");
 }
 
 #[test]

@@ -1,14 +1,14 @@
-//! A mission, flown and remembered.
+//! A flown mission with its whole record.
 
 use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent, SinkError};
 use skein_protocol::{DroneId, Phase, Vec2};
 use skein_runtime::inline;
 use skein_scenario::{Scenario, ScenarioSource};
 
-/// Everything that the record tells.
+/// The record of a flight.
 #[derive(Default)]
 pub struct Flown {
-    /// Time, s, and a row a drone, of every tick.
+    /// Of every tick: the time, s, and one row per drone.
     pub ticks: Vec<(f64, Vec<DroneRow>)>,
     pub events: Vec<RunEvent>,
 }
@@ -44,7 +44,7 @@ pub fn fly(scenario: &Scenario) -> Flown {
     flown
 }
 
-/// A file's mission by the paper's rule, which has to reach its goal with every distance kept.
+/// Flies a scenario file by the paper's rule. The mission must reach its goal with every distance kept.
 pub fn fly_file(name: &str, sets: &[(&str, &str)]) -> Flown {
     let rule = ("strategy", "congestion-aware-paper");
     let flown = fly(&scenario(name, &[&[rule], sets].concat()));
@@ -69,7 +69,7 @@ impl Flown {
         self.events.iter().find_map(end).unwrap()
     }
 
-    /// Time of the first event of which this is true, s.
+    /// Time of the first event that fulfils a condition, s.
     pub fn when(&self, what: impl Fn(&EventKind) -> bool) -> f64 {
         self.events.iter().find(|event| what(&event.what)).unwrap().t_s
     }
@@ -82,7 +82,7 @@ impl Flown {
         self.when(|what| matches!(what, EventKind::Passed { stage } if *stage == set))
     }
 
-    /// Of the first plan to avoid something: forecast, s, and time, s.
+    /// The first plan to avoid an obstacle set: its predicted time, s, and when it was made, s.
     pub fn grouping(&self) -> (f64, f64) {
         let avoid = |event: &RunEvent| match &event.what {
             EventKind::Grouping { phase, predicted_s, .. } if *phase == Phase::Avoid => {
@@ -93,7 +93,7 @@ impl Flown {
         self.events.iter().find_map(avoid).unwrap()
     }
 
-    /// Routes of the last plan to avoid something: it knows all obstacles, those that were seen late too.
+    /// Number of routes of the last plan to avoid an obstacle set. The last plan knows all obstacles, also those seen late.
     pub fn routes(&self) -> u32 {
         let avoid = |event: &RunEvent| match &event.what {
             EventKind::Grouping { phase, routes, .. } if *phase == Phase::Avoid => Some(*routes),
@@ -106,7 +106,7 @@ impl Flown {
         &self.ticks.iter().find(|(now_s, _)| *now_s >= t_s - 1e-9).unwrap().1
     }
 
-    /// When each drone first passes this abscissa, m, with its row then; the first first.
+    /// When each drone first passes this abscissa, m, with its row at that time; in order of time.
     pub fn crossings(&self, x_m: f64) -> Vec<(f64, DroneId, DroneRow)> {
         let drones = self.ticks[0].1.len();
         let crossing = |drone: usize| {
@@ -118,7 +118,7 @@ impl Flown {
         crossings
     }
 
-    /// Least distance of two drones over the mission, m.
+    /// Least distance between two drones over the mission, m.
     pub fn separation_m(&self) -> f64 {
         let least = |rows: &[DroneRow]| {
             let pairs = (0..rows.len()).flat_map(|i| (0..i).map(move |j| (i, j)));

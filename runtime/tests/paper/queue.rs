@@ -3,7 +3,7 @@
 use super::flown::{Flown, fly_file, position};
 use std::collections::BTreeMap;
 
-/// By route: when its drones pass the gate, s, and their places in its queue, the first first.
+/// By route: when each drone passes the gate, s, and its place in the queue; in order of time.
 fn passes(flown: &Flown, gate_x_m: f64) -> BTreeMap<u16, Vec<(f64, u16)>> {
     let mut passes: BTreeMap<u16, Vec<(f64, u16)>> = BTreeMap::new();
     for (t_s, _, row) in flown.crossings(gate_x_m) {
@@ -12,21 +12,21 @@ fn passes(flown: &Flown, gate_x_m: f64) -> BTreeMap<u16, Vec<(f64, u16)>> {
     passes
 }
 
-/// Least time between two that pass one after the other on the same route, s.
+/// Least time between two consecutive drones on the same route, s.
 fn least_gap_s(passes: &BTreeMap<u16, Vec<(f64, u16)>>) -> f64 {
     let gaps = passes.values().flat_map(|queue| queue.windows(2).map(|two| two[1].0 - two[0].0));
     gaps.fold(f64::INFINITY, f64::min)
 }
 
 #[test]
-fn q1_drones_pass_in_the_order_of_their_queue_and_keep_the_safe_distance_in_it() {
+fn q1_drones_pass_in_the_order_of_their_queue_and_keep_the_safe_distance() {
     let flown = fly_file("paper/s2-right", &[]);
     let passes = passes(&flown, 144.0);
     assert_eq!(passes.values().map(Vec::len).collect::<Vec<_>>(), [2, 6]);
     for queue in passes.values() {
         assert!(queue.is_sorted_by_key(|(_, rank)| *rank), "{queue:?}");
     }
-    // 37 m at 10 m/s; those behind slow down for it.
+    // 37 m at 10 m/s take 3.7 s. Drones behind slow down to keep that.
     assert!(least_gap_s(&passes) >= 3.7, "{passes:?}");
     let slowest = flown.ticks.iter().flat_map(|(_, rows)| rows.iter().map(|row| row.velocity_mps[0]));
     assert!(slowest.fold(f64::INFINITY, f64::min) < 8.0);
@@ -38,12 +38,12 @@ fn q1_without_the_queue_law_drones_pass_side_by_side() {
     let without = fly_file("paper/s2-right", &[("guidance.queue", "false")]);
     let [queued, free] = [&with, &without].map(|flown| least_gap_s(&passes(flown, 144.0)));
     assert!(free < queued / 2.0, "{queued} s apart with it, {free} s without");
-    // The filter alone keeps them apart.
+    // Only the safety filter keeps them apart.
     assert!(without.separation_m() >= 37.0, "{} m", without.separation_m());
 }
 
 #[test]
-fn g1_groups_split_again_and_two_of_different_descent_share_the_gap_in_one_queue() {
+fn g1_groups_split_again_and_two_groups_of_different_parents_share_the_gap_in_one_queue() {
     let flown = fly_file("paper/forest", &[]);
     let mut members: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (drone, row) in flown.at(70.0).iter().enumerate() {
@@ -56,7 +56,7 @@ fn g1_groups_split_again_and_two_of_different_descent_share_the_gap_in_one_queue
     groups.sort();
     groups.dedup();
     assert_eq!(groups, ["N12", "N21"]);
-    // One queue: a place each, and they pass in its order.
+    // There is one queue: each drone has a place of its own, and they pass in this order.
     assert_eq!(gap.iter().map(|(_, _, row)| row.rank).collect::<Vec<_>>(), (0..gap.len() as u16).collect::<Vec<_>>());
     assert!(gap.windows(2).all(|two| two[1].0 - two[0].0 >= 2.5), "25 m at 10 m/s");
 }

@@ -6,18 +6,20 @@ use skein_protocol::Vec2;
 use skein_protocol::thin_plate::{bending_energy, centred};
 
 /// Greatest distance of a drone to its slot after the best translation and assignment, m, and the bending energy of the
-/// spline that takes the slots to the drones.
+/// spline that maps the slots to the drones.
 fn disturbance(flown: &Flown, slots: &[Vec2], t_s: f64) -> (f64, f64) {
     let drones = centred(&flown.at(t_s).iter().map(position).collect::<Vec<_>>());
     let slot_of = assign(&drones, slots).unwrap();
     let largest_m = drones.iter().zip(&slot_of).map(|(p, &slot)| (p - slots[slot]).norm()).fold(0.0, f64::max);
     let mut images = vec![Vec2::zeros(); slots.len()];
-    drones.iter().zip(&slot_of).for_each(|(drone, &slot)| images[slot] = *drone);
+    for (drone, &slot) in drones.iter().zip(&slot_of) {
+        images[slot] = *drone;
+    }
     (largest_m, bending_energy(slots, &images, 0.0).unwrap().bending)
 }
 
 #[test]
-fn a5_e6_the_formation_is_torn_apart_and_closes_with_each_method() {
+fn a5_e6_the_formation_is_deformed_and_closes_with_each_method() {
     let slots = centred(&scenario("paper/s2-right", &[]).slots());
     for method in ["optimal", "tps", "greedy", "identity"] {
         let flown = fly_file("paper/s2-right", &[("mission.reformation", method), ("mission.tps_lambda", "100")]);
@@ -31,7 +33,7 @@ fn a5_e6_the_formation_is_torn_apart_and_closes_with_each_method() {
 }
 
 #[test]
-fn a5_the_swarm_closes_between_two_obstacles_too() {
+fn a5_the_formation_closes_between_two_obstacle_sets() {
     let slots = centred(&scenario("paper/forest", &[]).slots());
     let flown = fly_file("paper/forest", &[]);
     let between = disturbance(&flown, &slots, flown.detected_s(1) - 1.0);

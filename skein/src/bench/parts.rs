@@ -9,8 +9,7 @@ use skein_leader::split::ArrivalTable;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime, Vec2};
-use skein_runtime::pilot_host::StepScratch;
-use skein_runtime::{PilotKind, mission};
+use skein_runtime::{DroneFactory, PilotKind, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use std::hint::black_box;
 use std::path::Path;
@@ -110,8 +109,8 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
     const TICKS: u32 = 50;
     let mut world = mission::world(scenario).map_err(Failure::environment)?;
     let drones = scenario.formation.drones;
-    let (yard, mut desk) = (mission::DroneFactory::new(scenario, PilotKind::Beacon), StepScratch::default());
-    let pilot_host = |id| yard.pilot_host(DroneId(id), 1, SimTime::ZERO);
+    let (factory, mut scratch) = (DroneFactory::new(scenario, PilotKind::Beacon), StepScratch::default());
+    let pilot_host = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO);
     let mut cockpits: Vec<_> = (0..drones).map(pilot_host).collect();
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     Ok(median((0..rounds).map(|_| {
@@ -121,7 +120,7 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, Failure> {
             let down = world.downlink().view();
             let started = Instant::now();
             for pilot_host in &mut cockpits {
-                let said = pilot_host.step(&down, &mut desk, &mut slot, &mut stats);
+                let said = pilot_host.step(&down, &mut scratch, &mut slot, &mut stats);
                 answers.push((slot, said.iter().map(Message::encode).collect::<Vec<_>>()));
             }
             spent_s += started.elapsed().as_secs_f64();

@@ -3,10 +3,8 @@
 use crate::exit::Failure;
 use skein_bus::{BusError, Domain, DownlinkSubscriber, RecordSubscriber, Services, living};
 use skein_report::RunFacts;
-use skein_runtime::drone_process::scenario_path;
-use skein_runtime::mission;
 use skein_runtime::run_facts::run_facts;
-use skein_scenario::Scenario;
+use skein_runtime::{mission, scenario_file};
 use std::path::{Path, PathBuf};
 
 /// A running swarm of this user.
@@ -51,7 +49,7 @@ impl Tap {
     /// Attaches to a swarm. One that has just begun may not have its services yet: an error, to be tried again.
     pub fn attach(path: &Path) -> Result<Self, Failure> {
         let domain = Domain::join(path).map_err(Failure::environment)?;
-        let scenario = scenario(path)?;
+        let scenario = scenario_file::read(path).map_err(Failure::environment)?;
         let open = |domain: &Domain| -> Result<(Services, RecordSubscriber), BusError> {
             let services = Services::open(domain, mission::drones(&scenario), "observer")?;
             let records = services.watch_subscriber()?;
@@ -73,11 +71,4 @@ impl Tap {
     pub fn alive(&self) -> bool {
         living().is_ok_and(|runs| runs.iter().any(|run| run == self.domain.path()))
     }
-}
-
-fn scenario(path: &Path) -> Result<Scenario, Failure> {
-    let path = scenario_path(path);
-    let bytes = std::fs::read(&path).map_err(|error| Failure::environment(format!("{}: {error}", path.display())))?;
-    serde_json::from_slice(&bytes)
-        .map_err(|error| Failure::environment(format!("{}: not a scenario of this version: {error}", path.display())))
 }

@@ -9,8 +9,7 @@ use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::Outcome;
 use skein_report::{Recorder, RunCompletion};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::supervisor::{self, Launch};
-use skein_runtime::{Clock, PilotKind, RunEnd, RuntimeError, inline};
+use skein_runtime::{Clock, Launch, PilotKind, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::{Scenario, ScenarioSource};
 
 /// Size of the swarm.

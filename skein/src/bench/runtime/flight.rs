@@ -6,8 +6,7 @@ use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
-use skein_runtime::supervisor::{self, Launch, ProcessInfo};
-use skein_runtime::{Clock, PilotKind, RunEnd, inline};
+use skein_runtime::{Clock, Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, inline, supervisor};
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -39,7 +38,7 @@ struct Processes {
 impl Processes {
     fn begin(&mut self, processes: &[ProcessInfo]) {
         let pids = |role| processes.iter().filter(|p| p.role == role).map(|p| p.pid).collect::<Vec<u32>>();
-        (self.world, self.drones) = (pids("world"), pids("drone"));
+        (self.world, self.drones) = (pids(ProcessRole::World), pids(ProcessRole::Drone));
         self.drones.dedup();
         self.before = [Spent::of_all(&self.world), Spent::of_all(&self.drones)];
     }

@@ -1,14 +1,14 @@
-//! The faults of a scenario as the world's plan.
+//! Turns the faults of a scenario into the world's fault plan.
 
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Fault as Keys, FaultEvent, FaultKind, FaultTarget, Scenario, Sensor};
 use skein_world::faults::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, Wind};
 
-/// How long a gust lasts unless the scenario says, s.
+/// How long a gust lasts if the scenario does not say, s. The key `gust_s` documents this default.
 const GUST_S: f64 = 1.0;
 
-/// What is to go wrong in a mission.
-pub(crate) fn faults(scenario: &Scenario) -> FaultPlan {
+/// The faults of a mission, in the order of the scenario file.
+pub(crate) fn fault_plan(scenario: &Scenario) -> FaultPlan {
     let drones = scenario.formation.drones;
     let fault = |keys: &Keys| Fault {
         effect: effect(keys, drones),

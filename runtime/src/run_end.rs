@@ -1,0 +1,16 @@
+//! How a run ended.
+
+/// How a run ended: what its record does not tell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunEnd {
+    /// Wall time from the call to the first tick, s.
+    pub startup_s: f64,
+    /// System calls of the barrier: those of the world, and those of all drones together.
+    pub calls: [u64; 2],
+    /// The signal that interrupted the run.
+    pub signal: Option<i32>,
+    /// Why the recording stopped early.
+    pub sink_error: Option<String>,
+    /// What failed in the environment during the flight, such as the death of the world process.
+    pub failure: Option<String>,
+}

@@ -1,0 +1,34 @@
+//! Time limits of the runtime. None of them changes a flight in lockstep: they decide when a process counts as failed.
+
+use std::time::Duration;
+
+/// A drone process that does not answer a tick in lockstep for this long is hung: 5 s. Chosen by hand: a step takes far
+/// less than a millisecond, and a busy machine may stop a process for a second.
+pub(crate) const HUNG_AFTER: Duration = Duration::from_secs(5);
+
+/// The supervisor kills, stops or continues a process within this: 5 s. Chosen by hand; it takes milliseconds.
+pub(crate) const REQUEST_LIMIT: Duration = Duration::from_secs(5);
+
+/// The supervisor restarts a process within this: 30 s. Chosen by hand: more than [`START_LIMIT`], so that the supervisor
+/// gives up first.
+pub(crate) const RESTART_LIMIT: Duration = Duration::from_secs(30);
+
+/// Processes that are not ready after this have failed: 20 s, and [`START_LIMIT_PER_DRONE`] for each drone. Chosen by
+/// hand; `skein bench runtime` shows what a start takes.
+pub(crate) const START_LIMIT: Duration = Duration::from_secs(20);
+
+/// Added to [`START_LIMIT`] for each drone of the swarm: 0.1 s. Chosen by hand.
+pub(crate) const START_LIMIT_PER_DRONE: Duration = Duration::from_millis(100);
+
+/// Processes that have not ended this long after the end of the mission are killed: 2 s. Chosen by hand.
+pub(crate) const END_LIMIT: Duration = Duration::from_secs(2);
+
+/// Time between two polls of the supervisor for records, requests and signals: 1 ms. Chosen by hand. It notices the end
+/// of a process at once.
+pub(crate) const SUPERVISOR_POLL: Duration = Duration::from_millis(1);
+
+/// Time between two polls of a world process that waits for its launcher: 1 ms. Chosen by hand.
+pub(crate) const DISMISSAL_POLL: Duration = Duration::from_millis(1);
+
+/// A wall clock that has fallen behind by more than this starts anew instead of catching up: 1 s. Chosen by hand.
+pub(crate) const STALL_LIMIT: Duration = Duration::from_secs(1);
