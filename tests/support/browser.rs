@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 const WATCHDOG: Duration = Duration::from_secs(90);
 
 /// A browser with one page. Dropping this ends it.
-pub struct Browser {
+pub(crate) struct Browser {
     child: Child,
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     session: String,
@@ -26,7 +26,7 @@ pub struct Browser {
 
 impl Browser {
     /// Starts Chromium. Returns `None`, and says so on stderr, if there is none.
-    pub fn start(profile: &Path) -> Option<Self> {
+    pub(crate) fn start(profile: &Path) -> Option<Self> {
         let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(|name| spawn(name, profile));
         let Some(mut child) = found else {
             eprintln!("skipped: no chromium on this machine (Debian package `chromium`)");
@@ -52,14 +52,14 @@ impl Browser {
     }
 
     /// Opens an address.
-    pub fn open(&mut self, url: &str) {
+    pub(crate) fn open(&mut self, url: &str) {
         let opened = self.call("Page.navigate", json!({ "url": url }));
         assert!(opened.get("errorText").is_none(), "{url}: {opened}");
         self.wait("document.readyState === 'complete'");
     }
 
     /// The value of an expression in the page.
-    pub fn value(&mut self, expression: &str) -> Value {
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
         let asked = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let result = self.call("Runtime.evaluate", asked);
         assert!(result.get("exceptionDetails").is_none(), "{expression}: {result}");
@@ -67,7 +67,7 @@ impl Browser {
     }
 
     /// Waits until an expression is true.
-    pub fn wait(&mut self, expression: &str) {
+    pub(crate) fn wait(&mut self, expression: &str) {
         let since = Instant::now();
         while self.value(expression) != true {
             assert!(since.elapsed() < WATCHDOG, "never true: {expression}; errors: {:?}", self.errors);
@@ -76,7 +76,7 @@ impl Browser {
     }
 
     /// Sets the size of the page, in pixels.
-    pub fn resize(&mut self, width: u32, height: u32) {
+    pub(crate) fn resize(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", size);
     }

@@ -1,8 +1,8 @@
 //! Gives each test a working folder of its own, and starts the `skein` binary in it under a watchdog.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-pub mod browser;
-pub mod process;
+pub(crate) mod browser;
+pub(crate) mod process;
 
 use process::{Role, is_alive, shared_files};
 use serde_json::Value;
@@ -22,10 +22,10 @@ const WATCHDOG: Duration = Duration::from_secs(120);
 const POLL: Duration = Duration::from_millis(2);
 
 /// A working folder with a domain that no other test shares.
-pub struct Place(TempDir);
+pub(crate) struct Place(TempDir);
 
 impl Place {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = TempDir::with_prefix("sk").unwrap();
         let runtime = folder.path().join("x");
         fs::create_dir(&runtime).unwrap();
@@ -34,18 +34,18 @@ impl Place {
     }
 
     /// A path in it.
-    pub fn join(&self, name: &str) -> PathBuf {
+    pub(crate) fn join(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    pub fn command(&self, args: &[&str]) -> Command {
+    pub(crate) fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
         command.args(args).current_dir(self.0.path()).env("XDG_RUNTIME_DIR", self.join("x")).env_remove("SKEIN_LOG");
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
 
-    pub fn start(&self, args: &[&str]) -> Flight {
+    pub(crate) fn start(&self, args: &[&str]) -> Flight {
         let mut child = self.command(args).spawn().unwrap();
         let stdout = drain(child.stdout.take().unwrap());
         let stderr = drain(child.stderr.take().unwrap());
@@ -53,12 +53,12 @@ impl Place {
     }
 
     /// Runs a command to its end.
-    pub fn run(&self, args: &[&str]) -> Done {
+    pub(crate) fn run(&self, args: &[&str]) -> Done {
         self.start(args).finish()
     }
 
     /// Flies a paper scenario and returns its summary.
-    pub fn fly(&self, name: &str, args: &[&str]) -> Value {
+    pub(crate) fn fly(&self, name: &str, args: &[&str]) -> Value {
         let scenario = paper(name);
         let done = self.run(&[&["run", &scenario, "--json"], args].concat());
         assert_eq!(done.code, Some(0), "{done:?}");
@@ -66,19 +66,19 @@ impl Place {
     }
 
     /// Starts the flight of a paper scenario into the folder `out`.
-    pub fn take_off(&self, name: &str, args: &[&str]) -> Flight {
+    pub(crate) fn take_off(&self, name: &str, args: &[&str]) -> Flight {
         self.start(&[&["run", &paper(name), "--json", "--out", "out"], args].concat())
     }
 
     /// The runs in the domain's root: those that live, and those that were left behind.
-    pub fn runs_in_domain(&self) -> Vec<String> {
+    pub(crate) fn runs_in_domain(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.join("x/skein")) else { return Vec::new() };
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
         names.filter(|name| name != "lock").collect()
     }
 
     /// The command has started nothing and made neither a domain nor a run's folder.
-    pub fn assert_untouched(&self, known: &Done) {
+    pub(crate) fn assert_untouched(&self, known: &Done) {
         assert!(!self.join("x/skein").exists(), "a domain was made: {known:?}");
         assert!(!self.join("runs").exists() && !self.join("out").exists(), "a run's folder was made: {known:?}");
     }
@@ -86,7 +86,7 @@ impl Place {
 
 /// A command that has ended.
 #[derive(Debug)]
-pub struct Done {
+pub(crate) struct Done {
     pub args: String,
     pub pid: u32,
     /// `None` if a signal ended it.
@@ -97,14 +97,14 @@ pub struct Done {
 
 impl Done {
     /// The one JSON object on stdout.
-    pub fn summary(&self) -> Value {
+    pub(crate) fn summary(&self) -> Value {
         assert_eq!(self.stdout.lines().count(), 1, "one object, in one line: {self:?}");
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error} in {self:?}"))
     }
 }
 
 /// A running command. Dropping this kills it with all its processes.
-pub struct Flight {
+pub(crate) struct Flight {
     child: Child,
     out: PathBuf,
     args: String,
@@ -113,19 +113,19 @@ pub struct Flight {
 }
 
 impl Flight {
-    pub fn pid(&self) -> u32 {
+    pub(crate) fn pid(&self) -> u32 {
         self.child.id()
     }
 
     /// Waits until all processes are ready. Returns the launcher, the world and the drones by number.
-    pub fn processes(&mut self) -> Vec<Role> {
+    pub(crate) fn processes(&mut self) -> Vec<Role> {
         let file = self.out.join("processes.json");
         self.wait_for(&file);
         process::read(&file)
     }
 
     /// Waits until a file of the run's folder exists.
-    pub fn wait_for(&mut self, file: &Path) {
+    pub(crate) fn wait_for(&mut self, file: &Path) {
         let since = Instant::now();
         while !file.exists() {
             let ended = self.child.try_wait().unwrap();
@@ -139,7 +139,7 @@ impl Flight {
     }
 
     /// Waits until the recording has reached `t_s`. The writer's buffer delays it by some ticks.
-    pub fn wait_until(&mut self, t_s: f64) {
+    pub(crate) fn wait_until(&mut self, t_s: f64) {
         let (file, done) = (self.out.join("flight.spool"), self.out.join("summary.json"));
         self.wait_for(&file);
         eventually(&format!("`{}` flies to {t_s} s", self.args), || {
@@ -148,7 +148,7 @@ impl Flight {
     }
 
     /// Waits for its end, and asserts that it has left no process and nothing in shared memory.
-    pub fn finish(mut self) -> Done {
+    pub(crate) fn finish(mut self) -> Done {
         let done = self.end();
         if let Ok(text) = fs::read(self.out.join("processes.json"))
             && done.args.contains("--out out")
@@ -162,7 +162,7 @@ impl Flight {
     }
 
     /// Waits for its end.
-    pub fn end(&mut self) -> Done {
+    pub(crate) fn end(&mut self) -> Done {
         let since = Instant::now();
         let code = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -208,7 +208,7 @@ fn drain(mut from: impl Read + Send + 'static) -> JoinHandle<String> {
 }
 
 /// Waits until a condition holds; fails with `what` if it never does.
-pub fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
+pub(crate) fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
     let since = Instant::now();
     while !holds() {
         assert!(since.elapsed() < WATCHDOG, "never true: {what}");
@@ -217,37 +217,37 @@ pub fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
 }
 
 /// Path of a scenario of the paper.
-pub fn paper(name: &str) -> String {
+pub(crate) fn paper(name: &str) -> String {
     format!("{}/../scenarios/paper/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
 /// A number in a summary, by its JSON pointer.
-pub fn number(summary: &Value, pointer: &str) -> f64 {
+pub(crate) fn number(summary: &Value, pointer: &str) -> f64 {
     let value = summary.pointer(pointer).and_then(Value::as_f64);
     value.unwrap_or_else(|| panic!("{pointer} is no number in {summary}"))
 }
 
 /// Asserts that a number differs from the expected one by at most this part of it.
-pub fn assert_near(what: &str, found: f64, wanted: f64, part: f64) {
+pub(crate) fn assert_near(what: &str, found: f64, wanted: f64, part: f64) {
     assert!((found - wanted).abs() <= wanted * part, "{what}: {found}, wanted {wanted} within {} %", part * 100.0);
 }
 
 /// Reads a JSON file.
-pub fn json(path: impl AsRef<Path>) -> Value {
+pub(crate) fn json(path: impl AsRef<Path>) -> Value {
     let path = path.as_ref();
     let bytes = fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     serde_json::from_slice(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// The faults in events.jsonl of a run's folder.
-pub fn faults(folder: &Path) -> Vec<Value> {
+pub(crate) fn faults(folder: &Path) -> Vec<Value> {
     let text = fs::read_to_string(folder.join("events.jsonl")).unwrap();
     let events = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     events.filter(|event| event["event"] == "fault").collect()
 }
 
 /// Names in a folder.
-pub fn names(folder: impl AsRef<Path>) -> Vec<String> {
+pub(crate) fn names(folder: impl AsRef<Path>) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries.map(|entry| lossy(&entry.unwrap().file_name())).collect();
     names.sort();

@@ -7,7 +7,7 @@ use skein_scenario::{Scenario, ScenarioSource};
 
 /// The record of a flight.
 #[derive(Default)]
-pub struct Flown {
+pub(crate) struct Flown {
     /// Of every tick: the time, s, and one row per drone.
     pub ticks: Vec<(f64, Vec<DroneRow>)>,
     pub events: Vec<RunEvent>,
@@ -27,41 +27,41 @@ impl RecordSink for Flown {
 }
 
 /// A scenario file below `scenarios`, such as `paper/s2-right`, with these keys set.
-pub fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
+pub(crate) fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
     let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     parse(&std::fs::read_to_string(&path).unwrap(), sets)
 }
 
 /// A scenario from text.
-pub fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
+pub(crate) fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
     let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
     Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &sets).unwrap()
 }
 
-pub fn fly(scenario: &Scenario) -> Flown {
+pub(crate) fn fly(scenario: &Scenario) -> Flown {
     let mut flown = Flown::default();
     inline::run(scenario, &mut flown, || None).unwrap();
     flown
 }
 
 /// Flies a scenario file by the paper's rule. The mission must reach its goal with every distance kept.
-pub fn fly_file(name: &str, sets: &[(&str, &str)]) -> Flown {
+pub(crate) fn fly_file(name: &str, sets: &[(&str, &str)]) -> Flown {
     let rule = ("strategy", "congestion-aware-paper");
     let flown = fly(&scenario(name, &[&[rule], sets].concat()));
     assert_eq!(flown.outcome(), Outcome::Reached, "{name} {sets:?}");
     flown
 }
 
-pub fn position(row: &DroneRow) -> Vec2 {
+pub(crate) fn position(row: &DroneRow) -> Vec2 {
     row.position_m.into()
 }
 
-pub fn velocity(row: &DroneRow) -> Vec2 {
+pub(crate) fn velocity(row: &DroneRow) -> Vec2 {
     row.velocity_mps.into()
 }
 
 impl Flown {
-    pub fn outcome(&self) -> Outcome {
+    pub(crate) fn outcome(&self) -> Outcome {
         let end = |event: &RunEvent| match event.what {
             EventKind::End { outcome, .. } => Some(outcome),
             _ => None,
@@ -70,20 +70,20 @@ impl Flown {
     }
 
     /// Time of the first event that fulfils a condition, s.
-    pub fn when(&self, what: impl Fn(&EventKind) -> bool) -> f64 {
+    pub(crate) fn when(&self, what: impl Fn(&EventKind) -> bool) -> f64 {
         self.events.iter().find(|event| what(&event.what)).unwrap().t_s
     }
 
-    pub fn detected_s(&self, set: u32) -> f64 {
+    pub(crate) fn detected_s(&self, set: u32) -> f64 {
         self.when(|what| matches!(what, EventKind::Detected { stage, .. } if *stage == set))
     }
 
-    pub fn passed_s(&self, set: u32) -> f64 {
+    pub(crate) fn passed_s(&self, set: u32) -> f64 {
         self.when(|what| matches!(what, EventKind::Passed { stage } if *stage == set))
     }
 
     /// The first plan to avoid an obstacle set: its predicted time, s, and when it was made, s.
-    pub fn grouping(&self) -> (f64, f64) {
+    pub(crate) fn grouping(&self) -> (f64, f64) {
         let avoid = |event: &RunEvent| match &event.what {
             EventKind::Grouping { phase, predicted_s, .. } if *phase == Phase::Avoid => {
                 Some((predicted_s.unwrap(), event.t_s))
@@ -94,7 +94,7 @@ impl Flown {
     }
 
     /// Number of routes of the last plan to avoid an obstacle set. The last plan knows all obstacles, also those seen late.
-    pub fn routes(&self) -> u32 {
+    pub(crate) fn routes(&self) -> u32 {
         let avoid = |event: &RunEvent| match &event.what {
             EventKind::Grouping { phase, routes, .. } if *phase == Phase::Avoid => Some(*routes),
             _ => None,
@@ -102,12 +102,12 @@ impl Flown {
         self.events.iter().rev().find_map(avoid).unwrap()
     }
 
-    pub fn at(&self, t_s: f64) -> &[DroneRow] {
+    pub(crate) fn at(&self, t_s: f64) -> &[DroneRow] {
         &self.ticks.iter().find(|(now_s, _)| *now_s >= t_s - 1e-9).unwrap().1
     }
 
     /// When each drone first passes this abscissa, m, with its row at that time; in order of time.
-    pub fn crossings(&self, x_m: f64) -> Vec<(f64, DroneId, DroneRow)> {
+    pub(crate) fn crossings(&self, x_m: f64) -> Vec<(f64, DroneId, DroneRow)> {
         let drones = self.ticks[0].1.len();
         let crossing = |drone: usize| {
             let (t_s, rows) = self.ticks.iter().find(|(_, rows)| rows[drone].position_m[0] >= x_m)?;
@@ -119,7 +119,7 @@ impl Flown {
     }
 
     /// Least distance between two drones over the mission, m.
-    pub fn separation_m(&self) -> f64 {
+    pub(crate) fn separation_m(&self) -> f64 {
         let least = |rows: &[DroneRow]| {
             let pairs = (0..rows.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
             pairs.map(|(i, j)| (position(&rows[i]) - position(&rows[j])).norm()).fold(f64::INFINITY, f64::min)

@@ -10,26 +10,26 @@ use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
 
 /// A scenario file below `scenarios`, such as `paper/s2-right`, with these keys set.
-pub fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
+pub(crate) fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
     let path = format!("{}/../scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     parse(&std::fs::read_to_string(&path).unwrap(), sets)
 }
 
 /// A scenario from text, with these keys set.
-pub fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
+pub(crate) fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
     let sets: Vec<_> = sets.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
     Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &sets)
         .unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 /// The drones of a scenario before their first tick, with the paper's pilot.
-pub fn pilot_hosts(scenario: &Scenario) -> Vec<PilotHost> {
+pub(crate) fn pilot_hosts(scenario: &Scenario) -> Vec<PilotHost> {
     let factory = DroneFactory::new(scenario, PilotKind::Swarm);
     (0..scenario.formation.drones).map(|id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO)).collect()
 }
 
 /// Flies to the end. `killed` names a drone whose process ends in a tick: from then on it does not answer.
-pub fn fly_to_the_end(scenario: &Scenario, killed: Option<(DroneId, Tick)>) -> World {
+pub(crate) fn fly_to_the_end(scenario: &Scenario, killed: Option<(DroneId, Tick)>) -> World {
     let mut world = mission::world(scenario).unwrap();
     let mut pilot_hosts = pilot_hosts(scenario);
     let (mut scratch, mut stats) = (StepScratch::default(), LinkStats::default());
