@@ -8,7 +8,7 @@ use skein_protocol::{DroneId, ObstacleId, SimTime};
 use skein_report::scene::{SceneFacts, SetOutline};
 use skein_report::{MissionEnd, RunFacts};
 use skein_scenario::{End, Failsafe, Scenario};
-use skein_world::params::landing_s;
+use skein_world::landing_s;
 
 /// An obstacle set, and the routes past it that a leader finds which knows all obstacles of the scenario.
 #[derive(Clone, Debug)]

@@ -1,23 +1,24 @@
-//! A tree of values against the generated schema: keys, types, words and ranges, each error with its place.
+//! Checks a tree of values against the generated schema: keys, types, words and ranges. Each error has its place.
 
 use crate::faults::FaultTarget;
-use crate::node::{Data, Entry, Node, Place, number};
-use crate::reference::{self, unit};
+use crate::node::{Data, Entry, Node, Place};
+use crate::reference;
+use crate::schema_tree::{kind, lengths, present, range, tag, unit, words};
 use crate::strategy::Strategy;
 use serde_json::{Map, Value as Json};
 use std::collections::BTreeMap;
 
-/// An error whose place is not yet put into words.
+/// An error whose place is not a text yet.
 #[derive(Debug)]
 pub(crate) struct Complaint {
-    pub place: Place,
-    pub key: String,
-    pub message: String,
+    pub(crate) place: Place,
+    pub(crate) key: String,
+    pub(crate) message: String,
 }
 
-/// Checks the tree; gives it back as JSON that holds what was written and nothing else.
+/// Checks the tree. Gives it back as JSON, without the keys that were left out, and all errors.
 pub(crate) fn check(root: &Node, schema: &Json) -> (Json, Vec<Complaint>) {
-    // The first of several keys of one name is the one to guess.
+    // Of several keys with one name, the first one is suggested.
     let leaves = reference::keys_of(schema).into_iter().rev().map(|k| (k.leaf().to_owned(), k.path)).collect();
     let mut walk = Walk { leaves, complaints: Vec::new() };
     let json = walk.value(root, schema, "");
@@ -25,7 +26,7 @@ pub(crate) fn check(root: &Node, schema: &Json) -> (Json, Vec<Complaint>) {
 }
 
 struct Walk {
-    /// Every key's own name, and where it stands.
+    /// Every key's own name, with its path.
     leaves: BTreeMap<String, String>,
     complaints: Vec<Complaint>,
 }
@@ -100,7 +101,7 @@ impl Walk {
         }
     }
 
-    /// A word, or lists of drones.
+    /// The word `halves`, or lists of drones.
     fn sides(&mut self, node: &Node, lists: &Json, key: &str) -> Json {
         match &node.data {
             Data::List(_) => self.list(node, lists, key),
@@ -110,7 +111,7 @@ impl Walk {
     }
 
     fn integer(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
-        let expected = || format!("a whole number {}", reference::range(schema));
+        let expected = || format!("a whole number {}", range(schema));
         let Data::Integer(integer) = node.data else { return self.wrong(node, key, &expected()) };
         let limit = |name: &str| schema[name].as_number().and_then(serde_json::Number::as_i128);
         let above = limit("minimum").is_none_or(|min| integer >= min);
@@ -135,7 +136,7 @@ impl Walk {
             return value.into();
         }
         let unit = unit(key).map(|unit| format!(" ({unit})")).unwrap_or_default();
-        self.wrong(node, key, &format!("a number {}{unit}", reference::range(schema)))
+        self.wrong(node, key, &format!("a number {}{unit}", range(schema)))
     }
 
     fn list(&mut self, node: &Node, schema: &Json, key: &str) -> Json {
@@ -152,17 +153,17 @@ impl Walk {
         items.map(|(i, item)| self.value(item, &schema["items"], &join(key, &i.to_string()))).collect()
     }
 
-    /// One of several tables, told apart by the key that each of them has with a word of its own.
+    /// One of several tables. A key that all of them have, each with another word, says which.
     fn variant(&mut self, node: &Node, variants: &[Json], key: &str) -> Json {
         let Data::Table(entries) = &node.data else { return self.wrong(node, key, "a table") };
-        let Some((tag, _)) = variants.first().and_then(tag) else { return Json::Null };
-        let words: Vec<&str> = variants.iter().filter_map(crate::check::tag).map(|(_, word)| word).collect();
-        let Some(entry) = entries.get(tag) else {
+        let Some((key_of_word, _)) = variants.first().and_then(tag) else { return Json::Null };
+        let words: Vec<&str> = variants.iter().filter_map(tag).map(|(_, word)| word).collect();
+        let Some(entry) = entries.get(key_of_word) else {
             let list = words.iter().map(|w| format!("{w:?}")).collect::<Vec<_>>().join(", ");
-            return self.complain(&node.place, &join(key, tag), format!("is missing: expected one of {list}"));
+            return self.complain(&node.place, &join(key, key_of_word), format!("is missing: expected one of {list}"));
         };
-        let word = self.word(&entry.node, &words, &join(key, tag));
-        let chosen = variants.iter().find(|v| crate::check::tag(v).is_some_and(|(_, w)| word == w));
+        let word = self.word(&entry.node, &words, &join(key, key_of_word));
+        let chosen = variants.iter().find(|v| tag(v).is_some_and(|(_, w)| word == w));
         chosen.map_or(Json::Null, |schema| self.table(node, schema, key))
     }
 
@@ -204,52 +205,6 @@ fn what(node: &Node) -> &'static str {
     }
 }
 
-/// The schema of a value that is there: without the alternative `null`.
-pub(crate) fn present(schema: &Json) -> &Json {
-    let options = schema["anyOf"].as_array().map(Vec::as_slice).unwrap_or_default();
-    if options.iter().any(|o| o["type"] == "null") {
-        options.iter().find(|o| o["type"] != "null").unwrap_or(schema)
-    } else {
-        schema
-    }
-}
-
-/// The type of a value that is there.
-pub(crate) fn kind(schema: &Json) -> &str {
-    match &schema["type"] {
-        Json::Array(types) => types.iter().filter_map(Json::as_str).find(|t| *t != "null").unwrap_or_default(),
-        single => single.as_str().unwrap_or_default(),
-    }
-}
-
-/// The words of a schema that allows nothing else.
-pub(crate) fn words(schema: &Json) -> Option<Vec<&str>> {
-    schema["oneOf"].as_array()?.iter().map(|option| option["const"].as_str()).collect()
-}
-
-/// The key by which a variant is told from others, and its word.
-pub(crate) fn tag(variant: &Json) -> Option<(&str, &str)> {
-    let properties = variant["properties"].as_object()?;
-    properties.iter().find_map(|(name, schema)| Some((name.as_str(), schema["const"].as_str()?)))
-}
-
-/// Of how many items an array is.
-pub(crate) fn lengths(schema: &Json) -> String {
-    let items = match kind(&schema["items"]) {
-        "array" => format!("arrays, each {}", lengths(&schema["items"])),
-        "number" => "numbers".to_owned(),
-        "integer" => "whole numbers".to_owned(),
-        _ if words(&schema["items"]).is_some() => "words".to_owned(),
-        _ => "tables".to_owned(),
-    };
-    match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
-        (Some(min), Some(max)) if min == max => format!("of {min} {items}"),
-        (Some(min), Some(max)) => format!("of {min} to {max} {items}"),
-        (_, Some(max)) => format!("of at most {max} {items}"),
-        _ => format!("of {items}"),
-    }
-}
-
 fn join(key: &str, name: &str) -> String {
     if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") }
 }
@@ -258,13 +213,8 @@ fn did_you_mean<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> String
     closest(found, words).map(|word| format!("; did you mean `{word}`?")).unwrap_or_default()
 }
 
-/// The most similar word, if any is similar at all.
+/// The most similar word, if any is similar enough.
 fn closest<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let scored = words.map(|word| (strsim::jaro_winkler(found, word), word));
     scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, word)| word)
-}
-
-/// A quantity as it is shown in a message.
-pub(crate) fn quantity(value: f64, unit: &str) -> String {
-    format!("{} {unit}", number(value))
 }

@@ -1,10 +1,10 @@
-//! What is wrong with a scenario, and where.
+//! The errors of a scenario, each with its place.
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use std::fmt;
 use std::ops::Range;
 
-/// More errors than this are counted, not shown.
+/// This number of errors is shown. The others are counted.
 const SHOWN: usize = 50;
 
 /// One error. Its text is `place: key: message`.
@@ -12,11 +12,11 @@ const SHOWN: usize = 50;
 pub struct Issue {
     /// `file:line:column` (from 1, columns in characters), or `--set key=value`.
     pub place: String,
-    /// The key's path, such as `obstacle.0.centre_m`; empty where the file cannot be read at all.
+    /// The key's path, such as `obstacle.0.centre_m`; empty if the file cannot be read as TOML.
     pub key: String,
     /// What was found and what was expected.
     pub message: String,
-    /// Bytes of the file, if it is an error in the file.
+    /// The bytes of the file that are wrong; `None` for an error in an override.
     pub span: Option<Range<usize>>,
 }
 
@@ -24,17 +24,20 @@ impl fmt::Display for Issue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let key = if self.key.is_empty() { String::new() } else { format!("{}: ", self.key) };
         let line = format!("{}: {key}{}", self.place, self.message);
-        // A file's bytes must not steer the terminal.
-        line.chars().try_for_each(|c| match c {
-            '\n' => f.write_str("; "),
-            c if c.is_control() => write!(f, "{}", c.escape_default()),
-            c => write!(f, "{c}"),
-        })
+        // Control characters of a file must not reach the terminal.
+        for c in line.chars() {
+            match c {
+                '\n' => f.write_str("; ")?,
+                c if c.is_control() => write!(f, "{}", c.escape_default())?,
+                c => write!(f, "{c}")?,
+            }
+        }
+        Ok(())
     }
 }
 
-/// Everything that is wrong with a scenario, in the order of the file, then of the overrides. Its text has one line an
-/// error; as a [`Diagnostic`] it also shows the places in the file.
+/// All errors of a scenario, in the order of the file, then of the overrides. Its text has one line per error. As a
+/// [`Diagnostic`] it also shows the places in the file.
 #[derive(Debug)]
 pub struct ScenarioErrors {
     source: NamedSource<String>,
@@ -42,7 +45,7 @@ pub struct ScenarioErrors {
 }
 
 impl ScenarioErrors {
-    /// `text` is shown around the errors, with control characters replaced by as many bytes.
+    /// `text` is the file, shown around the errors. Each control character is replaced by one of the same length in bytes.
     pub(crate) fn new(name: &str, text: &str, mut issues: Vec<Issue>) -> Self {
         let shown = text.chars().map(|c| match c {
             '\n' | '\t' => c,
@@ -55,7 +58,7 @@ impl ScenarioErrors {
         Self { source: NamedSource::new(name, shown.collect()), issues }
     }
 
-    /// The errors; at least one.
+    /// The errors. There is at least one.
     #[must_use]
     pub fn issues(&self) -> &[Issue] {
         &self.issues
@@ -91,20 +94,20 @@ impl Diagnostic for ScenarioErrors {
     }
 }
 
-/// Where the lines of a text start, so that many errors in a long file are placed quickly.
+/// The starts of the lines of a text: finds the line of a byte fast, even for many errors in a long file.
 pub(crate) struct Lines<'a> {
     text: &'a str,
     starts: Vec<usize>,
 }
 
 impl<'a> Lines<'a> {
-    pub fn new(text: &'a str) -> Self {
+    pub(crate) fn new(text: &'a str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
         Self { text, starts }
     }
 
-    /// Line and column, from 1, of a byte of the text; columns count characters.
-    pub fn line_column(&self, byte: usize) -> (usize, usize) {
+    /// The line and the column of a byte of the text, from 1. Columns count characters.
+    pub(crate) fn line_column(&self, byte: usize) -> (usize, usize) {
         let line = self.starts.partition_point(|&start| start <= byte);
         let start = self.starts.get(line.wrapping_sub(1)).copied().unwrap_or(0);
         (line, self.text.get(start..byte).map_or(0, |before| before.chars().count()) + 1)

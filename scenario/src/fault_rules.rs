@@ -1,25 +1,25 @@
-//! What a fault's keys must be to each other.
+//! Rules between the keys of a fault.
 
+use crate::broken_rule::BrokenRule;
 use crate::faults::{Fault, FaultEvent, FaultKind};
 use crate::keys::Scenario;
-use crate::rules::Broken;
 use skein_protocol::link_faults::MAX_PARTITIONS;
 use std::collections::BTreeSet;
 
-/// All broken rules of a scenario's faults.
-pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
+/// The rules that the scenario's faults break.
+pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     let mut broken = Vec::new();
     for (number, fault) in scenario.fault_plan.iter().enumerate() {
         let mut rules = Rules { path: format!("fault.{number}"), scenario, fault, broken: &mut broken };
-        rules.when();
-        rules.whom();
+        rules.time();
+        rules.targets();
         rules.keys_of_kind();
         rules.sides();
     }
     let mut partitions = scenario.fault_plan.iter().enumerate().filter(|(_, f)| f.kind == FaultKind::Partition);
     if let Some((number, _)) = partitions.nth(MAX_PARTITIONS) {
         let message = format!("found one more partition, expected at most {MAX_PARTITIONS} in a scenario");
-        broken.push(Broken { keys: vec![format!("fault.{number}.kind")], message });
+        broken.push(BrokenRule { keys: vec![format!("fault.{number}.kind")], message });
     }
     broken
 }
@@ -28,43 +28,43 @@ struct Rules<'a> {
     path: String,
     scenario: &'a Scenario,
     fault: &'a Fault,
-    broken: &'a mut Vec<Broken>,
+    broken: &'a mut Vec<BrokenRule>,
 }
 
 impl Rules<'_> {
     fn expect(&mut self, holds: bool, keys: &[&str], message: impl FnOnce() -> String) {
         if !holds {
             let keys = keys.iter().map(|key| format!("{}.{key}", self.path)).collect();
-            self.broken.push(Broken { keys, message: message() });
+            self.broken.push(BrokenRule { keys, message: message() });
         }
     }
 
-    fn when(&mut self) {
+    fn time(&mut self) {
         let fault = self.fault;
         self.expect(fault.at_s.is_some() || fault.on.is_some(), &["at_s", "kind"], || {
-            "is missing: expected when the fault happens, either at_s or on".to_owned()
+            "is missing: expected the time of the fault, either at_s or on".to_owned()
         });
         self.expect(fault.at_s.is_none() || fault.on.is_none(), &["on"], || {
             "expected either this key or at_s, not both".to_owned()
         });
         self.expect(fault.on.is_some() || fault.after_s == 0.0, &["after_s"], || {
-            "belongs to an event: expected the key on beside it".to_owned()
+            "needs an event: expected the key on beside it".to_owned()
         });
         let Some(event) = fault.on else {
-            let message = || "belongs to an event: expected the key on beside it".to_owned();
+            let message = || "needs an event: expected the key on beside it".to_owned();
             return self.expect(fault.stage == 0, &["stage"], message);
         };
         let sets = self.scenario.obstacles.len();
         let election = matches!(event, FaultEvent::LeaderElected | FaultEvent::GroupLeaderElected);
         self.expect(election || sets > 0, &["on"], || {
-            "waits for an obstacle set, expected at least one [[obstacle]]".to_owned()
+            "waits for an obstacle set, expected at least one [[obstacle]] in the scenario".to_owned()
         });
         self.expect(election || sets == 0 || (fault.stage as usize) < sets, &["stage"], || {
             format!("found {}, expected an obstacle set from 0 to {} at most", fault.stage, sets - 1)
         });
     }
 
-    fn whom(&mut self) {
+    fn targets(&mut self) {
         let fault = self.fault;
         let keys =
             [("drone", fault.drone.is_some()), ("drones", fault.drones.is_some()), ("target", fault.target.is_some())];
@@ -75,7 +75,7 @@ impl Rules<'_> {
             }
             (FaultKind::Partition | FaultKind::Wind, []) | (_, [_]) => {}
             (_, []) => self.expect(false, &["target", "kind"], || {
-                "is missing: expected whom the fault meets, one of drone, drones, target".to_owned()
+                "is missing: expected the targets of the fault, one of drone, drones, target".to_owned()
             }),
             (_, [_, second, ..]) => {
                 self.expect(false, &[second], || format!("expected either this key or {}, not both", written[0]));
@@ -90,7 +90,7 @@ impl Rules<'_> {
         }
     }
 
-    /// Keys that only some kinds have, and those that they need.
+    /// Keys that only some kinds allow, and keys that some kinds need.
     fn keys_of_kind(&mut self) {
         use FaultKind::{Blind, Freeze, Noise, Partition, Restart, Slow, Wind};
         let fault = self.fault;
@@ -135,12 +135,14 @@ impl Rules<'_> {
         let drones = self.scenario.formation.drones;
         let sides = sides.of(drones);
         self.expect(sides.iter().all(|side| !side.is_empty()), &["sides"], || {
-            format!("found an empty side with {drones} drones, expected at least one drone on each")
+            format!("found an empty side with {drones} drones, expected at least one drone on each side")
         });
         let mut seen = BTreeSet::new();
         for id in sides.into_iter().flatten() {
             self.expect(id < drones, &["sides"], || format!("found drone {id}, expected one from 0 to {}", drones - 1));
-            self.expect(seen.insert(id), &["sides"], || format!("found drone {id} twice, expected it on one side"));
+            self.expect(seen.insert(id), &["sides"], || {
+                format!("found drone {id} twice, expected it on one side only")
+            });
         }
     }
 }

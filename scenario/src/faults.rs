@@ -1,6 +1,6 @@
-//! What becomes of drones that fail, and what goes wrong on purpose.
+//! The keys of faults: the failsafe of dead drones, and the scheduled faults.
 
-use crate::keys::MAX_DRONES;
+use crate::limits::MAX_DRONES;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use skein_protocol::GroupId;
@@ -11,14 +11,11 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Greatest number of faults.
-pub const MAX_FAULTS: usize = 1024;
-
-/// What becomes of drones that fail.
+/// What a drone does after its process has died.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Faults {
-    /// What a drone does whose process is dead.
+    /// The failsafe of a drone whose process has died.
     pub failsafe: Failsafe,
 }
 
@@ -28,77 +25,78 @@ impl Default for Faults {
     }
 }
 
-/// What a drone does whose process is dead.
+/// The failsafe of a drone whose process has died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Failsafe {
-    /// Brakes and hovers.
+    /// It brakes and hovers.
     Hover,
-    /// Brakes and lands.
+    /// It brakes and lands.
     Land,
 }
 
-/// One fault: what, when (`at_s`, or `on` with `after_s`), whom (`drone`, `drones` or `target`), for how long. See
-/// docs/faults.md.
+/// One scheduled fault: its kind, its time (`at_s`, or `on` with `after_s`), its targets (`drone`, `drones` or `target`)
+/// and its duration (`for_s`). See docs/faults.md.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
     /// What happens.
     pub kind: FaultKind,
-    /// When: in the first tick at or after this time. Either this or `on`.
+    /// Time of the fault: it begins in the first tick at or after this time. Write either this or `on`.
     #[schemars(range(min = 0.0, max = 36_000.0))]
     pub at_s: Option<f64>,
-    /// When: after an event, by the world's truth and what drones say of themselves. Either this or `at_s`.
+    /// The event that starts the fault. The world looks for it in the true state and in what drones report of themselves.
+    /// Write either this or `at_s`.
     pub on: Option<FaultEvent>,
-    /// With `on`: so long after the event.
+    /// With `on`: the delay after the event.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 36_000.0))]
     pub after_s: f64,
-    /// With `on`: of which obstacle set, from 0, in flight order; of the elections, which one, from 0.
+    /// With `on`: which obstacle set the event is about, from 0, in flight order. For elections: which election, from 0.
     #[serde(default)]
     #[schemars(range(min = 0, max = 1023))]
     pub stage: u32,
-    /// Whom: this drone.
+    /// The target: the drone with this id.
     #[schemars(range(min = 0, max = MAX_DRONES - 1))]
     pub drone: Option<u32>,
-    /// Whom: these drones.
+    /// The targets: the drones with these ids.
     #[schemars(length(min = 1, max = MAX_DRONES), inner(range(min = 0, max = MAX_DRONES - 1)))]
     pub drones: Option<Vec<u32>>,
-    /// Whom: by role, found when the fault happens and waited for if nobody has it: `"leader"`, `"group-leader:N1"`,
-    /// `"first-in-queue"`, `"last-in-queue"`, `"member"` (the lowest number that leads nobody), `"random"` (by the
-    /// seed), `"all"`.
+    /// The target by role: `"leader"`, `"group-leader:N1"`, `"first-in-queue"`, `"last-in-queue"`, `"member"` (the lowest
+    /// id that leads no group), `"random"` (chosen by the seed), `"all"`. The role is looked up when the fault begins. The
+    /// fault waits while no drone has the role.
     pub target: Option<FaultTarget>,
-    /// For how long; absent: to the end. Required with freeze and restart: until the process goes on, or a new one
-    /// starts. At least a tick.
+    /// Duration of the fault; absent: to the end of the mission. Required with `kind = "freeze"` and `kind = "restart"`:
+    /// afterwards the process continues, or a new one starts. It lasts at least one tick.
     #[schemars(range(min = 0.0, max = 36_000.0))]
     pub for_s: Option<f64>,
-    /// With kind = "slow", which needs it: added to the drone's reaction time.
+    /// Required with `kind = "slow"`: the time that is added to the drone's reaction time.
     #[schemars(range(max = 2.0), extend("exclusiveMinimum" = 0.0))]
     pub reaction_time_s: Option<f64>,
-    /// With kind = "partition", which needs it: sets of drones between which no frame passes; `"halves"`: the first
-    /// half of the numbers and the second. Who is in no set hears and is heard by all.
+    /// Required with `kind = "partition"`: lists of drone ids between which no frame passes. `"halves"` is the first half
+    /// of the ids and the second half. A drone in no list exchanges frames with all drones.
     pub sides: Option<PartitionSides>,
-    /// With kind = "blind": which sensor tells nothing; absent: both.
+    /// With `kind = "blind"`: the sensor that measures nothing; absent: both.
     pub sensor: Option<Sensor>,
-    /// With kind = "noise": added to what the drone is told of its own position, [x, y].
+    /// With `kind = "noise"`: constant error of the position that the drone reads of itself, [x, y].
     #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub position_bias_m: Option<[f64; 2]>,
-    /// With kind = "noise": standard deviation of each coordinate of the position, drawn anew in each tick.
+    /// With `kind = "noise"`: standard deviation of each coordinate of that position, drawn anew in each tick.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub position_std_m: Option<f64>,
-    /// With kind = "noise": added to what the drone is told of its own velocity, [x, y].
+    /// With `kind = "noise"`: constant error of the velocity that the drone reads of itself, [x, y].
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub velocity_bias_mps: Option<[f64; 2]>,
-    /// With kind = "noise": standard deviation of each coordinate of the velocity, drawn anew in each tick.
+    /// With `kind = "noise"`: standard deviation of each coordinate of that velocity, drawn anew in each tick.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub velocity_std_mps: Option<f64>,
-    /// With kind = "wind": an acceleration on top of the commanded one, [x, y].
+    /// With `kind = "wind"`: the acceleration that is added to the commanded one, [x, y].
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub wind_mps2: Option<[f64; 2]>,
-    /// With kind = "wind": standard deviation of each coordinate of the gusts on top, drawn for each drone.
+    /// With `kind = "wind"`: standard deviation of each coordinate of the gusts, drawn for each drone and gust.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub gust_mps2: Option<f64>,
-    /// With `gust_mps2`: how long a gust lasts; absent: 1.
+    /// With `gust_mps2`: duration of a gust; absent: 1.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub gust_s: Option<f64>,
 }
@@ -113,24 +111,24 @@ pub enum FaultKind {
     Freeze,
     /// The process is killed, and a new one started after `for_s`.
     Restart,
-    /// The drone reacts later.
+    /// The reaction time of the drone is longer.
     Slow,
-    /// It hears nobody.
+    /// The drone receives no frames.
     Deaf,
-    /// Nobody hears it.
+    /// No drone receives its frames.
     Mute,
-    /// No frame passes between sets of drones.
+    /// No frame passes between the sides.
     Partition,
-    /// It senses no obstacles, no neighbours, or neither.
+    /// The drone senses no obstacles, no neighbours, or neither.
     Blind,
-    /// It is told a wrong position and velocity of its own.
+    /// The drone reads a wrong position and velocity of itself.
     Noise,
-    /// It is blown about.
+    /// Wind accelerates the drone.
     Wind,
 }
 
 impl FaultKind {
-    /// As it is written.
+    /// The word in the scenario file.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -148,7 +146,7 @@ impl FaultKind {
     }
 }
 
-/// What a fault waits for.
+/// The event that starts a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultEvent {
@@ -160,43 +158,43 @@ pub enum FaultEvent {
     Queued,
     /// The first living drone is past the mean centre of the set.
     Gate,
-    /// The last living drone is.
+    /// The last living drone is past the mean centre of the set.
     Passed,
     /// A drone past the set obeys a plan to re-form.
     Reforming,
-    /// A drone takes up leading a group.
+    /// A drone begins to lead a group.
     LeaderElected,
-    /// A drone takes up leading a subgroup.
+    /// A drone begins to lead a subgroup.
     GroupLeaderElected,
 }
 
-/// Which sensor.
+/// A sensor of a drone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensor {
-    /// Of obstacles.
+    /// The obstacle sensor.
     Obstacles,
-    /// Of neighbours.
+    /// The ranging sensor, which measures neighbours.
     Ranging,
 }
 
-/// Whom a fault meets, by role. Written as one word.
+/// The target of a fault by role. Written as one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum FaultTarget {
-    /// Who leads most.
+    /// The leader of the shallowest group.
     Leader,
-    /// Who leads this group.
+    /// The leader of this group.
     GroupLeader(GroupId),
-    /// Who has the lowest rank in a queue.
+    /// The drone with the lowest rank in a queue.
     FirstInQueue,
-    /// Who has the highest rank in a queue.
+    /// The drone with the highest rank in a queue.
     LastInQueue,
-    /// The lowest number that leads nobody.
+    /// The drone with the lowest id that leads no group.
     Member,
-    /// Anybody, by the seed.
+    /// One living drone, chosen by the seed.
     Random,
-    /// Everybody.
+    /// All living drones.
     All,
 }
 
@@ -211,11 +209,11 @@ impl FaultTarget {
     ];
 }
 
-/// A word that names no target.
+/// The word is not a target.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "found {0:?}, expected one of \"leader\", \"first-in-queue\", \"last-in-queue\", \"member\", \"random\", \"all\", or \
-     \"group-leader:N1\" with a group's name: N and a digit from 1 to 9 for each split"
+     \"group-leader:N1\" with a group's name: N, then a digit from 1 to 9 for each split"
 )]
 pub struct TargetError(String);
 
@@ -229,7 +227,7 @@ impl FromStr for FaultTarget {
     }
 }
 
-/// `N`, `N1`, `N12`; `2` is short for `N2`.
+/// Reads a group's name: `N`, `N1`, `N12`. `2` is short for `N2`.
 fn group(name: &str) -> Option<GroupId> {
     let digits = name.strip_prefix('N').unwrap_or(name);
     let known = digits.len() <= GROUP_DEPTH && digits.bytes().all(|b| (b'1'..=b'9').contains(&b)) && !name.is_empty();
@@ -281,22 +279,22 @@ impl JsonSchema for FaultTarget {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum PartitionSides {
-    /// The first half of the numbers, the larger if they are odd, and the second: written `"halves"`.
+    /// A word.
     Word(SidesWord),
-    /// The drones of each side.
+    /// The ids of the drones on each side.
     Lists(Vec<Vec<u32>>),
 }
 
-/// The only word for sides.
+/// A word for the sides of a partition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SidesWord {
-    /// Two halves, by number.
+    /// `"halves"`: the first half of the ids and the second half. With an odd number of drones the first half is larger.
     Halves,
 }
 
 impl PartitionSides {
-    /// The drones of each side in a swarm of so many.
+    /// The ids of the drones on each side, in a swarm of this number of drones.
     #[must_use]
     pub fn of(&self, drones: u32) -> Vec<Vec<u32>> {
         match self {
@@ -336,7 +334,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn targets_are_words() {
+    fn targets_are_read_and_written_as_words() {
         for word in ["leader", "first-in-queue", "last-in-queue", "member", "random", "all", "group-leader:N12"] {
             assert_eq!(word.parse::<FaultTarget>().unwrap().to_string(), word);
         }
@@ -348,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_are_by_number() {
+    fn halves_are_made_by_id() {
         assert_eq!(PartitionSides::Word(SidesWord::Halves).of(5), [vec![0, 1, 2], vec![3, 4]]);
     }
 }

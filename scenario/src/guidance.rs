@@ -7,20 +7,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Guidance {
-    /// Commanded acceleration for a velocity error.
+    /// Commanded acceleration per velocity error.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub velocity_gain_per_s: f64,
-    /// γ of the safety filter: how fast the distance to the safe distance may shrink.
+    /// γ of the safety filter: how fast a distance may shrink towards the safe distance.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub filter_gain_per_s: f64,
-    /// By which part the filter widens the distances it keeps.
+    /// Fraction by which the safety filter widens the distances that it keeps.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub filter_margin: f64,
-    /// The drone with less precedence takes this part of an evasion, the other one the rest.
+    /// Share of an evasive manoeuvre that the drone with less precedence takes. The other drone takes the rest.
     #[schemars(range(min = 0.5, max = 1.0))]
     pub precedence_share: f64,
-    /// Whether drones that share a route slow down into a single file, a headway apart, before its gate. Without, nothing
-    /// but the safety filter keeps them apart, and they pass abreast where there is room.
+    /// Whether drones that share a route form a single file before its gate, one headway apart. If false, only the safety
+    /// filter keeps them apart, and they pass side by side where there is room.
     pub queue: bool,
 }
 

@@ -1,77 +1,73 @@
-//! The keys of a scenario. These types are the one source of truth: their doc comments, ranges and defaults make the
-//! JSON schema, which makes the checks and the key reference.
+//! The keys of a scenario. Doc comments, ranges and defaults of these types make the JSON schema. The schema makes the
+//! checks and the key reference.
 
-use crate::faults::{Fault, Faults, MAX_FAULTS};
+use crate::faults::{Fault, Faults};
 use crate::guidance::Guidance;
+use crate::limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES};
 use crate::objective::Objective;
 use crate::obstacle::Obstacle;
-use crate::radio::RadioKeys;
+use crate::radio_keys::RadioKeys;
 use crate::strategy::Strategy;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Greatest number of drones.
-pub const MAX_DRONES: u32 = 10_000;
-
-/// Greatest number of obstacles.
-pub const MAX_OBSTACLES: usize = 1024;
-
-/// A mission: who flies, where, past what, with which radio. SI units, radians; world frame x = flight direction,
-/// y = left, metres.
+/// A mission: the drones, their formation, the obstacles, the radio, the faults. SI units and radians. In the world
+/// frame, x is the flight direction and y is left, m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Name of the scenario, also in folder names: letters, digits, `.`, `_` and `-`, 64 at most, a letter, digit or
-    /// `_` first. Default: the file's name without its ending.
+    /// Name of the scenario, also used in folder names. At most 64 letters, digits, `.`, `_` and `-`; the first character
+    /// is a letter, a digit or `_`. The default is the file's name without its ending.
     #[serde(default)]
     #[schemars(regex(pattern = "^[A-Za-z0-9_][A-Za-z0-9._-]{0,63}$"))]
     pub name: String,
-    /// Seed of everything random: radio, start jitter, faults. Equal seeds give equal runs.
+    /// Seed of all random numbers: radio, start jitter, faults. Equal seeds give equal runs.
     #[serde(default = "first_seed")]
     #[schemars(range(min = 0, max = 9_223_372_036_854_775_807_i64))]
     pub seed: u64,
-    /// How drones are shared out to the routes round an obstacle set: `congestion-aware` (the best few groupings and the
-    /// shortest paths flown ahead by the leader, the best by `objective` taken), `congestion-aware-paper` (the paper's
-    /// rule), `shortest-path`, or `fixed:L/R` (L drones to the left, R to the right of the only obstacle).
+    /// How a leader assigns drones to the routes past an obstacle set. `congestion-aware`: the leader simulates a few good
+    /// groupings and the shortest paths, and takes the best by `objective`. `congestion-aware-paper`: the paper's rule.
+    /// `shortest-path`: every drone takes its shortest path. `fixed:L/R`: L drones pass the only obstacle on its left, R
+    /// drones on its right.
     #[serde(default)]
     pub strategy: Strategy,
-    /// What `congestion-aware` makes least.
+    /// What `congestion-aware` minimises.
     #[serde(default)]
     pub objective: Objective,
     /// Simulated time.
     #[serde(default)]
     pub time: Time,
-    /// How many drones, in which shape, from where. The one table that every scenario needs.
+    /// The number of drones, the shape of their formation, and where they start. Every scenario needs this table.
     pub formation: Formation,
-    /// When the mission is over.
+    /// When the mission ends.
     #[serde(default)]
     pub mission: Mission,
-    /// What a drone can do.
+    /// The limits of a drone.
     #[serde(default)]
     pub drone: Drone,
     /// What a drone senses.
     #[serde(default)]
     pub sensors: Sensors,
-    /// What the air does to frames.
+    /// How the radio delays, loses, copies and queues frames.
     #[serde(default)]
     pub radio: RadioKeys,
-    /// Distances kept from obstacles and in queues.
+    /// Distances to obstacles and between drones in a queue.
     #[serde(default)]
     pub avoidance: Avoidance,
-    /// Periods and time-outs of what drones say to each other.
+    /// Periods and time-outs of the messages between drones.
     #[serde(default)]
     pub protocol: Protocol,
     /// The guidance law and the safety filter.
     #[serde(default)]
     pub guidance: Guidance,
-    /// What becomes of drones that fail.
+    /// What a drone does after its process has died.
     #[serde(default)]
     pub faults: Faults,
-    /// What goes wrong on purpose, numbered from 0 in the file's order.
+    /// Scheduled faults, numbered from 0 in the order of the file.
     #[serde(default, rename = "fault")]
     #[schemars(length(max = MAX_FAULTS))]
     pub fault_plan: Vec<Fault>,
-    /// Obstacles, numbered from 0 in the file's order.
+    /// Obstacles, numbered from 0 in the order of the file.
     #[serde(default, rename = "obstacle")]
     #[schemars(length(max = MAX_OBSTACLES))]
     pub obstacles: Vec<Obstacle>,
@@ -85,11 +81,11 @@ fn first_seed() -> u64 {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Time {
-    /// Length of a tick. In a tick at top speed a drone may move a quarter of the clearance and of the safe distance
-    /// at most.
+    /// Length of a tick. In one tick at top speed, a drone may move at most a quarter of `avoidance.clearance_m` and of
+    /// `drone.safe_distance_m`.
     #[schemars(range(min = 1e-4, max = 0.1))]
     pub dt_s: f64,
-    /// The mission has failed when it takes longer than this.
+    /// Time limit. A mission that takes longer has failed.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub timeout_s: f64,
 }
@@ -100,25 +96,25 @@ impl Default for Time {
     }
 }
 
-/// How many drones, in which shape, from where.
+/// The number of drones, the shape of their formation, and where they start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Formation {
-    /// Shape of the formation, at the start and after every reformation.
+    /// Shape of the formation at the start and after every reformation.
     pub shape: Option<FormationShape>,
-    /// Slots relative to the anchor, [x, y] each, instead of `shape`; the first is the front slot.
+    /// Slots relative to the anchor, each [x, y], instead of `shape`. The first one is the front slot.
     #[schemars(length(min = 1, max = MAX_DRONES), inner(inner(range(min = -1e6, max = 1e6))))]
     pub offsets_m: Option<Vec<[f64; 2]>>,
-    /// Number of drones; with `offsets_m` it may be left out and has to agree otherwise.
+    /// Number of drones. With `offsets_m` it may be left out; if it is written, it must equal the number of slots.
     #[schemars(range(min = 1, max = MAX_DRONES))]
     pub drones: u32,
-    /// Distance between neighbouring slots, at least the safe distance.
+    /// Distance between neighbouring slots; at least `drone.safe_distance_m`.
     #[schemars(range(max = 10_000.0), extend("exclusiveMinimum" = 0.0))]
     pub spacing_m: f64,
-    /// Where the front slot is at the start, [x, y].
+    /// Position of the front slot at the start, [x, y].
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub start_m: [f64; 2],
-    /// Each drone starts at a place drawn (by the seed) uniformly from the disc of this radius around its slot.
+    /// Radius of the disc around its slot in which each drone starts. The place is drawn uniformly, by the seed.
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub start_jitter_m: f64,
 }
@@ -136,48 +132,48 @@ impl Default for Formation {
     }
 }
 
-/// A shape that can be made for any number of drones.
+/// A shape for any number of drones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FormationShape {
-    /// The paper's: chevrons of five, nested one behind the other.
+    /// The paper's formation: chevrons of five drones, nested one behind the other.
     NestedV,
-    /// One chevron, 90° at its tip.
+    /// One chevron with an angle of 90° at its tip.
     V,
-    /// Abreast, across the flight direction.
+    /// A row across the flight direction.
     Line,
-    /// One behind the other.
+    /// A row along the flight direction.
     Column,
-    /// Rows as wide as the formation is deep.
+    /// A square grid.
     Grid,
-    /// On a circle.
+    /// A circle.
     Circle,
-    /// A filled triangle: rows of 1, 2, 3, … behind the tip.
+    /// A filled triangle with rows of 1, 2, 3, … drones behind its tip.
     Wedge,
 }
 
-/// When the mission is over.
+/// When the mission ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mission {
     /// What ends the mission.
     pub end: End,
-    /// With end = "hold": a moving anchor stops once its x is at least this.
+    /// With `end = "hold"`: the formation stops once the x of its anchor is at least this.
     #[schemars(range(min = -1e6, max = 1e6))]
     pub stop_x_m: f64,
-    /// With end = "goal", which needs it: the front slot of the fixed goal slots, [x, y].
+    /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y].
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub goal_m: Option<[f64; 2]>,
-    /// Greatest speed while reforming, at most the drone's top speed.
+    /// Greatest speed while re-forming; at most `drone.speed_max_mps`.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub reform_speed_max_mps: f64,
-    /// A drone has arrived when it is as near as this to its slot.
+    /// Greatest distance to its slot at which a drone has arrived.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub arrival_error_m: f64,
-    /// How slots are given to drones when the formation closes.
+    /// How slots are assigned to drones when the formation closes.
     pub reformation: Reformation,
-    /// λ of the spline with reformation = "tps" (the paper's E6), m²: the greater, the more the formation keeps its
-    /// order; with 0 each drone maps to the closest slot, shape counts for nothing.
+    /// With `reformation = "tps"`: λ of the thin-plate spline (the paper's E6), m². A greater value keeps the order of the
+    /// formation better. With 0, each drone maps to the closest slot, whatever the order.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub tps_lambda: f64,
 }
@@ -196,17 +192,17 @@ impl Default for Mission {
     }
 }
 
-/// How slots are given to drones.
+/// How slots are assigned to drones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reformation {
-    /// Least sum of squared distances.
+    /// The least sum of squared distances.
     Optimal,
-    /// The paper's annealed thin-plate mapping; above 200 drones as optimal.
+    /// The paper's annealed thin-plate mapping; above 200 drones the same as optimal.
     Tps,
-    /// The closest pair of drone and slot first.
+    /// The closest pair of drone and slot first, then the next closest.
     Greedy,
-    /// In the order of the drones' numbers.
+    /// By the drones' ids.
     Identity,
 }
 
@@ -214,36 +210,36 @@ pub enum Reformation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum End {
-    /// All obstacles passed and the formation restored around its anchor.
+    /// All obstacles are passed and the formation is restored around its anchor.
     Hold,
-    /// Every drone in a slot of the formation at `goal_m`.
+    /// Every drone is in a slot of the formation at `goal_m`.
     Goal,
 }
 
-/// What a drone can do. A planar point mass at one altitude.
+/// The limits of a drone. A drone is a planar point mass at one altitude.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Drone {
-    /// Nominal speed, held whenever possible.
+    /// Nominal speed. A drone flies at this speed whenever possible.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub speed_mps: f64,
-    /// How much slower or faster than nominal a drone flies where it has to, the paper's δ.
+    /// Greatest change from the nominal speed when a drone has to fly slower or faster, the paper's δ; at most `speed_mps`.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub speed_change_mps: f64,
-    /// Top speed, never exceeded.
+    /// Top speed. A drone never exceeds it.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub speed_max_mps: f64,
     /// Greatest acceleration in any direction.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub acceleration_max_mps2: f64,
-    /// Distance between drones that must never be undercut, centre to centre.
+    /// Least distance between the centres of two drones. It must hold at all times.
     #[schemars(range(max = 10_000.0), extend("exclusiveMinimum" = 0.0))]
     pub safe_distance_m: f64,
-    /// c_d in the braking distance v²/(2 g c_d) with g = 9.81 m/s² (the paper's E3), dimensionless. The default
-    /// brakes with g·c_d = 5 m/s².
+    /// c_d in the braking distance v²/(2 g c_d) with g = 9.81 m/s² (the paper's E3), dimensionless. With the default, a
+    /// drone brakes with g·c_d = 5 m/s².
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub drag_coefficient: f64,
-    /// Time to compute or react, the paper's t_c in the reaction distance v·t_c (E4).
+    /// Time to compute and react: the paper's t_c in the reaction distance v·t_c (E4).
     #[schemars(range(min = 0.0, max = 2.0))]
     pub reaction_time_s: f64,
 }
@@ -266,11 +262,11 @@ impl Default for Drone {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sensors {
-    /// An obstacle with any point as near as this to a drone is sensed. At least the stopping distance at nominal
-    /// speed (the paper's E2) plus the clearance.
+    /// Greatest distance at which a drone senses the nearest point of an obstacle. At least the stopping distance at
+    /// nominal speed (the paper's E2) plus `avoidance.clearance_m`.
     #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
     pub detection_range_m: f64,
-    /// Whether drones sense neighbours (identity, relative position and velocity) within twice the safe distance.
+    /// Whether drones sense their neighbours (id, relative position and velocity) within twice the safe distance.
     pub ranging: bool,
 }
 
@@ -280,17 +276,17 @@ impl Default for Sensors {
     }
 }
 
-/// Distances kept from obstacles and in queues.
+/// Distances to obstacles and between drones in a queue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Avoidance {
-    /// Least distance from a drone's centre to an obstacle.
+    /// Least distance from a drone's centre to an obstacle. It must hold at all times.
     #[schemars(range(max = 10_000.0), extend("exclusiveMinimum" = 0.0))]
     pub clearance_m: f64,
-    /// Obstacles are inflated by this where paths are planned; at least the clearance.
+    /// Distance that planned paths keep from obstacles; at least `clearance_m`.
     #[schemars(range(max = 10_000.0), extend("exclusiveMinimum" = 0.0))]
     pub planning_distance_m: f64,
-    /// Headway between drones in a queue, in units of safe distance over nominal speed.
+    /// Time between two drones in a queue, as a multiple of safe distance / nominal speed.
     #[schemars(range(min = 1.0, max = 10.0))]
     pub headway_factor: f64,
 }
@@ -301,29 +297,29 @@ impl Default for Avoidance {
     }
 }
 
-/// Periods and time-outs of what drones say to each other.
+/// Periods and time-outs of the messages between drones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
-    /// Between two pose beacons of a drone.
+    /// Time between two pose beacons of a drone.
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
     pub beacon_period_s: f64,
-    /// Between two heartbeats of a leader; at most `leader_timeout_s`.
+    /// Time between two heartbeats of a leader; at most `leader_timeout_s`.
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
     pub heartbeat_period_s: f64,
-    /// Between two repeats of plans, assignments, obstacles and passages.
+    /// Time between two repetitions of a plan, an assignment, an obstacle or a passage.
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
     pub repeat_period_s: f64,
-    /// How long a claimant waits for objections.
+    /// How long a claimant waits for objections to its claim.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub election_wait_s: f64,
-    /// A leader that was not heard for this long is suspected.
+    /// A drone suspects a leader that it has not heard for this long.
     #[schemars(range(max = 600.0), extend("exclusiveMinimum" = 0.0))]
     pub leader_timeout_s: f64,
-    /// A drone that was not heard for this long is no longer counted; at least `beacon_period_s`.
+    /// A drone that has not been heard for this long is no member any more; at least `beacon_period_s`.
     #[schemars(range(max = 600.0), extend("exclusiveMinimum" = 0.0))]
     pub peer_timeout_s: f64,
-    /// New obstacles are collected for this long before a leader plans anew.
+    /// How long a leader collects new obstacles before it plans.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub debounce_s: f64,
 }

@@ -1,38 +1,77 @@
-//! TOML → a checked [`Scenario`]. Pure: text in, scenario out; reading files is the caller's.
+//! Reads a mission from TOML: text in, a checked [`Scenario`] or all errors with their places out.
 //!
-//! The types in `keys`, `faults`, `obstacle`, `radio` and `strategy` are the one source of truth: schemars makes the JSON
-//! [`schema`] of their doc comments, ranges and defaults; the checks walk the text against that schema, and [`markdown`]
-//! prints it as the key reference `docs/scenario.md`.
+//! - [`Scenario::parse`] reads TOML with overrides (`--set KEY=VALUE`). [`Scenario::parse_bytes`] and
+//!   [`Scenario::from_json`] read bytes and JSON. [`ScenarioSource`] names the text.
+//! - [`Scenario`] holds every key, with a table per part of the mission: [`Formation`], [`Mission`], [`Drone`],
+//!   [`RadioKeys`], [`Obstacle`], [`Fault`] and others. Methods give what follows from the keys, such as
+//!   [`Scenario::starts`], [`Scenario::shapes`] and [`Scenario::radio`].
+//! - [`ScenarioErrors`] holds all errors. Each [`Issue`] names its place, its key, what was found and what was expected.
+//! - [`keys`], [`markdown`] and [`schema`] describe every key: unit, range, default, meaning. They are generated from the
+//!   types: doc comments are the meanings. `docs/scenario.md` is [`markdown`]'s output.
+//!
+//! The crate is pure: it reads no files and runs nothing. It does not know how a mission flies.
+//!
+//! # Example
+//!
+//! ```
+//! use skein_scenario::{Scenario, ScenarioSource};
+//!
+//! let source = ScenarioSource { name: "mission.toml", stem: "mission" };
+//! let text = "
+//!     [formation]
+//!     drones = 5
+//!     [[obstacle]]
+//!     shape = \"circle\"
+//!     centre_m = [200, 0]
+//!     radius_m = 20
+//! ";
+//! let scenario = Scenario::parse(text, source, &[("seed".to_owned(), "7".to_owned())])?;
+//! assert_eq!((scenario.name.as_str(), scenario.seed), ("mission", 7));
+//! assert_eq!(scenario.starts().len(), 5);
+//! assert_eq!(scenario.stopping_distance_m().round(), 10.0);
+//!
+//! let errors = Scenario::parse("[formation]\ndrones = 0", source, &[]).unwrap_err();
+//! assert_eq!(
+//!     errors.to_string(),
+//!     "mission.toml:2:10: formation.drones: found 0, expected a whole number from 1 to 10000"
+//! );
+//! # Ok::<(), skein_scenario::ScenarioErrors>(())
+//! ```
+#![warn(unreachable_pub)]
 
+mod broken_rule;
 mod check;
 mod error;
 mod fault_rules;
 mod faults;
 mod guidance;
 mod keys;
+mod limits;
 mod near;
 mod node;
 mod objective;
 mod obstacle;
 mod parse;
 mod radio;
+mod radio_keys;
 mod reference;
 mod resolved;
 mod rules;
+mod schema_tree;
 mod strategy;
 
 pub use error::{Issue, ScenarioErrors};
 pub use faults::{
-    Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, MAX_FAULTS, PartitionSides, Sensor, SidesWord,
+    Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, PartitionSides, Sensor, SidesWord, TargetError,
 };
 pub use guidance::Guidance;
 pub use keys::{
-    Avoidance, Drone, End, Formation, FormationShape, MAX_DRONES, MAX_OBSTACLES, Mission, Protocol, Reformation,
-    Scenario, Sensors, Time,
+    Avoidance, Drone, End, Formation, FormationShape, Mission, Protocol, Reformation, Scenario, Sensors, Time,
 };
+pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES};
 pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::ScenarioSource;
-pub use radio::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
+pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
 pub use reference::{KeyDoc, keys, markdown, schema};
 pub use strategy::{Strategy, StrategyError};

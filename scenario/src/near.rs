@@ -1,28 +1,28 @@
-//! Who is too near to whom: points among each other, points and an obstacle. Metres.
+//! Points that are too close to each other or to an obstacle. All lengths are in metres.
 
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 
-/// The closest of the pairs that are nearer than a limit.
+/// The closest of the pairs that are closer than a limit.
 pub(crate) struct ClosePair {
-    pub pair: (usize, usize),
-    pub distance_m: f64,
-    /// How many pairs are.
-    pub pairs: usize,
+    pub(crate) pair: (usize, usize),
+    pub(crate) distance_m: f64,
+    /// The number of pairs that are closer than the limit.
+    pub(crate) pairs: usize,
 }
 
-/// The closest slot of those nearer to an obstacle than a limit.
+/// The closest of the slots that are closer to an obstacle than a limit.
 pub(crate) struct CloseSlot {
-    pub slot: usize,
-    /// 0 inside.
-    pub distance_m: f64,
-    /// How many slots are.
-    pub slots: usize,
+    pub(crate) slot: usize,
+    /// 0 inside the obstacle.
+    pub(crate) distance_m: f64,
+    /// The number of slots that are closer than the limit.
+    pub(crate) slots: usize,
 }
 
-/// The closest two points, if they are nearer than `limit_m`.
+/// The closest two points, if they are closer than `limit_m`.
 pub(crate) fn closest_pair(points: &[Vec2], limit_m: f64) -> Option<ClosePair> {
-    // A sweep along the axis on which the points are spread widest, so that ten thousand of them in a line are quick.
+    // A sweep along the axis on which the points spread the most: fast even for ten thousand points in a line.
     let (low, high) =
         points.iter().fold((Vec2::repeat(f64::MAX), Vec2::repeat(f64::MIN)), |(l, h), p| (l.inf(p), h.sup(p)));
     let axis = usize::from(high.y - low.y > high.x - low.x);
@@ -48,7 +48,7 @@ pub(crate) fn closest_pair(points: &[Vec2], limit_m: f64) -> Option<ClosePair> {
     close
 }
 
-/// The slot closest to the shape, if it is nearer than `limit_m`.
+/// The slot closest to the shape, if it is closer than `limit_m`.
 pub(crate) fn closest_slot(shape: &ConvexShape, slots: &[Vec2], limit_m: f64) -> Option<CloseSlot> {
     let (low, high) = shape.bounds();
     let boxed = |p: &Vec2| (low - p).max().max((p - high).max()) < limit_m;
@@ -58,8 +58,8 @@ pub(crate) fn closest_slot(shape: &ConvexShape, slots: &[Vec2], limit_m: f64) ->
     Some(CloseSlot { slot, distance_m, slots: near.len() })
 }
 
-/// Distance from a point to a shape, 0 inside.
-pub(crate) fn distance(shape: &ConvexShape, point: Vec2) -> f64 {
+/// The distance from a point to a shape, 0 inside.
+fn distance(shape: &ConvexShape, point: Vec2) -> f64 {
     let n = shape.count as usize;
     let edge = |i: usize| (shape.vertex(i), shape.vertex((i + 1) % n));
     if n >= 3 && (0..n).map(edge).all(|(a, b)| (b - a).perp(&(point - a)) >= 0.0) {
@@ -93,7 +93,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn the_sweep_finds_what_all_pairs_give(
+        fn the_sweep_finds_what_comparing_all_pairs_finds(
             points in proptest::collection::vec((-20.0..20.0f64, -40.0..40.0f64), 2..20),
             limit_m in 0.5..30.0f64,
         ) {

@@ -1,9 +1,10 @@
-//! A scenario's text as a tree in which every value knows its place, so that the file and its overrides are checked,
-//! and blamed, alike.
+//! A scenario's text as a tree in which every value has its place. The file and its overrides are checked in the same
+//! way, and their errors are reported in the same way.
 
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use thiserror::Error;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -12,15 +13,15 @@ use toml::de::{DeTable, DeValue};
 pub(crate) enum Place {
     /// Bytes of the file.
     File(Range<usize>),
-    /// The override of this number.
+    /// The override with this number, from 0.
     Set(usize),
 }
 
 /// A value and its place.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    pub place: Place,
-    pub data: Data,
+    pub(crate) place: Place,
+    pub(crate) data: Data,
 }
 
 /// A value, of TOML or of JSON.
@@ -32,20 +33,46 @@ pub(crate) enum Data {
     Text(String),
     List(Vec<Node>),
     Table(BTreeMap<String, Entry>),
-    /// What no key takes, described.
+    /// A value that no key allows, in words.
     Other(&'static str),
 }
 
-/// A key's place and its value.
+/// The place of a key, and its value.
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {
-    pub key: Place,
-    pub node: Node,
+    pub(crate) key: Place,
+    pub(crate) node: Node,
+}
+
+/// Why an override has no place in the scenario.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub(crate) enum OverrideError {
+    /// The path has an empty step.
+    #[error("expected a key's path such as time.dt_s, found {0:?}")]
+    Path(String),
+    /// The index is no number, or it is behind the end of the list.
+    #[error("found index {index:?}, expected a number up to {len}: {list} has {len} entries, and {len} adds one")]
+    Index {
+        /// The index that was found.
+        index: String,
+        /// The path of the list.
+        list: String,
+        /// The length of the list.
+        len: usize,
+    },
+    /// The path goes on below a single value.
+    #[error("{path} is a single value: expected no key or index {step:?} below it")]
+    Value {
+        /// The path of the value.
+        path: String,
+        /// The step below it.
+        step: String,
+    },
 }
 
 impl Node {
-    /// From a parsed file; `place` makes a place of a span.
-    pub fn from_table(table: &DeTable<'_>, place: &dyn Fn(Range<usize>) -> Place) -> Data {
+    /// Makes a tree from a parsed file. `place` turns a span into a place.
+    pub(crate) fn from_table(table: &DeTable<'_>, place: &dyn Fn(Range<usize>) -> Place) -> Data {
         let entry = |(key, value): (&Spanned<_>, &Spanned<DeValue<'_>>)| {
             let key: &Spanned<std::borrow::Cow<'_, str>> = key;
             (key.get_ref().to_string(), Entry { key: place(key.span()), node: Self::from_toml(value, place) })
@@ -53,8 +80,8 @@ impl Node {
         Data::Table(table.iter().map(entry).collect())
     }
 
-    /// From a parsed value; `place` makes a place of a span.
-    pub fn from_toml(value: &Spanned<DeValue<'_>>, place: &dyn Fn(Range<usize>) -> Place) -> Self {
+    /// Makes a node from a parsed value. `place` turns a span into a place.
+    pub(crate) fn from_toml(value: &Spanned<DeValue<'_>>, place: &dyn Fn(Range<usize>) -> Place) -> Self {
         let data = match value.get_ref() {
             DeValue::String(text) => Data::Text(text.to_string()),
             DeValue::Boolean(flag) => Data::Bool(*flag),
@@ -70,8 +97,8 @@ impl Node {
         Self { place: place(value.span()), data }
     }
 
-    /// From JSON, which has no places; keys with null are left out.
-    pub fn from_json(value: &Json) -> Self {
+    /// Makes a tree from JSON, which has no places. Keys whose value is null are left out.
+    pub(crate) fn from_json(value: &Json) -> Self {
         let data = match value {
             Json::Null => Data::Other("null"),
             Json::Bool(flag) => Data::Bool(*flag),
@@ -92,8 +119,8 @@ impl Node {
         Self { place: nowhere(), data }
     }
 
-    /// The node at this path, such as `obstacle.0.centre_m`, if it is there.
-    pub fn find(&self, path: &str) -> Option<&Self> {
+    /// The node at this path, such as `obstacle.0.centre_m`, if it exists.
+    pub(crate) fn find(&self, path: &str) -> Option<&Self> {
         path.split('.').try_fold(self, |node, step| match &node.data {
             Data::Table(entries) => entries.get(step).map(|entry| &entry.node),
             Data::List(items) => step.parse().ok().and_then(|i: usize| items.get(i)),
@@ -102,7 +129,7 @@ impl Node {
     }
 
     /// The deepest node on the way to this path.
-    pub fn nearest(&self, path: &str) -> &Self {
+    pub(crate) fn nearest(&self, path: &str) -> &Self {
         let mut end = path.len();
         loop {
             match (self.find(&path[..end]), path[..end].rfind('.')) {
@@ -113,8 +140,12 @@ impl Node {
         }
     }
 
-    /// Puts override `number` at `path`, making tables on the way; the value is TOML, or else a string.
-    pub fn set(&mut self, path: &str, value: &str, number: usize) -> Result<(), String> {
+    /// Puts the override with this number at `path` and makes the tables on the way. The value is TOML; a value that is not
+    /// valid TOML is taken as a string.
+    ///
+    /// # Errors
+    /// [`OverrideError`] if there is no place for the path.
+    pub(crate) fn set(&mut self, path: &str, value: &str, number: usize) -> Result<(), OverrideError> {
         let place = |_| Place::Set(number);
         let new = DeValue::parse(value).map_or_else(
             |_| Self { place: Place::Set(number), data: Data::Text(value.to_owned()) },
@@ -124,14 +155,14 @@ impl Node {
         Ok(())
     }
 
-    /// The node at `path`, made if it is missing in a table.
-    fn make(&mut self, path: &str, number: usize) -> Result<&mut Self, String> {
+    /// The node at `path`. A node that is missing in a table, or is the next one of a list, is made.
+    fn make(&mut self, path: &str, number: usize) -> Result<&mut Self, OverrideError> {
         let mut node = self;
         let mut steps = path.split('.').peekable();
         let mut at = String::new();
         while let Some(step) = steps.next() {
             if step.is_empty() {
-                return Err(format!("expected a key's path such as time.dt_s, found {path:?}"));
+                return Err(OverrideError::Path(path.to_owned()));
             }
             let needs_list = steps.peek().is_some_and(|next| next.bytes().all(|b| b.is_ascii_digit()));
             node = match &mut node.data {
@@ -144,13 +175,10 @@ impl Node {
                     if index == Some(len) {
                         items.push(Self::empty(number, needs_list));
                     }
-                    index.and_then(|index| items.get_mut(index)).ok_or_else(|| {
-                        format!(
-                            "found index {step:?}, expected {len} at most: {at} has {len} entries, one more is made"
-                        )
-                    })?
+                    let error = || OverrideError::Index { index: step.to_owned(), list: at.clone(), len };
+                    index.and_then(|index| items.get_mut(index)).ok_or_else(error)?
                 }
-                _ => return Err(format!("{at} is one value: expected no key or index {step:?} below it")),
+                _ => return Err(OverrideError::Value { path: at, step: step.to_owned() }),
             };
             at = if at.is_empty() { step.to_owned() } else { format!("{at}.{step}") };
         }
@@ -162,8 +190,8 @@ impl Node {
         Self { place: Place::Set(number), data }
     }
 
-    /// The value as it is shown in a message.
-    pub fn found(&self) -> String {
+    /// The value, for a message.
+    pub(crate) fn found(&self) -> String {
         match &self.data {
             Data::Bool(flag) => flag.to_string(),
             Data::Integer(integer) => integer.to_string(),
@@ -183,7 +211,7 @@ fn nowhere() -> Place {
     Place::File(0..0)
 }
 
-/// A number as short as can be.
+/// The shortest text of a number.
 pub(crate) fn number(value: f64) -> String {
     if value != 0.0 && (value.abs() >= 1e15 || value.abs() < 1e-6) { format!("{value:e}") } else { format!("{value}") }
 }

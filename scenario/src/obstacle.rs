@@ -1,4 +1,4 @@
-//! Obstacles as they are written, and the one shape they all become.
+//! The keys of an obstacle, and the convex shape that they describe.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES, ShapeError};
 use std::f64::consts::{PI, TAU};
 
-/// One obstacle, world frame.
+/// One obstacle, in the world frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "shape", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Obstacle {
@@ -15,10 +15,10 @@ pub enum Obstacle {
         /// Its centre, [x, y].
         #[schemars(inner(range(min = -1e6, max = 1e6)))]
         centre_m: [f64; 2],
-        /// Half its length along x and along y before it is turned.
+        /// Half its length along x and along y, before the rotation.
         #[schemars(inner(range(min = 1e-3, max = 1e5)))]
         half_size_m: [f64; 2],
-        /// Turned counter-clockwise by this.
+        /// Rotation around the centre, counter-clockwise.
         #[serde(default)]
         #[schemars(range(min = -1000.0, max = 1000.0))]
         rotation_rad: f64,
@@ -38,15 +38,15 @@ pub enum Obstacle {
         #[schemars(length(min = 3, max = MAX_VERTICES), inner(inner(range(min = -1e6, max = 1e6))))]
         vertices_m: Vec<[f64; 2]>,
     },
-    /// An ellipse; it becomes the polygon of 16 corners around it.
+    /// An ellipse. It is replaced by the polygon of 16 corners that encloses it.
     Ellipse {
         /// Its centre, [x, y].
         #[schemars(inner(range(min = -1e6, max = 1e6)))]
         centre_m: [f64; 2],
-        /// Its semi-axes along x and along y before it is turned.
+        /// Its semi-axes along x and along y, before the rotation.
         #[schemars(inner(range(min = 1e-3, max = 1e5)))]
         semi_axes_m: [f64; 2],
-        /// Turned counter-clockwise by this.
+        /// Rotation around the centre, counter-clockwise.
         #[serde(default)]
         #[schemars(range(min = -1000.0, max = 1000.0))]
         rotation_rad: f64,
@@ -54,10 +54,10 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
-    /// The obstacle's shape, counter-clockwise, world frame, metres.
+    /// The obstacle's shape, counter-clockwise, world frame, m.
     ///
     /// # Errors
-    /// [`ShapeError`] if a polygon is not convex or a number is not what its key allows.
+    /// [`ShapeError`] if a polygon is not convex or a number is outside its key's range.
     pub fn shape(&self) -> Result<ConvexShape, ShapeError> {
         match self {
             Self::Rectangle { centre_m, half_size_m, rotation_rad } => {
@@ -78,7 +78,7 @@ fn polygon(corners: &[[f64; 2]]) -> Result<ConvexShape, ShapeError> {
         corners.reverse();
     }
     let shape = ConvexShape::new(&corners, 0.0)?;
-    // Turning left at every corner is not enough: a pentagram does, too. So every corner has to be left of every edge.
+    // To turn left at every corner is not enough: a pentagram does that too. Every corner has to be left of every edge.
     let n = corners.len();
     let edge_is_outside = |i: usize| {
         let (a, b) = (corners[i], corners[(i + 1) % n]);
@@ -87,12 +87,12 @@ fn polygon(corners: &[[f64; 2]]) -> Result<ConvexShape, ShapeError> {
     if n >= 3 && (0..n).all(edge_is_outside) { Ok(shape) } else { Err(ShapeError::NotConvex) }
 }
 
-/// Twice the signed area: positive if the corners run counter-clockwise.
+/// Twice the signed area; positive if the corners are in counter-clockwise order.
 fn twice_area(corners: &[Vec2]) -> f64 {
     (0..corners.len()).map(|i| corners[i].perp(&corners[(i + 1) % corners.len()])).sum()
 }
 
-/// The affine image of the regular polygon around the unit circle: it touches the ellipse with every edge.
+/// The affine image of the regular polygon around the unit circle. Each of its edges touches the ellipse.
 fn ellipse(centre: Vec2, semi_axes: Vec2, rotation_rad: f64) -> Result<ConvexShape, ShapeError> {
     let out = 1.0 / (PI / MAX_VERTICES as f64).cos();
     let (sin, cos) = rotation_rad.sin_cos();

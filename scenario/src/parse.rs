@@ -1,32 +1,33 @@
 //! From text to a checked scenario.
 
+use crate::broken_rule::BrokenRule;
 use crate::check::{Complaint, check};
 use crate::error::{Issue, Lines, ScenarioErrors};
 use crate::keys::Scenario;
 use crate::node::{Data, Node, Place};
 use crate::radio;
 use crate::reference::schema;
-use crate::rules::{self, Broken};
+use crate::rules;
 use std::ops::Range;
 use toml::de::DeTable;
 
-/// What a scenario's text is called.
+/// The name of a scenario's text, for messages and for the scenario's default name.
 #[derive(Clone, Copy, Debug)]
 pub struct ScenarioSource<'a> {
-    /// Its path, for messages.
+    /// The path of the file, for messages.
     pub name: &'a str,
-    /// The file's name without its ending: the scenario's name where the text gives none. Characters that a name must
-    /// not have become `-`.
+    /// The file's name without its ending. It is the scenario's name if the text has no key `name`. Characters that are
+    /// not allowed in a name become `-`.
     pub stem: &'a str,
 }
 
 impl Scenario {
-    /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`,
-    /// applied in their order before anything is checked; a value that is no TOML is taken as a string.
+    /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`. They
+    /// are applied in their order before anything is checked. A value that is not valid TOML is taken as a string.
     ///
     /// # Errors
-    /// [`ScenarioErrors`], each with its place. Errors of TOML's syntax come alone; so do unknown keys, wrong types and
-    /// ranges; rules between keys are checked last.
+    /// [`ScenarioErrors`], each with its place. TOML syntax is checked first, then keys, types and ranges, then rules
+    /// between keys. Only the errors of the first step that fails are given.
     pub fn parse(
         text: &str,
         source: ScenarioSource<'_>,
@@ -45,8 +46,8 @@ impl Scenario {
         let mut root = Node { place: Place::File(0..0), data };
         let mut issues = Vec::new();
         for (number, (path, value)) in overrides.iter().enumerate() {
-            if let Err(message) = root.set(path, value, number) {
-                issues.push(text_of.issue(&Place::Set(number), path, &message));
+            if let Err(error) = root.set(path, value, number) {
+                issues.push(text_of.issue(&Place::Set(number), path, &error.to_string()));
             }
         }
         text_of.finish(&root, issues)
@@ -55,7 +56,7 @@ impl Scenario {
     /// As [`Scenario::parse`], from bytes that may not be UTF-8.
     ///
     /// # Errors
-    /// As [`Scenario::parse`]; the first byte that is not UTF-8 is an error of its own.
+    /// As [`Scenario::parse`]. If the bytes are not UTF-8, the only error is the place of the first invalid byte.
     pub fn parse_bytes(
         bytes: &[u8],
         source: ScenarioSource<'_>,
@@ -73,16 +74,16 @@ impl Scenario {
         Err(text_of.errors(vec![text_of.issue(&Place::File(at..at), "", &message)]))
     }
 
-    /// A checked scenario from the JSON that serde makes of one, such as the one in a run's manifest.
+    /// A checked scenario from the JSON that serde makes of one, such as the JSON in a run's manifest.
     ///
     /// # Errors
-    /// As [`Scenario::parse`]; JSON has no places, so every error is at 1:1.
+    /// As [`Scenario::parse`]. JSON has no places, so every error is at 1:1.
     pub fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) -> Result<Self, ScenarioErrors> {
         Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
     }
 }
 
-/// The text and all that is needed to say where in it an error is.
+/// The text, and what is needed to give the place of an error in it.
 struct Text<'a> {
     text: &'a str,
     lines: Lines<'a>,
@@ -111,7 +112,7 @@ impl<'a> Text<'a> {
         if issues.is_empty() { Ok(scenario) } else { Err(self.errors(issues)) }
     }
 
-    /// Fills in what follows from other keys: the name, and with offsets the number of drones and no shape.
+    /// Fills in what follows from other keys: the name, and with `offsets_m` the number of drones and no shape.
     fn resolve(&self, root: &Node, scenario: &mut Scenario) -> Vec<Issue> {
         if root.find("name").is_none() {
             scenario.name = name_of(self.source.stem);
@@ -125,7 +126,7 @@ impl<'a> Text<'a> {
                 issues.push(self.issue(
                     &node.place,
                     "formation.shape",
-                    "expected either this key or offsets_m, not both",
+                    "found both this key and offsets_m, expected one of them",
                 ));
             }
         }
@@ -134,14 +135,14 @@ impl<'a> Text<'a> {
                 let message = format!("found {}, expected {offsets}: the number of offsets_m", formation.drones);
                 issues.push(self.issue(&node.place, "formation.drones", &message));
             }
-            // The schema limits the offsets to far less than fits.
+            // The schema limits the number of offsets to far less than a u32 holds.
             _ => formation.drones = u32::try_from(offsets).unwrap_or(u32::MAX),
         }
         issues
     }
 
-    /// A broken rule is blamed on the first override among its keys, or else on the first key that is written.
-    fn blame(&self, root: &Node, broken: &Broken) -> Issue {
+    /// Blames a broken rule on the first override among its keys, or else on the first key that the file writes.
+    fn blame(&self, root: &Node, broken: &BrokenRule) -> Issue {
         let written: Vec<&Node> = broken.keys.iter().filter_map(|key| root.find(key)).collect();
         let set = written.iter().find(|node| has_override(node));
         let node = match (set, written.first(), broken.keys.first()) {
@@ -192,7 +193,7 @@ fn overridden(node: &Node) -> Option<&Place> {
     }
 }
 
-/// A file's stem as a scenario's name.
+/// A scenario's name, made from the name of its file without the ending.
 fn name_of(stem: &str) -> String {
     let name: String = stem.chars().take(64).map(|c| if rules::is_name_char(c) { c } else { '-' }).collect();
     let name = name.trim_start_matches(['.', '-']);

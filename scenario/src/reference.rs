@@ -1,22 +1,22 @@
-//! The schema, and the key reference that is made from it.
+//! The JSON schema, and the key reference made from it.
 
-use crate::check::{kind, present, tag, words};
 use crate::keys::Scenario;
 use crate::node::number;
+use crate::schema_tree::{kind, present, range, tag, unit, words};
 use serde_json::Value as Json;
 // Writing to a string cannot fail, so its result is dropped below.
 use std::fmt::Write as _;
 
-/// One key of a scenario.
+/// The description of one key of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyDoc {
-    /// Where it stands, such as `time.dt_s`; keys of the list `obstacle` as `obstacle.rectangle.centre_m`.
+    /// Its path, such as `time.dt_s`. A key of an obstacle has the shape in its path: `obstacle.rectangle.centre_m`.
     pub path: String,
-    /// Its unit, from the ending of its name; empty if it has none.
+    /// Its unit, from the ending of its name; empty without a unit.
     pub unit: &'static str,
-    /// The values it takes.
+    /// The values it allows.
     pub range: String,
-    /// What holds when it is left out; "required" if it must not be.
+    /// Its default; `required` if it must be written.
     pub default: String,
     /// What it means.
     pub meaning: String,
@@ -29,7 +29,7 @@ impl KeyDoc {
     }
 }
 
-/// The JSON schema of a scenario (draft 2020-12), made from [`Scenario`]'s types.
+/// The JSON schema of a scenario (draft 2020-12), made from the types of [`Scenario`].
 #[must_use]
 pub fn schema() -> Json {
     let settings = schemars::generate::SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
@@ -54,7 +54,9 @@ fn collect(table: &Json, path: &str, keys: &mut Vec<KeyDoc>) {
         let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         let variants = schema["items"]["oneOf"].as_array().into_iter().flatten();
         let before = keys.len();
-        variants.filter_map(|v| Some((v, tag(v)?.1))).for_each(|(v, word)| collect(v, &format!("{path}.{word}"), keys));
+        for (variant, word) in variants.filter_map(|v| Some((v, tag(v)?.1))) {
+            collect(variant, &format!("{path}.{word}"), keys);
+        }
         let here = present(schema);
         match kind(here) {
             _ if keys.len() > before => {}
@@ -77,41 +79,14 @@ fn key(path: String, schema: &Json, required: bool) -> KeyDoc {
         Json::Number(n) => n.as_f64().map(number).unwrap_or_default(),
         other => other.to_string(),
     };
-    let mut meaning = if schema["const"].is_string() { "Which shape it has.".to_owned() } else { text(schema) };
+    let mut meaning = if schema["const"].is_string() { "The shape of the obstacle.".to_owned() } else { text(schema) };
     for word in present(schema)["oneOf"].as_array().into_iter().flatten() {
         let _ = write!(meaning, " {}: {}", word["const"], text(word));
     }
     KeyDoc { unit: unit(&path).unwrap_or_default(), range: values(schema), default, meaning, path }
 }
 
-/// The unit that a key's name ends with; indices behind it are skipped.
-pub(crate) fn unit(path: &str) -> Option<&'static str> {
-    const ENDINGS: [(&str, &str); 8] = [
-        ("_bps", "bit/s"),
-        ("_db", "dB"),
-        ("_mps2", "m/s²"),
-        ("_mps", "m/s"),
-        ("_per_s", "1/s"),
-        ("_rad", "rad"),
-        ("_s", "s"),
-        ("_m", "m"),
-    ];
-    let name = path.rsplit('.').find(|step| step.parse::<usize>().is_err())?;
-    ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit)
-}
-
-/// The limits of a number, such as `from 0 to 10`.
-pub(crate) fn range(schema: &Json) -> String {
-    let limit = |name: &str| schema[name].as_f64();
-    let max = schema["maximum"].as_i64().map(|max| max.to_string()).or_else(|| limit("maximum").map(number));
-    match (limit("minimum").map(number), limit("exclusiveMinimum").map(number), max) {
-        (_, Some(min), Some(max)) => format!("above {min}, at most {max}"),
-        (Some(min), _, Some(max)) => format!("from {min} to {max}"),
-        _ => "that is finite".to_owned(),
-    }
-}
-
-/// The values a key takes, in words.
+/// The values that a key allows, in words.
 fn values(schema: &Json) -> String {
     let schema = present(schema);
     if let Some(words) = words(schema) {
@@ -163,22 +138,23 @@ pub fn markdown() -> String {
 
 const HEAD: &str = "# Scenario files
 
-Generated from the types of the crate `scenario`; a test keeps it up to date. `skein schema scenario` prints the same as
-a JSON schema, `skein check FILE` checks a file without flying it.
+This page is generated from the types of the crate `scenario`. A test keeps it up to date. `skein schema scenario` prints
+the same as a JSON schema. `skein check FILE` checks a file without flying it.
 
-A scenario is a TOML file. SI units, angles in radians; world frame x = flight direction, y = left. Only the table
-`[formation]` is required, and it may be empty. Any key can be set from the command line: `--set radio.delay_s=0.2`,
-`--set obstacle.0.centre_m=[150,20]`; the value is TOML, or else a string.
+A scenario is a TOML file. Quantities are in SI units, angles in radians. In the world frame, x is the flight direction
+and y is left. Only the table `[formation]` is required, and it may be empty.
+
+Any key can be set on the command line: `--set radio.delay_s=0.2`, `--set obstacle.0.centre_m=[150,20]`. The value is
+TOML; a value that is not valid TOML is taken as a string.
 ";
 
 fn heading(page: &mut String, schema: &Json, table: &str) {
-    let (title, about) =
-        if table.is_empty() { ("At the top".to_owned(), String::new()) } else { titled(schema, table) };
+    let (title, about) = if table.is_empty() { ("Top level".to_owned(), String::new()) } else { titled(schema, table) };
     let about = if about.is_empty() { about } else { format!("{about}\n\n") };
     let _ = write!(page, "\n## {title}\n\n{about}| key | unit | values | default | meaning |\n|---|---|---|---|---|\n");
 }
 
-/// A table as it is written, and what it is: `[time]`, `[[radio.rule]]`, `[[obstacle]]` with its variant's word.
+/// The heading of a table and its description: `[time]`, `[[radio.rule]]`, `[[obstacle]]` with its shape.
 fn titled(schema: &Json, table: &str) -> (String, String) {
     let (mut at, mut about, mut name) = (schema, String::new(), Vec::new());
     for step in table.split('.') {

@@ -1,11 +1,13 @@
-//! What others build from a checked scenario.
+//! Values that follow from the keys of a checked scenario.
 
 use crate::keys::{FormationShape, Scenario};
+use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::radio::{Radio, SharedChannel};
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
-/// Standard gravity as the paper has it, m/s².
+/// Gravity as in the paper, m/s².
 const GRAVITY_MPS2: f64 = 9.81;
 
 impl Scenario {
@@ -30,7 +32,8 @@ impl Scenario {
         self.formation_shape().slots(self.formation.drones as usize, self.formation.spacing_m)
     }
 
-    /// Where each drone starts, world frame, m: its slot, moved by the jitter that seed and drone alone decide.
+    /// The start position of each drone, world frame, m: its slot plus a jitter that depends on the seed and the drone
+    /// only.
     #[must_use]
     pub fn starts(&self) -> Vec<Vec2> {
         let start = Vec2::from(self.formation.start_m);
@@ -38,16 +41,17 @@ impl Scenario {
         self.slots().into_iter().enumerate().map(|(drone, slot)| start + slot + jitter(drone)).collect()
     }
 
-    /// The obstacles' shapes, world frame, m, in their order.
+    /// The shapes of the obstacles, world frame, m, in their order.
     ///
     /// # Errors
-    /// [`ShapeError`], never from a scenario that [`Scenario::parse`] or [`Scenario::from_json`] made.
+    /// [`ShapeError`] if an obstacle has an invalid shape. A scenario from [`Scenario::parse`] or [`Scenario::from_json`]
+    /// has none.
     pub fn shapes(&self) -> Result<Vec<ConvexShape>, ShapeError> {
         self.obstacles.iter().map(crate::Obstacle::shape).collect()
     }
 
-    /// The stopping distance at nominal speed, m: E2 = E4 + E3 = v·t_c + v²/(2 g c_d), where g·c_d is no more than the
-    /// drone's greatest acceleration.
+    /// The stopping distance at nominal speed, m: the paper's E2 = E4 + E3 = v·t_c + v²/(2 g c_d), where g·c_d is at most
+    /// the drone's greatest acceleration.
     #[must_use]
     pub fn stopping_distance_m(&self) -> f64 {
         let drone = &self.drone;
@@ -55,17 +59,29 @@ impl Scenario {
         drone.speed_mps * drone.reaction_time_s + drone.speed_mps.powi(2) / (2.0 * braking_mps2)
     }
 
-    /// The scenario as TOML with every key written out; [`Scenario::parse`] makes an equal one of it.
+    /// The radio of the scenario: delay, loss, range and copies, keyed by the seed.
+    #[must_use]
+    pub fn radio(&self) -> Radio {
+        radio::radio(self.seed, &self.radio)
+    }
+
+    /// The channel that all drones share; `None` if bandwidth is no limit.
+    #[must_use]
+    pub fn channel(&self) -> Option<SharedChannel> {
+        radio::channel(self.seed, &self.radio)
+    }
+
+    /// The scenario as TOML with every key written out. [`Scenario::parse`] makes an equal scenario of it.
     ///
     /// # Errors
-    /// From the serializer, if a number does not fit TOML; never from a checked scenario.
+    /// The serializer's error if a number does not fit TOML. A checked scenario has no such number.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string(self)
     }
 }
 
-/// A point drawn uniformly from the unit disc, decided by the two keys alone (SplitMix64; rejection, so that no bit
-/// depends on a platform's sine).
+/// A uniform point of the unit disc that depends on the two keys only. It uses SplitMix64 and rejection, so that no bit
+/// depends on a platform's sine.
 fn in_unit_disc(seed: u64, drone: u64) -> Vec2 {
     let mut state = mix(mix(seed) ^ drone);
     let mut draw = || {

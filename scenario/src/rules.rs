@@ -1,6 +1,6 @@
-//! What no single key can say: rules between keys, and the geometry of start, goal and obstacles.
+//! Rules between keys, and the geometry of start, goal and obstacles.
 
-use crate::check::quantity;
+use crate::broken_rule::{BrokenRule, quantity};
 use crate::keys::{End, Scenario};
 use crate::node::number;
 use crate::strategy::Strategy;
@@ -8,17 +8,11 @@ use crate::{fault_rules, near};
 use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
-/// Rounding of slots and shapes, m.
+/// Tolerance for the rounding of slots and shapes, m.
 const ROUNDING_M: f64 = 1e-6;
 
-/// A broken rule: the keys it is about, the blamed one first, and what was found and expected.
-pub(crate) struct Broken {
-    pub keys: Vec<String>,
-    pub message: String,
-}
-
-/// All broken rules of a scenario whose keys are fine one by one.
-pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
+/// All rules that a scenario breaks whose keys are valid one by one.
+pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     let mut rules = Rules { scenario, broken: Vec::new() };
     rules.name();
     rules.speeds();
@@ -35,14 +29,14 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
 
 struct Rules<'a> {
     scenario: &'a Scenario,
-    broken: Vec<Broken>,
+    broken: Vec<BrokenRule>,
 }
 
 impl Rules<'_> {
     fn expect(&mut self, holds: bool, keys: &[&str], message: impl FnOnce() -> String) {
         if !holds {
             let keys = keys.iter().map(|k| (*k).to_owned()).collect();
-            self.broken.push(Broken { keys, message: message() });
+            self.broken.push(BrokenRule { keys, message: message() });
         }
     }
 
@@ -125,7 +119,7 @@ impl Rules<'_> {
     fn mission(&mut self) {
         let mission = &self.scenario.mission;
         self.expect(mission.end != End::Goal || mission.goal_m.is_some(), &["mission.goal_m", "mission.end"], || {
-            "is missing: mission.end = \"goal\" needs the goal's front slot, [x, y]".to_owned()
+            "is missing: mission.end = \"goal\" needs the position of the front slot, [x, y]".to_owned()
         });
     }
 
@@ -186,8 +180,8 @@ impl Rules<'_> {
                     }
                 }
                 Err(ShapeError::NotConvex) => self.expect(false, &[&format!("obstacle.{i}.vertices_m")], || {
-                    "found corners that are not those of a convex polygon in order, expected every corner to turn the \
-                     same way, none of them straight or repeated"
+                    "found corners that do not form a convex polygon, expected corners in order that all turn the same \
+                     way, none of them straight or repeated"
                         .to_owned()
                 }),
                 Err(error) => self.expect(false, &[&format!("obstacle.{i}")], || error.to_string()),
@@ -195,7 +189,7 @@ impl Rules<'_> {
         }
     }
 
-    /// Slots of the start or of the goal nearer to obstacle `i` than the clearance.
+    /// Checks that the slots of the start or of the goal keep the clearance from obstacle `i`.
     fn clear_of(&mut self, i: usize, shape: &ConvexShape, (end, key): (&str, &str), slots: &[Vec2]) {
         let clearance_m = self.scenario.avoidance.clearance_m;
         let Some(close) = near::closest_slot(shape, slots, clearance_m - ROUNDING_M) else { return };

@@ -1,4 +1,4 @@
-//! How drones are shared out to the routes.
+//! How a leader assigns drones to routes.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -7,28 +7,28 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How drones are shared out to the routes round an obstacle set. Written as one word.
+/// How a leader assigns drones to the routes past an obstacle set. Written as one word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Strategy {
-    /// `congestion-aware`: the best few groupings by the paper's rule, and the shortest paths, are flown ahead in the
-    /// leader's mind; the best by the scenario's objective is taken.
+    /// `congestion-aware`: the leader simulates a few good groupings and the shortest paths to the mission's end. It takes
+    /// the best one by the scenario's [`Objective`](crate::Objective).
     #[default]
     LookAhead,
-    /// `congestion-aware-paper`: the paper's rule to the letter (A3, C1), no rehearsal.
+    /// `congestion-aware-paper`: the paper's rule (A3, C1), without simulation.
     PaperRule,
-    /// `shortest-path`: every drone takes its own shortest path.
+    /// `shortest-path`: every drone takes its shortest path.
     ShortestPath,
-    /// `fixed:L/R`: so many drones to each side of the only obstacle.
+    /// `fixed:L/R`: L drones pass the only obstacle on its left, R drones on its right.
     Fixed {
-        /// Drones to the left of it, seen along the flight.
+        /// Number of drones on the left, seen along the flight.
         left: u32,
-        /// Drones to the right of it.
+        /// Number of drones on the right.
         right: u32,
     },
 }
 
-/// A word that names no strategy.
+/// The word is not a strategy.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{found:?} is no strategy: expected {words} or \"fixed:L/R\" (drones to the left and to the right)", words = quoted_words())]
 pub struct StrategyError {
@@ -36,7 +36,7 @@ pub struct StrategyError {
 }
 
 impl Strategy {
-    /// The words without numbers in them.
+    /// The words without numbers, and their strategies.
     pub const WORDS: [(&str, Self); 3] = [
         ("congestion-aware", Self::LookAhead),
         ("congestion-aware-paper", Self::PaperRule),

@@ -1,4 +1,4 @@
-//! What is wrong with a scenario is said with its place, what was found and what was expected.
+//! Each error of a scenario gives its place, what was found and what was expected.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
@@ -17,8 +17,8 @@ fn errors(text: &str, sets: &[(&str, &str)]) -> String {
     }
 }
 
-/// Each text must be refused in words that hold all of these.
-fn refused(cases: &[(&str, &[&str])]) {
+/// Each text must be rejected with a message that contains all of these parts.
+fn assert_rejected(cases: &[(&str, &[&str])]) {
     for (text, wanted) in cases {
         let message = errors(text, &[]);
         for part in *wanted {
@@ -30,8 +30,8 @@ fn refused(cases: &[(&str, &[&str])]) {
 const BOX: &str = "[[obstacle]]\nshape = \"rectangle\"\ncentre_m = [150, 0]\nhalf_size_m = [5, 50]\n";
 
 #[test]
-fn text_that_is_no_toml() {
-    refused(&[
+fn invalid_toml_is_rejected_with_its_place() {
+    assert_rejected(&[
         ("", &["bad.toml:1:1: formation: is missing: this table is required"]),
         ("[formation]\ndrones = \n", &["bad.toml:2:"]),
         ("[formation]\ndrones = 8\ndrones = 9\n", &["bad.toml:3:1: TOML syntax: duplicate key"]),
@@ -44,8 +44,8 @@ fn text_that_is_no_toml() {
 }
 
 #[test]
-fn unknown_keys_and_words_are_named_with_a_guess() {
-    refused(&[
+fn unknown_keys_and_words_come_with_a_suggestion() {
+    assert_rejected(&[
         ("[formation]\ndronse = 8", &["bad.toml:2:1: formation.dronse: unknown key", "did you mean `drones`?"]),
         ("[formation]\n[drone]\nspeed = 8", &["bad.toml:3:1: drone.speed: unknown key", "did you mean `speed_mps`?"]),
         ("drones = 8\n[formation]", &["bad.toml:1:1: drones: unknown key", "did you mean `formation.drones`?"]),
@@ -62,8 +62,8 @@ fn unknown_keys_and_words_are_named_with_a_guess() {
 }
 
 #[test]
-fn types_and_ranges() {
-    refused(&[
+fn wrong_types_and_ranges_are_rejected() {
+    assert_rejected(&[
         (
             "[formation]\ndrones = 0",
             &["bad.toml:2:10: formation.drones: found 0, expected a whole number from 1 to 10000"],
@@ -100,8 +100,8 @@ fn types_and_ranges() {
 }
 
 #[test]
-fn rules_between_keys() {
-    refused(&[
+fn broken_rules_between_keys_are_rejected() {
+    assert_rejected(&[
         ("[formation]\nspacing_m = 20", &["bad.toml:2:13: formation.spacing_m: found 20 m", "safe_distance_m = 35 m"]),
         (
             "[formation]\n[drone]\nspeed_mps = 25",
@@ -123,11 +123,14 @@ fn rules_between_keys() {
             &["strategy: found fixed:4/4 with 0 obstacles, expected exactly one"],
         ),
         ("[formation]\noffsets_m = [[0,0],[-9,3]]", &["formation.offsets_m: slots 0 and 1 are 9.48"]),
-        ("[formation]\nshape = \"v\"\noffsets_m = [[0,0],[-40,3]]", &["formation.shape: expected either"]),
+        (
+            "[formation]\nshape = \"v\"\noffsets_m = [[0,0],[-40,3]]",
+            &["formation.shape: found both this key and offsets_m"],
+        ),
         ("[formation]\nstart_jitter_m = 30", &["formation.start_jitter_m: drones", "apart at the start"]),
     ]);
     let short = format!("strategy = \"fixed:4/3\"\n[formation]\n{BOX}");
-    refused(&[(&short, &["strategy: found fixed:4/3, 7 drones, expected a sum of formation.drones = 8"])]);
+    assert_rejected(&[(&short, &["strategy: found fixed:4/3, 7 drones, expected a sum of formation.drones = 8"])]);
     assert!(parse(&short.replace("4/3", "5/3"), &[]).is_ok());
 }
 
@@ -151,7 +154,7 @@ fn slots_and_obstacles() {
 }
 
 #[test]
-fn overrides_are_checked_like_keys_and_blamed_by_their_own_text() {
+fn overrides_are_checked_like_keys_and_named_in_their_errors() {
     let file = format!("[formation]\n{BOX}");
     let cases: &[(&str, &str, &str)] = &[
         ("drone.speed_mps", "fast", "--set drone.speed_mps=fast: drone.speed_mps: found \"fast\", expected a number"),
@@ -160,8 +163,8 @@ fn overrides_are_checked_like_keys_and_blamed_by_their_own_text() {
         ("formation.drones", "1000000000", "--set formation.drones=1000000000: formation.drones: found"),
         ("obstacle.0.centre_m", "[0,0]", "--set obstacle.0.centre_m=[0,0]: obstacle.0: start slot"),
         ("obstacle.1.centre_m", "[0,0]", "obstacle.1.shape: is missing"),
-        ("obstacle.2.centre_m", "[0,0]", "found index \"2\", expected 1 at most: obstacle has 1 entries"),
-        ("obstacle.0.centre_m.0.x", "1", "obstacle.0.centre_m.0 is one value"),
+        ("obstacle.2.centre_m", "[0,0]", "found index \"2\", expected a number up to 1: obstacle has 1 entries"),
+        ("obstacle.0.centre_m.0.x", "1", "obstacle.0.centre_m.0 is a single value"),
         ("time..dt_s", "1", "expected a key's path"),
         ("avoidance.clearance_m", "19", "--set avoidance.clearance_m=19: sensors.detection_range_m: found 28 m"),
         ("formation", "3", "--set formation=3: formation: found 3, expected a table"),
@@ -178,14 +181,14 @@ fn overrides_are_checked_like_keys_and_blamed_by_their_own_text() {
 }
 
 #[test]
-fn all_errors_are_collected_in_the_files_order() {
+fn all_errors_are_collected_in_the_order_of_the_file() {
     let message = errors("[time]\ndt_s = 5\n[radio]\nloss = 2\n[drone]\nspeedy = 1", &[("name", "a b")]);
     let places: Vec<&str> = message.lines().map(|line| line.split(' ').next().unwrap()).collect();
     assert_eq!(places, ["bad.toml:1:1:", "bad.toml:2:8:", "bad.toml:4:8:", "bad.toml:6:1:"]);
 }
 
 #[test]
-fn the_places_are_shown_in_the_file() {
+fn the_diagnostic_shows_the_lines_of_the_file() {
     let error = parse("[formation]\ndrones = 0\nspacing_m = -1\n", &[]).unwrap_err();
     let mut shown = String::new();
     miette::NarratableReportHandler::new().render_report(&mut shown, &error).unwrap();
@@ -199,7 +202,7 @@ fn the_places_are_shown_in_the_file() {
 }
 
 #[test]
-fn many_errors_are_counted() {
+fn after_fifty_errors_the_others_are_counted() {
     let many: String = (0..20_000).map(|i| format!("x{i} = 1\n")).collect();
     let message = errors(&many, &[]);
     assert_eq!(message.lines().count(), 51);

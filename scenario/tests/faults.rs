@@ -1,4 +1,4 @@
-//! The keys of faults: what is read, and what is refused with its place.
+//! The keys of faults: what is read, and what is rejected with its place.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_scenario::{Fault, FaultEvent, FaultKind, FaultTarget, Scenario, ScenarioErrors, ScenarioSource};
@@ -45,7 +45,7 @@ fn every_kind_is_read_and_survives_json_and_toml() {
 }
 
 #[test]
-fn a_fault_is_made_by_overrides() {
+fn overrides_can_make_a_fault() {
     let sets = [("fault.0", "{ kind = \"freeze\", for_s = 2 }"), ("fault.0.target", "leader"), ("fault.0.at_s", "3")];
     let made = parse(HEAD, &sets).unwrap_or_else(|errors| panic!("{errors}")).fault_plan;
     assert_eq!(made, [fault("kind = \"freeze\"\nfor_s = 2\ntarget = \"leader\"\nat_s = 3")]);
@@ -60,10 +60,10 @@ fn a_fault_is_made_by_overrides() {
 }
 
 #[test]
-fn what_is_wrong_with_a_fault_is_said_with_its_place() {
+fn an_invalid_fault_is_rejected_with_its_place() {
     let sides = |sides: &str| format!("kind = \"partition\"\nat_s = 1\nsides = {sides}");
     let cases: &[(&str, &str)] = &[
-        ("kind = \"kill\"\ndrone = 1", "f.toml:7:8: fault.0.at_s: is missing: expected when the fault happens"),
+        ("kind = \"kill\"\ndrone = 1", "f.toml:7:8: fault.0.at_s: is missing: expected the time of the fault"),
         ("at_s = 1\ndrone = 1", "f.toml:6:1: fault.0.kind: is missing"),
         ("kind = \"kil\"\nat_s = 1\ndrone = 1", "f.toml:7:8: fault.0.kind: found \"kil\", expected one of \"kill\""),
         (
@@ -71,13 +71,13 @@ fn what_is_wrong_with_a_fault_is_said_with_its_place() {
             "f.toml:9:6: fault.0.on: expected either this key or at_s",
         ),
         ("kind = \"kill\"\nat_s = -1\ndrone = 1", "f.toml:8:8: fault.0.at_s: found -1, expected a number from 0"),
-        ("kind = \"kill\"\nat_s = 1\nafter_s = 1\ndrone = 1", "f.toml:9:11: fault.0.after_s: belongs to an event"),
-        ("kind = \"kill\"\nat_s = 1\nstage = 1\ndrone = 1", "f.toml:9:9: fault.0.stage: belongs to an event"),
+        ("kind = \"kill\"\nat_s = 1\nafter_s = 1\ndrone = 1", "f.toml:9:11: fault.0.after_s: needs an event"),
+        ("kind = \"kill\"\nat_s = 1\nstage = 1\ndrone = 1", "f.toml:9:9: fault.0.stage: needs an event"),
         (
             "kind = \"kill\"\non = \"gate\"\nstage = 1\ndrone = 1",
             "f.toml:9:9: fault.0.stage: found 1, expected an obstacle set",
         ),
-        ("kind = \"kill\"\nat_s = 1", "fault.0.target: is missing: expected whom the fault meets"),
+        ("kind = \"kill\"\nat_s = 1", "fault.0.target: is missing: expected the targets of the fault"),
         (
             "kind = \"kill\"\nat_s = 1\ndrone = 1\ntarget = \"all\"",
             "f.toml:10:10: fault.0.target: expected either this key or drone",

@@ -44,8 +44,8 @@ fn every_file_below_scenarios_is_valid_and_survives_json_and_toml() {
 }
 
 #[test]
-fn the_papers_files_are_the_searched_geometry() {
-    // id, spacing, safe distance, range, centre x, shift, half sizes, top reformation speed
+fn the_paper_scenarios_have_the_published_parameters() {
+    // Id, spacing, safe distance, detection range, centre x, shift, half sizes, greatest speed while re-forming.
     let table = [
         ("s1", 35.0, 33.0, 115.0, 167.0, 110.0, [10.0, 75.0], 20.0),
         ("s2", 65.0, 37.0, 90.0, 144.0, 115.0, [5.0, 80.0], 15.0),
@@ -68,7 +68,7 @@ fn the_papers_files_are_the_searched_geometry() {
     }
 }
 
-/// `SKEIN_WRITE_DOCS=1 cargo test -p skein-scenario` writes the page instead of comparing it.
+/// `SKEIN_WRITE_DOCS=1 cargo test -p skein-scenario` writes the page instead of comparing with it.
 #[test]
 fn the_key_reference_is_up_to_date() {
     let path = root().join("docs/scenario.md");
@@ -81,7 +81,7 @@ fn the_key_reference_is_up_to_date() {
 }
 
 #[test]
-fn every_key_is_explained() {
+fn every_key_has_a_meaning_a_range_and_a_default() {
     for key in skein_scenario::keys() {
         assert!(key.meaning.ends_with('.'), "{key:?}");
         assert!(!key.range.is_empty() && !key.default.is_empty(), "{key:?}");

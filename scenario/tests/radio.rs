@@ -1,17 +1,17 @@
-//! `[radio]`: presets, what overrides them, rules, and what is refused.
+//! `[radio]`: presets, keys that override them, rules, and what is rejected.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Burst, BurstScope, ChannelModel, Delay, DelayModel, Link, Radio, Range, SharedChannel};
 use skein_protocol::{DroneId, Vec2};
-use skein_scenario::{Preset, Scenario, ScenarioSource};
+use skein_scenario::{Preset, Scenario, ScenarioErrors, ScenarioSource};
 
 const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "r.toml", stem: "r" };
 
-fn try_parse(radio: &str, sets: &[(&str, &str)]) -> Result<Scenario, String> {
+fn try_parse(radio: &str, sets: &[(&str, &str)]) -> Result<Scenario, ScenarioErrors> {
     let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     let text = format!("seed = 7\n[formation]\n[radio]\n{radio}");
-    Scenario::parse(&text, SOURCE, &sets).map_err(|errors| errors.to_string())
+    Scenario::parse(&text, SOURCE, &sets)
 }
 
 fn parse(radio: &str, sets: &[(&str, &str)]) -> Scenario {
@@ -23,7 +23,7 @@ fn link(source: u32, destination: u32, topic: Topic) -> Link {
 }
 
 #[test]
-fn every_key_gets_to_the_radio() {
+fn every_key_reaches_the_radio_model() {
     let s = parse(
         "delay_s = 0.1\njitter_s = 0.02\ndelay_model = \"gamma\"\nloss = 0.1\nrange_m = 300\nshadowing_db = 4\n\
          path_loss_exponent = 2.5\nduplicate = 0.05\nasymmetry = 0.5\nrate_bps = 1e6\nqueue_limit_s = 0.5\n\
@@ -42,12 +42,12 @@ fn every_key_gets_to_the_radio() {
 }
 
 #[test]
-fn presets_are_filled_in_and_overridden_key_by_key() {
+fn a_preset_fills_in_the_keys_that_are_not_written() {
     assert_eq!(parse("preset = \"ideal\"", &[]).radio(), parse("", &[]).radio());
     for name in ["ideal", "wifi", "mesh-lossy", "lte", "jammed", "satellite"] {
         let s = parse(&format!("preset = \"{name}\""), &[]);
         let again = Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap();
-        assert_eq!(again, s, "what a preset has set is written out");
+        assert_eq!(again, s, "the keys of a preset are written out");
         let json = Scenario::from_json(&serde_json::to_value(&s).unwrap(), SOURCE).unwrap();
         assert_eq!(json, s);
     }
@@ -55,13 +55,13 @@ fn presets_are_filled_in_and_overridden_key_by_key() {
     assert_eq!((wifi.radio.preset, wifi.radio.loss, wifi.radio.jitter_s), (Some(Preset::Wifi), 0.5, 0.0));
     assert_eq!((wifi.radio.range_m, wifi.radio.delay_s), (Some(300.0), 0.005));
     let jammed = parse("preset = \"jammed\"\nburst.share = 0.9", &[]).radio.burst.unwrap();
-    assert_eq!((jammed.share, jammed.length_s, jammed.loss), (0.9, 1.0, 0.95), "a table is filled in, too");
+    assert_eq!((jammed.share, jammed.length_s, jammed.loss), (0.9, 1.0, 0.95), "a preset also fills in tables");
     let set = parse("", &[("radio.preset", "satellite"), ("radio.delay_s", "1")]);
     assert_eq!((set.radio.delay_s, set.radio.rate_bps), (1.0, Some(256e3)));
 }
 
 #[test]
-fn the_last_rule_about_a_frame_counts_and_keeps_the_rest() {
+fn the_last_matching_rule_counts_and_inherits_the_rest() {
     let s = parse(
         "loss = 0.1\ndelay_s = 0.2\nburst = { share = 0.5 }\n\
          [[radio.rule]]\ntopics = [\"pose\", \"assignment\"]\nloss = 0.5\nburst = { share = 0 }\n\
@@ -77,15 +77,15 @@ fn the_last_rule_about_a_frame_counts_and_keeps_the_rest() {
     assert_eq!(radio.rules[0].channel.burst.map(|burst| burst.share), Some(0.0));
     assert_eq!(radio.rules[1].channel.burst, radio.channel.burst);
     assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
-    // Heard at once, if at all, where no rule adds a delay: both rules are about this frame.
+    // Both rules match this frame. Its delivery is that of the last rule alone.
     let due = radio.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO);
     let last_rule = Radio { channel: radio.rules[1].channel, rules: Vec::new(), ..radio };
     assert_eq!(due, last_rule.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO));
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_place() {
-    let refused = [
+fn invalid_keys_are_rejected_with_their_place() {
+    let rejected = [
         ("preset = \"wfi\"", "r.toml:4:10: radio.preset: found \"wfi\", expected one of \"ideal\", \"wifi\""),
         ("jitter_s = 0.1", "r.toml:4:12: radio.jitter_s: found 0.1 s, expected 0 s with radio.delay_model = \"fixed\""),
         (
@@ -119,11 +119,11 @@ fn what_cannot_be_is_refused_with_its_place() {
         ),
         ("rule = { loss = 1 }", "radio.rule: found a table, expected an array"),
     ];
-    for (radio, wanted) in refused {
-        let message = try_parse(radio, &[]).unwrap_err();
+    for (radio, wanted) in rejected {
+        let message = try_parse(radio, &[]).unwrap_err().to_string();
         assert!(message.contains(wanted), "{radio:?}: no {wanted:?} in\n{message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
-    let message = try_parse("preset = \"wifi\"", &[("radio.delay_s", "0")]).unwrap_err();
+    let message = try_parse("preset = \"wifi\"", &[("radio.delay_s", "0")]).unwrap_err().to_string();
     assert!(message.starts_with("--set radio.delay_s=0: radio.delay_s: found 0 s"), "{message}");
 }

@@ -1,4 +1,4 @@
-//! What a valid scenario becomes.
+//! What follows from a valid scenario.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
 }
 
 #[test]
-fn the_least_scenario_has_the_papers_defaults() {
+fn the_shortest_scenario_has_the_defaults_of_the_paper() {
     let s = parse("[formation]", &[]);
     assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::LookAhead));
     assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
@@ -27,7 +27,7 @@ fn the_least_scenario_has_the_papers_defaults() {
 }
 
 #[test]
-fn overrides_are_toml_or_else_words() {
+fn overrides_are_toml_or_strings() {
     let text = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [200, 0]\nradius_m = 5";
     let sets = [
         ("strategy", "fixed:5/3"),
@@ -48,7 +48,7 @@ fn overrides_are_toml_or_else_words() {
 }
 
 #[test]
-fn jitter_is_uniform_in_its_disc_and_keyed_by_seed_and_drone() {
+fn jitter_is_uniform_in_its_disc_and_depends_on_seed_and_drone() {
     let with = |seed: &str| {
         parse("[formation]\nshape = \"line\"\ndrones = 4000\nspacing_m = 60\nstart_jitter_m = 10", &[("seed", seed)])
     };
@@ -56,7 +56,7 @@ fn jitter_is_uniform_in_its_disc_and_keyed_by_seed_and_drone() {
     let moved = |s: &Scenario| s.starts().iter().zip(s.slots()).map(|(a, b)| (a - b) / 10.0).collect::<Vec<_>>();
     let (a, b) = (moved(&one), moved(&two));
     assert_eq!(a, moved(&one));
-    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).norm() > 1e-9), "another seed is another draw");
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).norm() > 1e-9), "another seed gives another jitter");
     assert!(a.iter().all(|p| p.norm() <= 1.0 + 1e-9));
     // Uniform in the disc: a quarter within half the radius, ± five standard deviations; the mean at the centre.
     let inner = a.iter().filter(|p| p.norm() < 0.5).count() as f64;
@@ -66,7 +66,7 @@ fn jitter_is_uniform_in_its_disc_and_keyed_by_seed_and_drone() {
 }
 
 #[test]
-fn polygons_of_either_orientation_and_ellipses() {
+fn polygons_of_both_orientations_and_ellipses_become_convex_shapes() {
     let shape = |obstacle: &str| parse(&format!("[formation]\n[[obstacle]]\n{obstacle}"), &[]).shapes().unwrap()[0];
     let left = shape("shape = \"polygon\"\nvertices_m = [[100, 0], [110, 0], [110, 8]]");
     let right = shape("shape = \"polygon\"\nvertices_m = [[110, 8], [110, 0], [100, 0]]");
@@ -95,7 +95,7 @@ fn offsets_replace_the_shape() {
 }
 
 #[test]
-fn json_by_hand_is_checked_too() {
+fn json_is_checked_like_toml() {
     let mut json = serde_json::to_value(parse("[formation]", &[])).unwrap();
     json["formation"]["drones"] = 1_000_000_000.into();
     let error = Scenario::from_json(&json, SOURCE).unwrap_err().to_string();
@@ -103,7 +103,7 @@ fn json_by_hand_is_checked_too() {
 }
 
 #[test]
-fn ten_thousand_drones_are_checked_too() {
+fn ten_thousand_drones_are_checked() {
     for shape in ["nested-v", "v", "line", "column", "grid", "circle"] {
         let s = parse(
             &format!("[formation]\nshape = \"{shape}\"\ndrones = 10000\nstart_jitter_m = 1\nspacing_m = 40"),
@@ -114,7 +114,7 @@ fn ten_thousand_drones_are_checked_too() {
 }
 
 #[test]
-fn limits_get_into_the_schema() {
+fn ranges_are_in_the_schema() {
     let schema = schema();
     let at = |path: &str| schema.pointer(path).unwrap_or_else(|| panic!("no {path}"));
     assert_eq!(at("/properties/formation/properties/drones/maximum"), 10_000);
@@ -130,14 +130,14 @@ fn limits_get_into_the_schema() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]
-    fn any_bytes_are_refused_or_read_but_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
+    fn any_bytes_are_parsed_without_a_panic(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
         let mut text = b"[formation]\n".to_vec();
         text.extend(bytes);
         let _ = Scenario::parse_bytes(&text, SOURCE, &[]).map_err(|errors| errors.to_string());
     }
 
     #[test]
-    fn any_override_is_refused_or_taken_but_never_panics(key in "[a-z_.0-9]{0,20}", value in "[\\[\\]{}=a-z0-9.,\"\n ]{0,20}") {
+    fn any_override_is_parsed_without_a_panic(key in "[a-z_.0-9]{0,20}", value in "[\\[\\]{}=a-z0-9.,\"\n ]{0,20}") {
         let sets = [(key, value)];
         let file = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [200, 0]\nradius_m = 5";
         let _ = Scenario::parse(file, SOURCE, &sets).map_err(|errors| errors.to_string());

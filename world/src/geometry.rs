@@ -1,4 +1,4 @@
-//! Distance to an obstacle: the one module that speaks parry.
+//! Distance to an obstacle. No other module uses parry.
 
 use parry2d_f64::math::Vector;
 use parry2d_f64::query::PointQuery;
@@ -9,27 +9,25 @@ use skein_protocol::shape::ConvexShape;
 /// An obstacle's outline, prepared for distance queries.
 #[derive(Clone, Debug)]
 pub(crate) struct Outline {
-    /// Edges of the core polygon, counter-clockwise; a single one, without length, around a lone vertex.
+    /// Edges of the core polygon, counter-clockwise. A core of one vertex has a single edge of length 0.
     edges: Vec<Segment>,
     radius_m: f64,
-    /// Least corner of the box around it, m.
-    pub low: Vec2,
-    /// Greatest corner of the box around it, m.
-    pub high: Vec2,
+    low: Vec2,
+    high: Vec2,
 }
 
-/// The point of an obstacle's surface that is nearest to a query point.
+/// The point of an obstacle's surface nearest to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Nearest {
     /// World frame, m.
-    pub point: Vec2,
-    /// m; negative if the query point is inside.
-    pub distance_m: f64,
+    pub(crate) point: Vec2,
+    /// Distance to the surface, m; negative if the query point is inside.
+    pub(crate) distance_m: f64,
 }
 
 impl Outline {
-    /// Prepares a shape that has been checked.
-    pub fn new(shape: &ConvexShape) -> Self {
+    /// Prepares a shape that [`ConvexShape::check`] has accepted.
+    pub(crate) fn new(shape: &ConvexShape) -> Self {
         let corners: Vec<Vector> = shape.vertices().map(|v| Vector::new(v.x, v.y)).collect();
         let count = corners.len();
         let edges = if count > 2 { count } else { 1 };
@@ -42,13 +40,23 @@ impl Outline {
         }
     }
 
-    /// Square of the distance to the box around the outline, m²: never more than that to the outline itself.
-    pub fn box_distance_squared(&self, point: Vec2) -> f64 {
+    /// The corner of the bounding box with the least coordinates, m.
+    pub(crate) fn low(&self) -> Vec2 {
+        self.low
+    }
+
+    /// The corner of the bounding box with the greatest coordinates, m.
+    pub(crate) fn high(&self) -> Vec2 {
+        self.high
+    }
+
+    /// Square of the distance to the bounding box, m². The distance to the outline itself is never shorter.
+    pub(crate) fn box_distance_squared(&self, point: Vec2) -> f64 {
         (point - point.sup(&self.low).inf(&self.high)).norm_squared()
     }
 
     /// The nearest point of the surface, exact up to rounding.
-    pub fn nearest(&self, point: Vec2) -> Nearest {
+    pub(crate) fn nearest(&self, point: Vec2) -> Nearest {
         let query = Vector::new(point.x, point.y);
         let (mut best, mut inside) = ((f64::INFINITY, Vec2::zeros(), Vec2::zeros()), self.edges.len() > 2);
         for edge in &self.edges {
@@ -68,7 +76,8 @@ impl Outline {
     }
 }
 
-/// The outward direction at a point of the core itself: the edge's normal; towards the comers for a lone vertex.
+/// The outward direction at a point of the core itself: the normal of its edge. A core of one vertex has no normal, so it
+/// faces the drones that fly towards it (−x).
 fn face(normal: Vec2) -> Vec2 {
     normal.try_normalize(0.0).unwrap_or(Vec2::new(-1.0, 0.0))
 }
@@ -89,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rectangle_is_signed() {
+    fn the_distance_is_negative_inside_a_rectangle() {
         let shape = rectangle(0.0, 0.0, 10.0, 75.0);
         assert_eq!(nearest(&shape, -30.0, 5.0), Nearest { point: Vec2::new(-10.0, 5.0), distance_m: 20.0 });
         assert_eq!(nearest(&shape, 8.0, 5.0), Nearest { point: Vec2::new(10.0, 5.0), distance_m: -2.0 });
@@ -98,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_grows_the_shape_on_every_side() {
+    fn the_radius_grows_the_shape_on_every_side() {
         assert_eq!(nearest(&rounded_square(), 5.0, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: 2.0 });
         assert_eq!(nearest(&rounded_square(), 2.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -0.5 });
         assert_eq!(nearest(&rounded_square(), 1.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -1.5 });
@@ -106,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn discs_and_capsules_are_shapes_too() {
+    fn discs_and_capsules_have_distances() {
         let disc = ConvexShape::circle(Vec2::new(3.0, 4.0), 2.0).unwrap();
         assert_eq!(nearest(&disc, 0.0, 0.0).distance_m, 3.0);
         assert_eq!(nearest(&disc, 3.0, 4.0), Nearest { point: Vec2::new(1.0, 4.0), distance_m: -2.0 });
@@ -116,7 +125,7 @@ mod tests {
         assert_eq!(nearest(&capsule, 13.0, 4.0).distance_m, 4.0);
     }
 
-    /// Points of the surface, densely: along the edges moved outward, and around the corners.
+    /// Points of the surface at close intervals: along the edges, moved outward, and around the corners.
     fn surface(shape: &ConvexShape) -> Vec<Vec2> {
         let corners: Vec<Vec2> = shape.vertices().collect();
         let mut points = Vec::new();
@@ -141,7 +150,7 @@ mod tests {
             let shape = ConvexShape { radius_m: radius, ..core };
             let (point, outline) = (Vec2::new(x, y), Outline::new(&shape));
             let found = outline.nearest(point);
-            // Arcs also sample the inside of the rounded outline, which may only be farther from an outer point.
+            // The arcs also sample points inside the rounded outline. From a point outside, those can only be farther away.
             let sampled = surface(&shape).iter().map(|s| (s - point).norm()).fold(f64::INFINITY, f64::min);
             if found.distance_m > 0.0 {
                 prop_assert!((found.distance_m - sampled).abs() < 0.05, "{found:?}, sampled {sampled}");
@@ -152,7 +161,7 @@ mod tests {
         }
 
         #[test]
-        fn depth_is_that_of_the_nearest_face(u in -1f64..1.0, v in -1f64..1.0, turn in 0f64..3.0, radius in 0f64..5.0) {
+        fn the_depth_inside_is_that_of_the_nearest_face(u in -1f64..1.0, v in -1f64..1.0, turn in 0f64..3.0, radius in 0f64..5.0) {
             let (half, centre) = (Vec2::new(12.0, 5.0), Vec2::new(3.0, -2.0));
             let core = ConvexShape::rectangle(centre, half, turn).unwrap();
             let local = Vec2::new(u * half.x, v * half.y);

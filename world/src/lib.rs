@@ -1,34 +1,95 @@
-//! The truth of a mission: bodies, obstacles, what drones sense, energy, invariants and the end, one step at a time.
+//! The true state of a mission, advanced one tick at a time: bodies, obstacles, senses, energy, faults, invariants.
 //!
-//! Pure: no clock, thread, process or operating-system randomness. The same calls give the same bits.
-//! World frame: x along the flight, y to its left, metres.
+//! [`World`] holds what is true. A runtime asks it for the senses of all drones ([`World::downlink`]), gives it what the
+//! drones answer ([`World::take_slot`], [`World::take_frames`]), and lets it advance by one tick ([`World::advance`]).
+//! Each tick ends with a record ([`World::record`]) for the recorder and a digest ([`World::digest`]) that is equal
+//! whenever every bit of the mission is equal.
 //!
-//! | module | what |
-//! |---|---|
-//! | [`params`] | what a mission is made of |
-//! | [`world`] | one tick: senses down, answers up, advance, record |
-//! | `body`, `geometry`, `grid`, `senses` | kinematics; distances; who is near whom and what |
-//! | `process` | a drone's process, as far as the world sees it |
-//! | `invariants`, `stages`, `finish` | what must hold; obstacle sets on the way; when the mission is over |
-//! | [`faults`] | what a scenario makes go wrong: the plan, and what of it is due and in force |
-//! | `decisions`, `totals`, `log` | what leaders said, what was counted, both told as events |
+//! - [`WorldParams`] describes the mission: limits, distances, end condition, scheduled faults. [`WorldError`] says which
+//!   parameter is invalid.
+//! - [`faults`] describes what goes wrong, when, and for which drones. The world tells the runtime by
+//!   [`faults::ProcessCommand`] which processes to kill, stop, continue or start.
+//! - [`World`] composes machines with private state, one file each: the drone table, the sensor sweep, the fault engine,
+//!   the obstacle sets, the invariant monitor, the judge of the mission's end, the uplink, the counters, the digest.
+//!
+//! The crate is pure: no clock, thread, process or randomness of the operating system. The same calls give the same
+//! bits. It does not know what drones think, whether a radio delivers a frame, or what a process is.
+//!
+//! World frame: x along the flight, y to its left. SI units.
+//!
+//! # Example
+//!
+//! One drone accelerates along the flight for one tick.
+//!
+//! ```
+//! use skein_protocol::formation::Shape;
+//! use skein_protocol::nearby::Locality;
+//! use skein_protocol::slot::Slot;
+//! use skein_protocol::{DroneId, Vec2};
+//! use skein_world::faults::FaultPlan;
+//! use skein_world::{End, Failsafe, World, WorldParams};
+//!
+//! let params = WorldParams {
+//!     dt_ns: 20_000_000,
+//!     timeout_s: 60.0,
+//!     speed_max_mps: 20.0,
+//!     acceleration_max_mps2: 5.0,
+//!     safe_distance_m: 25.0,
+//!     clearance_m: 15.0,
+//!     planning_distance_m: 20.0,
+//!     detection_range_m: 90.0,
+//!     ranging_m: Some(50.0),
+//!     channel: None,
+//!     locality: Locality::default(),
+//!     failsafe: Failsafe::Hover,
+//!     end: End::Hold { stop_x_m: 1000.0 },
+//!     arrival_error_m: 0.8,
+//!     shape: Shape::NestedV,
+//!     spacing_m: 35.0,
+//!     faults: FaultPlan::default(),
+//! };
+//! let start = (Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0));
+//! let mut world = World::new(params, &[start], &[])?;
+//!
+//! assert!(world.process_commands().is_empty());
+//! assert_eq!(world.downlink().drones.len(), 1);
+//! world.take_slot(DroneId(0), &Slot { acceleration_mps2: [1.0, 0.0], ..Slot::default() });
+//! world.advance();
+//!
+//! let row = world.record().rows[0];
+//! assert_eq!(row.velocity_mps, [10.02, 0.0]);
+//! assert_eq!(world.tick(), 1);
+//! assert_eq!(world.ended(), None);
+//! # Ok::<(), skein_world::WorldError>(())
+//! ```
+#![warn(unreachable_pub)]
 
 mod body;
-mod decisions;
+mod counters;
+mod decision_log;
+mod drones;
+mod end_condition;
+mod event_log;
+mod fault_plan;
 pub mod faults;
-mod finish;
 mod geometry;
 mod grid;
 mod invariants;
-mod log;
-pub mod params;
+mod judge;
+mod neighbours;
+mod params;
 mod process;
-mod senses;
+mod sense_writer;
+mod sensor_fault;
 mod stages;
+mod sweep;
 #[cfg(test)]
 mod testing;
-mod totals;
-pub mod world;
+mod tick_digest;
+mod tick_record;
+mod tuning;
+mod uplink;
+mod world;
 
-pub use params::{End, Failsafe, WorldError, WorldParams};
+pub use params::{End, Failsafe, WorldError, WorldParams, landing_s};
 pub use world::World;

@@ -1,6 +1,7 @@
-//! What a mission is made of, beside its drones and obstacles. SI units, world frame.
+//! The parameters of a world. SI units, world frame.
 
-use crate::faults::FaultPlan;
+use crate::fault_plan::FaultPlan;
+use crate::tuning::{DESCENT_MPS, FLIGHT_ALTITUDE_M};
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
@@ -8,32 +9,32 @@ use skein_protocol::radio::SharedChannel;
 use skein_protocol::shape::ShapeError;
 use thiserror::Error;
 
-/// What a drone does whose process is gone.
+/// What a drone without a process does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failsafe {
     /// Brakes to a stop and stays there.
     Hover,
-    /// Brakes to a stop, descends, and is gone as a body once it is down.
+    /// Brakes to a stop and descends. Once it is down, it is no body any more.
     Land,
 }
 
-/// How long a landing drone stays a body once it stands still, s.
+/// How long a landing drone stays a body after it has stopped, s.
 #[must_use]
 pub fn landing_s() -> f64 {
-    crate::body::ALTITUDE_M / crate::body::DESCENT_MPS
+    FLIGHT_ALTITUDE_M / DESCENT_MPS
 }
 
 /// When the mission is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
-    /// The formation is closed, slow, past every obstacle, and its front slot beyond an abscissa.
+    /// The formation is closed and slow, every drone has been past every obstacle, and the front slot is far enough.
     Hold {
-        /// That abscissa, m.
+        /// The least abscissa of the front slot, m.
         stop_x_m: f64,
     },
     /// The living drones stand in fixed slots.
     Goal {
-        /// Where the front slot is, m.
+        /// The position of the front slot, m.
         front_m: Vec2,
     },
 }
@@ -45,62 +46,63 @@ pub struct WorldParams {
     pub dt_ns: i64,
     /// The mission ends after this time, s.
     pub timeout_s: f64,
-    /// No drone flies faster, m/s.
+    /// Greatest speed of a drone, m/s.
     pub speed_max_mps: f64,
-    /// No drone accelerates or brakes harder, m/s².
+    /// Greatest acceleration of a drone in any direction, m/s².
     pub acceleration_max_mps2: f64,
     /// Least distance of two bodies, m.
     pub safe_distance_m: f64,
     /// Least distance of a body to an obstacle, m.
     pub clearance_m: f64,
-    /// Distance that paths keep from obstacles, m. Obstacles closer than twice this in flight direction are one set.
+    /// Distance that planned paths keep from obstacles, m. Obstacles whose extents along the flight are closer than twice
+    /// this form one set.
     pub planning_distance_m: f64,
-    /// An obstacle with a point within this distance is sensed, m.
+    /// Greatest distance at which a drone senses the nearest point of an obstacle, m.
     pub detection_range_m: f64,
-    /// Neighbours within this distance are sensed, m; `None`: no ranging.
+    /// Greatest distance at which a drone senses a neighbour, m; `None`: drones sense no neighbours.
     pub ranging_m: Option<f64>,
-    /// The channel that all drones share; `None`: its bandwidth is no limit.
+    /// The channel that all drones share; `None`: bandwidth is no limit.
     pub channel: Option<SharedChannel>,
-    /// Which frames are heard in a neighbourhood alone: they are sorted for their receivers.
+    /// Which frames can only be received near by. The downlink indexes those by place.
     pub locality: Locality,
-    /// What a drone does whose process is gone.
+    /// What a drone without a process does.
     pub failsafe: Failsafe,
     /// When the mission is over.
     pub end: End,
     /// Largest slot error of a closed formation, m.
     pub arrival_error_m: f64,
-    /// The formation.
+    /// The shape of the formation.
     pub shape: Shape,
-    /// Its spacing, m.
+    /// The spacing of the formation, m.
     pub spacing_m: f64,
-    /// What is to go wrong.
+    /// The scheduled faults.
     pub faults: FaultPlan,
 }
 
-/// Why no world can be made.
+/// Why a world cannot be made.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WorldError {
     /// The length of a tick is not positive.
-    #[error("a tick lasts {0} ns, expected more than 0")]
+    #[error("dt_ns is {0}, expected more than 0")]
     Tick(i64),
     /// A parameter is negative or not a number.
     #[error("{name} is {value}, expected a number of at least 0")]
     Parameter {
-        /// Which.
+        /// Its name.
         name: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// The channel's bit rate is not positive.
-    #[error("the channel has {0} bit/s, expected more than 0")]
+    #[error("channel.rate_bps is {0}, expected more than 0")]
     Rate(f64),
-    /// A start is not finite.
-    #[error("drone {0} starts at a position or with a velocity that is not finite")]
+    /// The start position or velocity of this drone is not finite.
+    #[error("drone {0} starts at a position or with a velocity that is not finite, expected finite numbers")]
     Start(usize),
-    /// An obstacle is none.
+    /// An obstacle has an invalid shape.
     #[error("obstacle {index}: {error}")]
     Obstacle {
-        /// Which, from 0.
+        /// Its number, from 0.
         index: usize,
         /// What is wrong with it.
         error: ShapeError,
@@ -114,7 +116,7 @@ impl WorldParams {
         self.dt_ns as f64 * 1e-9
     }
 
-    /// Checks what a world relies on.
+    /// Checks all parameters.
     ///
     /// # Errors
     /// [`WorldError::Tick`], [`WorldError::Rate`], [`WorldError::Parameter`].
@@ -149,7 +151,7 @@ mod tests {
     use crate::testing::params;
 
     #[test]
-    fn bad_parameters_are_named() {
+    fn an_invalid_parameter_is_named() {
         assert_eq!(params().check(), Ok(()));
         assert_eq!(WorldParams { dt_ns: 0, ..params() }.check(), Err(WorldError::Tick(0)));
         let channel = Some(SharedChannel { seed: 1, rate_bps: 0.0, limit_s: 1.0 });

@@ -1,34 +1,26 @@
-//! A drone's process, as far as the world sees it: its answers.
+//! One drone's process as the world sees it: its last answer, its incarnation, whether it is frozen.
 
-use crate::body::Body;
-use crate::invariants::Obedience;
-use skein_protocol::flag;
-use skein_protocol::link_faults::LinkFaults;
-use skein_protocol::record::{DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED};
 use skein_protocol::slot::Slot;
 
 /// How a drone has answered in the current tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
-    Awaited,
-    Given,
+enum Answer {
+    Pending,
+    Received,
     Late,
-    /// It is frozen: no answer is awaited.
+    /// The process is frozen, so no answer is expected.
     Frozen,
 }
 
 /// One drone's process.
 #[derive(Clone, Debug)]
 pub(crate) struct Process {
-    /// Its last answer; without the tally while it is held.
-    pub slot: Slot,
-    pub answer: Answer,
-    /// Ticks without an answer, up to now.
-    pub late_ticks: u32,
-    pub incarnation: u32,
-    /// Whether it is stopped.
-    pub frozen: bool,
-    pub obedience: Obedience,
+    /// The last answer. While it is held over to later ticks, its counters are 0.
+    slot: Slot,
+    answer: Answer,
+    late_ticks: u32,
+    incarnation: u32,
+    frozen: bool,
     sequence: u32,
 }
 
@@ -36,63 +28,97 @@ impl Default for Process {
     fn default() -> Self {
         Self {
             slot: Slot::default(),
-            answer: Answer::Awaited,
+            answer: Answer::Pending,
             late_ticks: 0,
             incarnation: 1,
             frozen: false,
-            obedience: Obedience::default(),
             sequence: 0,
         }
     }
 }
 
 impl Process {
-    /// It answered.
-    pub fn answered(&mut self) {
-        self.answer = Answer::Given;
+    /// The last answer.
+    pub(crate) fn slot(&self) -> &Slot {
+        &self.slot
+    }
+
+    /// Number of ticks without an answer up to now; 0 after an answer.
+    pub(crate) fn late_ticks(&self) -> u32 {
+        self.late_ticks
+    }
+
+    /// Number of the process, from 1. Each restart adds 1.
+    pub(crate) fn incarnation(&self) -> u32 {
+        self.incarnation
+    }
+
+    /// Whether the process is stopped (SIGSTOP).
+    pub(crate) fn is_frozen(&self) -> bool {
+        self.frozen
+    }
+
+    /// Whether the process has missed the current tick.
+    pub(crate) fn is_late(&self) -> bool {
+        self.answer == Answer::Late
+    }
+
+    /// Whether the current tick still waits for an answer.
+    pub(crate) fn is_pending(&self) -> bool {
+        self.answer == Answer::Pending
+    }
+
+    /// Takes the answer to the current tick.
+    pub(crate) fn take(&mut self, slot: &Slot) {
+        self.slot = *slot;
+        self.answer = Answer::Received;
         self.late_ticks = 0;
     }
 
-    /// Its last command goes on; it heard nothing in this tick.
-    pub fn hold(&mut self, why: Answer) {
-        self.answer = why;
-        self.late_ticks = self.late_ticks.saturating_add(u32::from(why == Answer::Late));
-        self.slot =
-            Slot { heard: 0, duplicates: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
+    /// The process missed the current tick: its last command goes on, and it has heard nothing.
+    pub(crate) fn miss(&mut self) {
+        self.answer = Answer::Late;
+        self.late_ticks = self.late_ticks.saturating_add(1);
+        self.clear_counters();
     }
 
-    /// The number of the next frame, from 0; it goes on over restarts.
-    pub fn next_sequence(&mut self) -> u32 {
+    /// The frozen process heard nothing in the current tick.
+    pub(crate) fn skip(&mut self) {
+        self.answer = Answer::Frozen;
+        self.clear_counters();
+    }
+
+    /// A new tick begins.
+    pub(crate) fn open_tick(&mut self) {
+        self.answer = Answer::Pending;
+    }
+
+    /// Stops or continues the process. Returns whether it was stopped before.
+    pub(crate) fn set_frozen(&mut self, frozen: bool) -> bool {
+        std::mem::replace(&mut self.frozen, frozen)
+    }
+
+    /// Notes the incarnation. Returns whether it is another one than before.
+    pub(crate) fn set_incarnation(&mut self, incarnation: u32) -> bool {
+        std::mem::replace(&mut self.incarnation, incarnation) != incarnation
+    }
+
+    /// A new process begins with an empty answer. Returns its incarnation.
+    pub(crate) fn restart(&mut self) -> u32 {
+        self.incarnation += 1;
+        self.slot = Slot::default();
+        self.incarnation
+    }
+
+    /// The sequence number of the next frame, from 0. It continues over restarts.
+    pub(crate) fn next_sequence(&mut self) -> u32 {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         sequence
     }
 
-    /// The drone at the end of a tick. Of a dead one's answers only what it obeyed is left.
-    pub fn row(&self, body: &Body, link_faults: LinkFaults) -> DroneRow {
-        let (slot, alive) = (&self.slot, u32::from(body.alive));
-        let flags = flag(slot.leads(), ROW_LEADS)
-            | flag(slot.is_queued(), ROW_QUEUED)
-            | flag(self.answer == Answer::Late, ROW_LATE)
-            | flag(self.frozen, ROW_FROZEN)
-            | ROW_ALIVE;
-        DroneRow {
-            position_m: body.position.into(),
-            velocity_mps: body.velocity.into(),
-            energy_j: body.energy_j,
-            obeyed: slot.obeyed,
-            term: slot.term,
-            group: slot.group,
-            led: slot.led,
-            flags: alive * flags,
-            phase: slot.phase,
-            heard: alive * slot.heard,
-            dropped: slot.dropped.map(|count| alive * count),
-            link_faults,
-            step_ns: alive * slot.step_ns,
-            route: slot.route,
-            rank: slot.rank,
-            reserved: Default::default(),
-        }
+    fn clear_counters(&mut self) {
+        self.slot =
+            Slot { heard: 0, duplicates: 0, dropped: Default::default(), heard_hash: 0, step_ns: 0, ..self.slot };
     }
 }

@@ -1,47 +1,46 @@
-//! Obstacle sets on the way, by the world's truth: when each is first sensed and when all are past it.
+//! Obstacle sets on the way, by the true state: when a drone first senses each set, and when all drones are past it.
 
 use crate::body::Body;
+use crate::event_log::EventLog;
 use crate::geometry::Outline;
-use crate::log::Log;
-use crate::senses::Contact;
+use crate::sweep::Contact;
 use skein_protocol::record::EventKind;
 use skein_protocol::{DroneId, ObstacleId, SimTime};
 
-/// Obstacles that overlap in flight direction, or nearly.
+/// One set: obstacles whose extents along the flight overlap or nearly overlap.
 #[derive(Clone, Debug)]
 struct Stage {
-    /// Mean abscissa of the centres of the obstacles' boxes, m.
+    /// Mean abscissa of the centres of the obstacles' bounding boxes, m.
     centre_x_m: f64,
     detected: bool,
     passed: bool,
 }
 
-/// The sets, in flight order.
+/// All sets, in flight order.
 #[derive(Clone, Debug)]
 pub(crate) struct Stages {
     stages: Vec<Stage>,
-    /// The set of each obstacle.
+    /// The number of the set of each obstacle.
     set_of: Vec<usize>,
-    /// Abscissa behind which every obstacle lies, m.
-    pub rear_x_m: f64,
+    rear_x_m: f64,
 }
 
 impl Stages {
-    /// Obstacles whose extents along x are closer than `gap_m` are one set.
-    pub fn new(outlines: &[Outline], gap_m: f64) -> Self {
+    /// Puts obstacles whose extents along x are closer than `gap_m` into one set.
+    pub(crate) fn new(outlines: &[Outline], gap_m: f64) -> Self {
         let mut order: Vec<usize> = (0..outlines.len()).collect();
-        order.sort_by(|&a, &b| outlines[a].low.x.total_cmp(&outlines[b].low.x));
+        order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
         let mut made = Self { stages: Vec::new(), set_of: vec![0; outlines.len()], rear_x_m: f64::NEG_INFINITY };
         let mut centres: Vec<f64> = Vec::new();
         for obstacle in order {
             let outline = &outlines[obstacle];
-            if !centres.is_empty() && outline.low.x - made.rear_x_m >= gap_m {
+            if !centres.is_empty() && outline.low().x - made.rear_x_m >= gap_m {
                 made.close(&centres);
                 centres.clear();
             }
             made.set_of[obstacle] = made.stages.len();
-            made.rear_x_m = made.rear_x_m.max(outline.high.x);
-            centres.push((outline.low.x + outline.high.x) / 2.0);
+            made.rear_x_m = made.rear_x_m.max(outline.high().x);
+            centres.push((outline.low().x + outline.high().x) / 2.0);
         }
         if !centres.is_empty() {
             made.close(&centres);
@@ -54,33 +53,38 @@ impl Stages {
         self.stages.push(Stage { centre_x_m, detected: false, passed: false });
     }
 
+    /// The greatest abscissa of any obstacle, m; −∞ without obstacles.
+    pub(crate) fn rear_x_m(&self) -> f64 {
+        self.rear_x_m
+    }
+
     /// Number of sets.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.stages.len()
     }
 
-    /// Mean abscissa of the centres of a set's boxes, m.
-    pub fn centre_x_m(&self, number: usize) -> f64 {
+    /// Mean abscissa of the centres of the bounding boxes in a set, m.
+    pub(crate) fn centre_x_m(&self, number: usize) -> f64 {
         self.stages[number].centre_x_m
     }
 
     /// Whether a living drone has sensed the set.
-    pub fn is_detected(&self, number: usize) -> bool {
+    pub(crate) fn is_detected(&self, number: usize) -> bool {
         self.stages[number].detected
     }
 
-    /// Whether the last living drone has passed the set.
-    pub fn is_passed(&self, number: usize) -> bool {
+    /// Whether all living drones have passed the set.
+    pub(crate) fn is_passed(&self, number: usize) -> bool {
         self.stages[number].passed
     }
 
     /// Whether all sets are passed.
-    pub fn all_passed(&self) -> bool {
+    pub(crate) fn all_passed(&self) -> bool {
         self.stages.iter().all(|stage| stage.passed)
     }
 
-    /// Tells the sets that are sensed for the first time, at the time the tick opens.
-    pub fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut Log) {
+    /// Logs the sets that are sensed for the first time, at the time when the tick opens.
+    pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
             let number = self.set_of[contact.obstacle as usize];
             if !std::mem::replace(&mut self.stages[number].detected, true) {
@@ -95,9 +99,9 @@ impl Stages {
         }
     }
 
-    /// Tells the sets that the last living drone has passed, at the time the tick ends.
-    pub fn pass(&mut self, bodies: &[Body], end: SimTime, log: &mut Log) {
-        let living = bodies.iter().filter(|body| body.alive).map(|body| body.position.x);
+    /// Logs the sets that the last living drone has passed, at the time when the tick ends.
+    pub(crate) fn pass(&mut self, bodies: &[Body], end: SimTime, log: &mut EventLog) {
+        let living = bodies.iter().filter(|body| body.is_alive()).map(|body| body.position().x);
         let Some(last) = living.reduce(f64::min) else { return };
         for (number, stage) in self.stages.iter_mut().enumerate() {
             if !stage.passed && last >= stage.centre_x_m {
@@ -111,9 +115,9 @@ impl Stages {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::event_log::tests::read;
     use crate::geometry::Nearest;
-    use crate::log::tests::read;
-    use crate::testing::{bodies, happenings, rectangle};
+    use crate::testing::{bodies, event_kinds, rectangle};
     use skein_protocol::Vec2;
 
     /// The forest of the paper, its second set listed first.
@@ -131,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_are_in_flight_order() {
+    fn sets_are_numbered_in_flight_order() {
         assert_eq!((forest().set_of, forest().rear_x_m), (vec![1, 1, 0], 650.0));
         assert_eq!(forest().stages.iter().map(|s| s.centre_x_m).collect::<Vec<_>>(), [320.0, 640.0]);
     }
@@ -150,8 +154,8 @@ mod tests {
     }
 
     #[test]
-    fn detection_is_told_once_a_set() {
-        let (mut stages, mut log) = (forest(), Log::default());
+    fn detection_is_logged_once_per_set() {
+        let (mut stages, mut log) = (forest(), EventLog::default());
         stages.detect(&[contact(3, 0), contact(4, 1)], SimTime(5), &mut log);
         stages.detect(&[contact(0, 1), contact(0, 2)], SimTime(6), &mut log);
         let detected = |stage, drone, obstacle| EventKind::Detected {
@@ -160,28 +164,28 @@ mod tests {
             obstacle: ObstacleId(obstacle),
             distance_m: 60.0,
         };
-        assert_eq!(happenings(read(&mut log)), [detected(1, 3, 0), detected(0, 0, 2)]);
+        assert_eq!(event_kinds(read(&mut log)), [detected(1, 3, 0), detected(0, 0, 2)]);
     }
 
     #[test]
     fn a_set_is_passed_when_the_last_living_drone_is_past_its_centre() {
-        let (mut stages, mut log) = (forest(), Log::default());
+        let (mut stages, mut log) = (forest(), EventLog::default());
         let mut all = bodies(&[[400.0, 0.0], [319.9, 0.0]]);
         stages.pass(&all, SimTime(1), &mut log);
         assert_eq!(read(&mut log), []);
-        all[1].alive = false;
+        all[1].kill();
         stages.pass(&all, SimTime(2), &mut log);
         stages.pass(&all, SimTime(3), &mut log);
-        assert_eq!(happenings(read(&mut log)), [EventKind::Passed { stage: 0 }]);
+        assert_eq!(event_kinds(read(&mut log)), [EventKind::Passed { stage: 0 }]);
         assert!(!stages.all_passed());
-        all[0].alive = false;
-        all[0].position.x = 700.0;
+        all[0] = Body::new(Vec2::new(700.0, 0.0), Vec2::zeros());
+        all[0].kill();
         stages.pass(&all, SimTime(4), &mut log);
-        assert_eq!(read(&mut log), [], "with nobody alive nothing is passed");
+        assert_eq!(read(&mut log), [], "without living drones no set is passed");
     }
 
     #[test]
-    fn without_obstacles_nothing_is_in_the_way() {
+    fn without_obstacles_all_sets_are_passed() {
         let stages = Stages::new(&[], 40.0);
         assert!(stages.all_passed());
         assert_eq!(stages.rear_x_m, f64::NEG_INFINITY);

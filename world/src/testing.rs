@@ -1,7 +1,7 @@
-//! Fixtures of this crate's tests.
+//! Fixtures for this crate's tests.
 
 use crate::body::Body;
-use crate::faults::FaultPlan;
+use crate::fault_plan::FaultPlan;
 use crate::params::{End, Failsafe, WorldParams};
 use crate::world::World;
 use skein_protocol::formation::Shape;
@@ -11,7 +11,7 @@ use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, Vec2};
 
-/// The paper's first scene: spacing 35 m, safe distance 33 m, 20 ms a tick.
+/// The paper's first scene: spacing 35 m, safe distance 33 m, ticks of 20 ms.
 pub(crate) fn params() -> WorldParams {
     WorldParams {
         dt_ns: 20_000_000,
@@ -47,10 +47,12 @@ pub(crate) fn bodies(positions: &[[f64; 2]]) -> Vec<Body> {
     positions.iter().map(|&p| Body::new(Vec2::from(p), Vec2::zeros())).collect()
 }
 
-/// Lets every drone answer `slot` and advances one tick; the events told in it.
+/// Lets every drone answer `slot` and advances one tick. Gives its events.
 pub(crate) fn tick(world: &mut World, slot: &Slot) -> Vec<RunEvent> {
     let drones = world.downlink().drones.len() as u32;
-    (0..drones).for_each(|id| world.take_slot(DroneId(id), slot));
+    for id in 0..drones {
+        world.take_slot(DroneId(id), slot);
+    }
     world.advance();
     events(world)
 }
@@ -60,8 +62,8 @@ pub(crate) fn events(world: &World) -> Vec<RunEvent> {
     world.record().parse_events(|line| serde_json::from_slice(line)).unwrap()
 }
 
-/// The events themselves, without their times.
-pub(crate) fn happenings(events: Vec<RunEvent>) -> Vec<EventKind> {
+/// The events without their times.
+pub(crate) fn event_kinds(events: Vec<RunEvent>) -> Vec<EventKind> {
     events.into_iter().map(|event| event.what).collect()
 }
 

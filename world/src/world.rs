@@ -1,112 +1,97 @@
-//! One mission, a tick at a time.
-//!
-//! In each tick: [`World::process_commands`], and what they say done to processes; [`World::downlink`]; then for each living drone [`World::take_slot`] and [`World::take_frames`], or
-//! [`World::hold`], or [`World::mark_dead`]; then [`World::advance`] and [`World::record`]. When [`World::ended`] says
-//! so: [`World::finish`] and, once more, [`World::record`].
+//! One mission, one tick at a time. [`World`] composes the machines of this crate and has no rules of its own.
 
-use crate::body::Body;
-use crate::decisions::Decisions;
-use crate::faults::ProcessCommand;
-use crate::faults::engine::Engine;
-use crate::finish::Finish;
+use crate::counters::MissionCounters;
+use crate::decision_log::DecisionLog;
+use crate::drones::DroneTable;
+use crate::event_log::EventLog;
+use crate::fault_plan::ProcessCommand;
+use crate::faults::engine::FaultEngine;
 use crate::geometry::Outline;
-use crate::invariants::Distances;
-use crate::log::Log;
+use crate::invariants::InvariantMonitor;
+use crate::judge::{MissionJudge, MissionState};
 use crate::params::{WorldError, WorldParams};
-use crate::process::{Answer, Process};
-use crate::senses::{Reach, SenseWriter, Surroundings};
+use crate::sense_writer::SenseWriter;
 use crate::stages::Stages;
-use crate::totals;
-use skein_protocol::digest::Digest;
+use crate::sweep::{SensorSweep, SweepRange};
+use crate::tick_digest::TickDigest;
+use crate::tick_record::{EndedTick, TickRecord};
+use crate::uplink::Uplink;
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
 use skein_protocol::nearby::Locality;
-use skein_protocol::radio::{ChannelQueue, DropReason};
-use skein_protocol::record::{DroneRow, EventKind, FaultKind, Outcome, Percentiles, RecordHeader, RecordView, Totals};
+use skein_protocol::record::{EventKind, FaultKind, Outcome, Percentiles, RecordView};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
 
-/// The first so many drop counters are in every digest. Duplicates and later reasons are in it only where they count, so
-/// that a mission without them keeps the digest it had before there were any.
-const ALWAYS_FOLDED: usize = DropReason::Queue as usize;
-
-/// The truth of one mission.
+/// The true state of one mission.
+///
+/// In each tick, call in this order:
+/// 1. [`World::process_commands`], and do to the processes what it says;
+/// 2. [`World::downlink`], which every living drone reads;
+/// 3. for each living drone [`World::take_slot`] and [`World::take_frames`], or [`World::hold`], or
+///    [`World::mark_dead`];
+/// 4. [`World::advance`], then [`World::record`].
+///
+/// When [`World::ended`] gives an outcome, call [`World::finish`] and [`World::record`] once more. Calls about a drone
+/// that does not exist have no effect.
 #[derive(Clone)]
 pub struct World {
     params: WorldParams,
     tick: Tick,
-    bodies: Vec<Body>,
-    processes: Vec<Process>,
-    outlines: Vec<Outline>,
-    around: Surroundings,
-    teller: SenseWriter,
-    distances: Distances,
-    stages: Stages,
-    decisions: Decisions,
-    faults: Engine,
-    /// What the tick's faults do to processes.
-    commands: Vec<ProcessCommand>,
     /// Whether the current tick is open.
     open: bool,
-    finish: Finish,
-    log: Log,
-    totals: Totals,
-    digest: Digest,
-    /// What the digest takes in of one tick.
-    folded: Vec<u8>,
-    /// Frames sent in this tick.
-    sent: Vec<AirFrame>,
-    /// What they wait in for the channel.
-    queue: Option<ChannelQueue>,
-    down: Downlink,
-    head: RecordHeader,
-    rows: Vec<DroneRow>,
-    end: Option<(Outcome, String)>,
+    drones: DroneTable,
+    sweep: SensorSweep,
+    faults: FaultEngine,
+    stages: Stages,
+    monitor: InvariantMonitor,
+    decisions: DecisionLog,
+    judge: MissionJudge,
+    uplink: Uplink,
+    sense_writer: SenseWriter,
+    downlink: Downlink,
+    counters: MissionCounters,
+    digest: TickDigest,
+    log: EventLog,
+    record: TickRecord,
 }
 
 impl World {
-    /// A world at the start of its mission. `starts`: each drone's position (m) and velocity (m/s), by id. Obstacles
-    /// are numbered in their order here.
+    /// A world at the start of its mission. `starts` holds each drone's position (m) and velocity (m/s) in the world
+    /// frame, by id. Obstacles are numbered by their order in `obstacles`.
     ///
     /// # Errors
-    /// [`WorldError`] names the parameter, start or obstacle that cannot be.
+    /// [`WorldError`] names the parameter, start or obstacle that is invalid.
     pub fn new(params: WorldParams, starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<Self, WorldError> {
         params.check()?;
         check_bodies(starts, obstacles)?;
         let outlines: Vec<Outline> = obstacles.iter().map(Outline::new).collect();
-        let bodies: Vec<Body> = starts.iter().map(|&(position, velocity)| Body::new(position, velocity)).collect();
+        let drones = DroneTable::new(starts);
         let mut world = Self {
             tick: 0,
-            processes: vec![Process::default(); bodies.len()],
-            around: Surroundings::default(),
-            teller: SenseWriter::new(obstacles),
-            distances: Distances::new(&bodies, params.safe_distance_m, params.clearance_m),
-            stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
-            decisions: Decisions::new(bodies.len()),
-            faults: Engine::new(params.faults.clone(), bodies.len()),
-            commands: Vec::new(),
             open: false,
-            finish: Finish::default(),
-            log: Log::default(),
-            totals: Totals::default(),
-            digest: Digest::default(),
-            folded: Vec::new(),
-            sent: Vec::new(),
-            queue: params.channel.map(ChannelQueue::new),
-            down: Downlink::default(),
-            head: RecordHeader::default(),
-            rows: Vec::new(),
-            end: None,
+            faults: FaultEngine::new(params.faults.clone(), starts.len()),
+            stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
+            monitor: InvariantMonitor::new(drones.bodies(), params.safe_distance_m, params.clearance_m),
+            sweep: SensorSweep::new(outlines),
+            decisions: DecisionLog::new(starts.len()),
+            judge: MissionJudge::default(),
+            uplink: Uplink::new(params.channel),
+            sense_writer: SenseWriter::new(obstacles),
+            downlink: Downlink::default(),
+            counters: MissionCounters::default(),
+            digest: TickDigest::default(),
+            log: EventLog::default(),
+            record: TickRecord::default(),
             params,
-            bodies,
-            outlines,
+            drones,
         };
-        world.survey();
+        world.sweep();
         Ok(world)
     }
 
-    /// The current tick: the one that [`World::downlink`] opens and [`World::advance`] ends.
+    /// The number of the current tick, from 0: the tick that [`World::downlink`] opens and [`World::advance`] ends.
     #[must_use]
     pub fn tick(&self) -> Tick {
         self.tick
@@ -118,71 +103,75 @@ impl World {
         self.time_of(self.tick)
     }
 
-    /// Everybody's senses in the current tick, and the frames sent in the tick before.
+    /// What the faults of the current tick do to the drones' processes. Do it in this order, before the tick's downlink
+    /// goes out. The world counts it as done.
+    pub fn process_commands(&mut self) -> &[ProcessCommand] {
+        self.open();
+        self.faults.commands()
+    }
+
+    /// The senses of all drones in the current tick, and the frames that were sent in the tick before.
     pub fn downlink(&mut self) -> &Downlink {
         self.open();
-        let (tick, faults) = (self.tick, &self.faults);
-        let told = |(process, id): (&Process, u32)| (process.incarnation, faults.sensor_fault(DroneId(id), tick));
-        let drones = self.processes.iter().zip(0..).map(told);
-        self.teller.tell(&self.bodies, drones, &self.around, self.params.ranging_m, &mut self.down);
-        // In a queue for the channel frames lose their order, by which a drone counts its own.
-        let locality = if self.queue.is_none() { self.params.locality } else { Locality::default() };
-        self.down.index.build(locality, &self.down.frames);
-        self.down.seal(tick, self.now());
-        &self.down
+        let (tick, faults) = (self.tick, self.faults.schedule());
+        let processes = self.drones.processes().iter().zip(0..);
+        let drones = processes.map(|(process, id)| (process.incarnation(), faults.sensor_fault(DroneId(id), tick)));
+        self.sense_writer.write(self.drones.bodies(), drones, &self.sweep, self.params.ranging_m, &mut self.downlink);
+        // A drone counts its own frames by their order. Without that order there is no index by place.
+        let locality = if self.uplink.keeps_order() { self.params.locality } else { Locality::default() };
+        self.downlink.index.build(locality, &self.downlink.frames);
+        self.downlink.seal(tick, self.now());
+        &self.downlink
     }
 
-    /// Takes a drone's answer to the current tick. Unknown and dead drones are ignored, here and below.
+    /// Takes a drone's answer to the current tick. Answers of dead and frozen drones are ignored.
     pub fn take_slot(&mut self, id: DroneId, slot: &Slot) {
-        if let Some(process) = self.living(id) {
-            process.slot = *slot;
-            process.answered();
-        }
+        self.drones.take_slot(id, slot);
     }
 
-    /// Takes the frames that a drone sent in the current tick, in the order in which it sent them.
+    /// Takes the frames that a drone sent in the current tick, in the order in which it sent them. Frames of dead drones
+    /// are ignored.
     pub fn take_frames(&mut self, id: DroneId, frames: &[Frame]) {
-        let Some(body) = self.bodies.get(id.index()).filter(|body| body.alive) else { return };
-        let (tick, position_m, process) = (self.tick, body.position.into(), &mut self.processes[id.index()]);
-        let cuts = self.faults.standing(id).cuts;
-        let stamp = |&frame| AirFrame {
-            tick,
-            source: id,
-            sequence: process.next_sequence(),
-            position_m,
-            queue_ns: 0,
-            link_faults: cuts,
-            frame,
-        };
-        self.sent.extend(frames.iter().map(stamp));
-        self.totals.sent += frames.len() as u64;
+        if !self.drones.is_alive(id) {
+            return;
+        }
+        let link_faults = self.faults.schedule().standing(id).link_faults;
+        for &frame in frames {
+            let Some((sequence, position)) = self.drones.next_frame(id) else { return };
+            let position_m = position.into();
+            self.uplink.push(AirFrame {
+                tick: self.tick,
+                source: id,
+                sequence,
+                position_m,
+                queue_ns: 0,
+                link_faults,
+                frame,
+            });
+        }
+        self.counters.count_sent(frames.len() as u64);
     }
 
-    /// A drone did not answer in time (wall clock only): its last command holds for a while, then it brakes; the miss is
-    /// counted.
+    /// A drone did not answer in time, which happens by the wall clock only. Its last command holds for a while, then it
+    /// brakes. The missed deadline is counted once per tick.
     pub fn hold(&mut self, id: DroneId) {
-        if let Some(process) = self.living(id).filter(|process| process.answer != Answer::Late) {
-            process.hold(Answer::Late);
-            self.totals.deadline_misses += 1;
+        self.counters.count_missed(u64::from(self.drones.miss(id)));
+    }
+
+    /// A drone's process is gone: its body follows the failsafe from the current tick on. `detail` describes what is
+    /// known for people, such as the signal or the exit code.
+    pub fn mark_dead(&mut self, id: DroneId, kind: FaultKind, scheduled: bool, detail: &str) {
+        if self.drones.kill(id) {
+            self.decisions.forget(id);
+            self.log.push(self.now(), EventKind::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
         }
     }
 
-    /// A drone's process is gone in the current tick: its body follows the failsafe from this tick on. `detail` says
-    /// for people what is known: the signal, the exit code.
-    pub fn mark_dead(&mut self, id: DroneId, kind: FaultKind, scheduled: bool, detail: &str) {
-        let now = self.now();
-        let Some(body) = self.bodies.get_mut(id.index()).filter(|body| body.alive) else { return };
-        body.alive = false;
-        self.processes[id.index()].frozen = false;
-        self.decisions.forget(id);
-        self.log.push(now, EventKind::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
-    }
-
-    /// The incarnation of a drone's process, from 1, as its senses tell it. A new one may begin with an older plan.
+    /// Sets the incarnation of a drone's process, from 1, as its senses give it. A new incarnation may obey an older
+    /// plan than the one before it.
     pub fn set_incarnation(&mut self, id: DroneId, incarnation: u32) {
-        if let Some(process) = self.processes.get_mut(id.index()).filter(|process| process.incarnation != incarnation) {
-            process.incarnation = incarnation;
-            process.obedience.restart();
+        if self.drones.set_incarnation(id, incarnation) {
+            self.monitor.restart(id);
             self.decisions.forget(id);
         }
     }
@@ -190,172 +179,192 @@ impl World {
     /// The incarnation of a drone's process; `None` if there is no such drone.
     #[must_use]
     pub fn incarnation(&self, id: DroneId) -> Option<u32> {
-        self.processes.get(id.index()).map(|process| process.incarnation)
+        self.drones.process(id).map(crate::process::Process::incarnation)
     }
 
-    /// Ends the tick: commands, bodies, energy, invariants, stages, end condition, digest, record. A living drone
-    /// that has not answered is held. The calls before may come in any order of drones: it makes no difference.
+    /// Ends the tick: commands, bodies, energy, invariants, obstacle sets, end condition, digest, record. A living drone
+    /// that has not answered is held. The order in which drones answered makes no difference.
     pub fn advance(&mut self) {
-        self.sent.sort_unstable_by_key(|sent| (sent.source, sent.sequence));
         let (opening, end) = (self.now(), self.time_of(self.tick + 1));
-        if let Some(queue) = &mut self.queue {
-            queue.schedule(opening, &mut self.sent);
-        }
-        self.follow_processes(opening);
-        self.move_bodies();
-        self.survey();
-        self.distances.check(&self.bodies, &self.around, end, &mut self.log);
-        self.stages.pass(&self.bodies, end, &mut self.log);
+        self.uplink.close(opening);
+        self.follow_answers(opening);
+        self.move_bodies(opening);
+        self.sweep();
+        self.monitor.check_distances(self.drones.bodies(), &self.sweep, end, &mut self.log);
+        self.stages.pass(self.drones.bodies(), end, &mut self.log);
         self.judge(end);
-        self.fold();
+        self.digest.fold(self.tick, &self.drones, self.uplink.frames());
         self.close_tick(end);
     }
 
-    /// The record of the tick that ended last; after [`World::finish`], that of the mission's end.
+    /// The record of the tick that ended last; after [`World::finish`], the record of the mission's end.
     #[must_use]
     pub fn record(&self) -> RecordView<'_> {
-        let frames = if self.head.frames == 0 { &[] } else { &self.down.frames[..] };
-        RecordView { head: &self.head, rows: &self.rows, frames, events: self.log.told() }
+        self.record.view(&self.downlink.frames, self.log.ended())
     }
 
-    /// How the mission ended, once it has.
+    /// How the mission ended; `None` while it goes on.
     #[must_use]
     pub fn ended(&self) -> Option<Outcome> {
-        self.end.as_ref().map(|(outcome, _)| *outcome)
+        self.judge.outcome()
     }
 
-    /// Ends the mission from outside, for this reason, unless it has ended.
+    /// Ends the mission from outside for this reason, unless it has ended.
     pub fn abort(&mut self, reason: &str) {
-        self.end.get_or_insert_with(|| (Outcome::Aborted, reason.to_owned()));
+        self.judge.abort(reason);
     }
 
-    /// Makes the last record: the end event with the mission's totals, without rows and frames, under the tick, time
-    /// and digest of the last tick that ended. `stats` are all drones' link counters, merged; `wall_s` the wall time
-    /// from the first tick opened to the last tick done, s. A mission that has not ended is aborted.
+    /// Makes the last record: the end event with the mission's totals, without rows and frames, under the tick, time and
+    /// digest of the tick that ended last. `stats` are the merged link counters of all drones. `wall_s` is the wall time
+    /// from the opening of the first tick to the end of the last one, s. A mission that has not ended is aborted.
     pub fn finish(&mut self, stats: &LinkStats, wall_s: f64) {
-        self.abort("the mission was stopped");
-        let Some((outcome, reason)) = self.end.clone() else { return };
-        let totals = Box::new(totals::close(&self.totals, stats, self.params.dt_s(), wall_s));
+        let (outcome, reason) = self.judge.abort("the mission was stopped");
+        let totals = Box::new(self.counters.close(stats, self.params.dt_s(), wall_s));
         self.log.push(self.now(), EventKind::End { outcome, reason, totals });
-        self.log.turn();
-        self.rows.clear();
-        let events_len = self.log.told().len() as u32;
-        self.head = RecordHeader { rows: 0, frames: 0, events_len, digest: self.digest(), ..self.head };
+        self.log.end_tick();
+        self.record.close_mission(self.digest(), self.log.ended().len());
     }
 
-    /// How late ticks opened by the wall clock: for [`World::finish`].
+    /// Notes how late ticks opened by the wall clock, s. [`World::finish`] reports it.
     pub fn note_lateness(&mut self, lateness_s: Percentiles) {
-        self.totals.lateness_s = lateness_s;
+        self.counters.set_lateness(lateness_s);
     }
 
-    /// The digest so far, over every drone's state and what it heard in every tick.
+    /// The digest so far, over every drone's state and what it received in every tick.
     #[must_use]
     pub fn digest(&self) -> u64 {
         self.digest.value()
     }
 
-    /// Whether a drone's process lives; not if there is no such drone.
+    /// Whether a drone's process lives; false if there is no such drone.
     #[must_use]
     pub fn is_alive(&self, id: DroneId) -> bool {
-        self.bodies.get(id.index()).is_some_and(|body| body.alive)
+        self.drones.is_alive(id)
+    }
+
+    /// Whether a drone's process is stopped; false if there is no such drone.
+    #[must_use]
+    pub fn is_frozen(&self, id: DroneId) -> bool {
+        self.drones.process(id).is_some_and(crate::process::Process::is_frozen)
     }
 
     /// Least distance of two bodies so far, m; infinite if there were never two.
     #[must_use]
     pub fn min_separation_m(&self) -> f64 {
-        self.distances.min_separation_m()
+        self.monitor.min_separation_m()
     }
 
     /// Least distance of a body to an obstacle at the end of a tick so far, m; infinite without obstacles.
     #[must_use]
     pub fn min_clearance_m(&self) -> f64 {
-        self.distances.min_clearance_m
+        self.monitor.min_clearance_m()
     }
 
     /// Violations of invariants so far.
     #[must_use]
     pub fn violations(&self) -> u64 {
-        self.distances.violations
+        self.monitor.violations()
     }
 
     fn time_of(&self, tick: Tick) -> SimTime {
         SimTime((tick as i64).saturating_mul(self.params.dt_ns))
     }
 
-    fn living(&mut self, id: DroneId) -> Option<&mut Process> {
-        self.is_alive(id).then(|| &mut self.processes[id.index()]).filter(|process| !process.frozen)
-    }
-
-    fn survey(&mut self) {
-        let params = &self.params;
-        let bodies_m = params.safe_distance_m.max(params.ranging_m.unwrap_or(0.0));
-        let reach = Reach {
-            // Farther than the least distance so far nothing matters, and that one is finite with two bodies.
-            bodies_m: bodies_m.max(self.distances.min_separation_m()),
-            detection_m: params.detection_range_m,
-            clearance_m: params.clearance_m.max(self.distances.min_clearance_m),
-        };
-        self.around.survey(&self.bodies, &self.outlines, reach);
-    }
-
-    fn follow_processes(&mut self, opening: SimTime) {
-        for index in 0..self.processes.len() {
-            let id = DroneId(index as u32);
-            if !self.bodies[index].alive {
-                continue;
-            }
-            if self.processes[index].frozen {
-                self.processes[index].hold(Answer::Frozen);
-                continue;
-            }
-            if self.processes[index].answer == Answer::Awaited {
-                self.hold(id);
-            }
-            let process = &mut self.processes[index];
-            totals::tally(&mut self.totals, &process.slot);
-            self.distances.violations += process.obedience.check(id, &process.slot, opening, &mut self.log);
-            self.decisions.follow_slot(id, &process.slot, opening, &mut self.log);
-        }
-        self.sent.iter().for_each(|sent| self.decisions.follow_frame(sent, opening, &mut self.log));
-    }
-
-    fn judge(&mut self, end: SimTime) {
-        if self.end.is_some() {
+    /// Opens the tick once: faults end, obstacle sets are detected, faults begin.
+    fn open(&mut self) {
+        if std::mem::replace(&mut self.open, true) {
             return;
         }
-        let (outcome, reason) = if self.finish.met(&self.params, &self.bodies, &self.stages) {
-            (Outcome::Reached, "the end condition is met".to_owned())
-        } else if !self.bodies.iter().any(|body| body.alive) && !self.faults.awaits_restarts() {
-            (Outcome::Timeout, "no drone is left alive".to_owned())
-        } else if end >= SimTime::from_secs(self.params.timeout_s) {
-            (Outcome::Timeout, format!("the time of {} s is over", self.params.timeout_s))
-        } else {
-            return;
-        };
-        self.end = Some(match self.violations() {
-            0 => (outcome, reason),
-            count => (Outcome::Unsafe, format!("{reason}, but invariants were broken {count} times")),
+        let now = self.now();
+        self.faults.end_due(now, &mut self.drones, &mut self.log);
+        self.drop_unsensed_contacts();
+        self.stages.detect(self.sweep.contacts(), now, &mut self.log);
+        if self.faults.begin_due(now, &mut self.drones, &self.stages, &mut self.log) {
+            self.drop_unsensed_contacts();
+        }
+        self.follow_commands();
+    }
+
+    /// Dead drones and drones with a broken obstacle sensor sense no obstacles.
+    fn drop_unsensed_contacts(&mut self) {
+        let (drones, faults) = (&self.drones, self.faults.schedule());
+        self.sweep.retain_contacts_of(|drone| {
+            let id = DroneId(drone);
+            drones.is_alive(id) && !faults.standing(id).no_obstacles
         });
     }
 
-    fn close_tick(&mut self, end: SimTime) {
-        self.rows.clear();
-        for ((body, process), id) in self.bodies.iter().zip(&self.processes).zip(0..) {
-            self.rows.push(process.row(body, self.faults.standing(DroneId(id)).cuts));
+    /// Forgets what killed and restarted processes have said.
+    fn follow_commands(&mut self) {
+        for &command in self.faults.commands() {
+            match command {
+                ProcessCommand::Kill(id) => self.decisions.forget(id),
+                ProcessCommand::Restart(id, _) => {
+                    self.monitor.restart(id);
+                    self.decisions.forget(id);
+                }
+                ProcessCommand::Freeze(_) | ProcessCommand::Resume(_) => {}
+            }
         }
-        self.processes.iter_mut().for_each(|process| process.answer = Answer::Awaited);
-        std::mem::swap(&mut self.down.frames, &mut self.sent);
-        self.sent.clear();
-        self.log.turn();
-        self.head = RecordHeader {
-            tick: self.tick,
-            now: end,
-            rows: self.rows.len() as u32,
-            frames: self.down.frames.len() as u32,
-            events_len: self.log.told().len() as u32,
-            lost: 0,
-            digest: self.digest(),
+    }
+
+    /// Counts and checks what drones reported in the tick, and logs what leaders decided.
+    fn follow_answers(&mut self, opening: SimTime) {
+        self.counters.count_missed(self.drones.hold_unanswered());
+        for (drone, slot) in self.drones.answers() {
+            let id = DroneId(drone as u32);
+            self.counters.count_slot(slot);
+            self.monitor.check_obedience(id, slot, opening, &mut self.log);
+            self.decisions.follow_slot(id, slot, opening, &mut self.log);
+        }
+        for frame in self.uplink.frames() {
+            self.decisions.follow_frame(frame, opening, &mut self.log);
+        }
+    }
+
+    fn move_bodies(&mut self, opening: SimTime) {
+        let faults = self.faults.schedule();
+        let rejected = self.drones.fly(&self.params, |id| faults.wind_mps2(id, opening));
+        self.counters.count_rejected(rejected);
+    }
+
+    /// Looks around every body, as far as senses and invariants need it.
+    fn sweep(&mut self) {
+        let params = &self.params;
+        let bodies_m = params.safe_distance_m.max(params.ranging_m.unwrap_or(0.0));
+        let range = SweepRange {
+            // Pairs farther apart than the least distance so far change nothing. That distance is finite with two bodies.
+            bodies_m: bodies_m.max(self.monitor.min_separation_m()),
+            detection_m: params.detection_range_m,
+            clearance_m: params.clearance_m.max(self.monitor.min_clearance_m()),
         };
+        self.sweep.sweep(self.drones.bodies(), range);
+    }
+
+    fn judge(&mut self, end: SimTime) {
+        let state = MissionState {
+            bodies: self.drones.bodies(),
+            stages: &self.stages,
+            end,
+            awaits_restarts: self.faults.schedule().awaits_restarts(),
+            violations: self.monitor.violations(),
+        };
+        self.judge.judge(&self.params, state);
+    }
+
+    /// Records the tick and opens the next one.
+    fn close_tick(&mut self, end: SimTime) {
+        self.uplink.hand_over(&mut self.downlink.frames);
+        self.log.end_tick();
+        let ended = EndedTick {
+            tick: self.tick,
+            end,
+            digest: self.digest(),
+            events_len: self.log.ended().len(),
+            frames: self.downlink.frames.len(),
+        };
+        self.record.close_tick(ended, &self.drones, self.faults.schedule());
+        self.drones.open_tick();
         self.tick += 1;
         self.open = false;
     }
@@ -366,12 +375,13 @@ fn check_bodies(starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<()
     if let Some(drone) = starts.iter().position(|(position, velocity)| !finite(position) || !finite(velocity)) {
         return Err(WorldError::Start(drone));
     }
-    let mut shapes = obstacles.iter().enumerate();
-    shapes.try_for_each(|(index, shape)| shape.check().map_err(|error| WorldError::Obstacle { index, error }))
+    for (index, shape) in obstacles.iter().enumerate() {
+        shape.check().map_err(|error| WorldError::Obstacle { index, error })?;
+    }
+    Ok(())
 }
 
-mod fold;
-mod motion;
-mod orders;
+#[cfg(test)]
+mod fault_tests;
 #[cfg(test)]
 mod tests;

@@ -1,16 +1,15 @@
-//! From the keys of `[radio]` to the radio that the drones have.
+//! From the keys of `[radio]` to the radio model that the drones use.
 
-use super::{BurstKeys, BurstScope, DelayModel, RadioKeys, RuleKeys, TopicKey};
-use crate::keys::Scenario;
+use crate::radio_keys::{BurstKeys, BurstScope, DelayModel, RadioKeys, RuleKeys, TopicKey};
 use serde_json::{Map, Value as Json};
 use skein_protocol::DroneId;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{self, ChannelModel, Delay, Radio, Range, Rule, SharedChannel};
 
-/// What the presets set: tables of keys.
+/// The presets: one table of keys per preset.
 const PRESETS: &str = include_str!("presets.toml");
 
-/// Writes what a scenario's preset sets into its `[radio]`, where that does not say otherwise.
+/// Writes the keys of the chosen preset into `[radio]`, except those that the scenario sets itself.
 pub(crate) fn fill_preset(scenario: &mut Json) {
     let Some(Json::Object(keys)) = scenario.get_mut("radio") else { return };
     let Some(name) = keys.get("preset").and_then(Json::as_str) else { return };
@@ -19,7 +18,7 @@ pub(crate) fn fill_preset(scenario: &mut Json) {
     }
 }
 
-/// The presets' tables, by name. That the file can be read is a test's to show.
+/// The presets' tables, by name. A test shows that the file can be read.
 fn presets() -> Map<String, Json> {
     toml::from_str(PRESETS).unwrap_or_default()
 }
@@ -34,62 +33,54 @@ fn fill(keys: &mut Map<String, Json>, preset: Map<String, Json>) {
     }
 }
 
-impl Scenario {
-    /// What the air does to frames, keyed by the scenario's seed.
-    #[must_use]
-    pub fn radio(&self) -> Radio {
-        let keys = &self.radio;
-        let rules = keys.rules.iter().map(|rule| keys.rule(rule)).collect();
-        Radio { seed: self.seed, channel: keys.air(), asymmetry: keys.asymmetry, rules }
-    }
+/// The radio of these keys. `seed` keys its random numbers.
+pub(crate) fn radio(seed: u64, keys: &RadioKeys) -> Radio {
+    let rules = keys.rules.iter().map(|rule| channel_rule(keys, rule)).collect();
+    Radio { seed, channel: channel_model(keys), asymmetry: keys.asymmetry, rules }
+}
 
-    /// The channel that all drones share; `None` if its bandwidth is no limit.
-    #[must_use]
-    pub fn channel(&self) -> Option<SharedChannel> {
-        let limit_s = self.radio.queue_limit_s;
-        self.radio.rate_bps.map(|rate_bps| SharedChannel { seed: self.seed, rate_bps, limit_s })
+/// The channel that all drones share; `None` if bandwidth is no limit. `seed` keys its random numbers.
+pub(crate) fn channel(seed: u64, keys: &RadioKeys) -> Option<SharedChannel> {
+    keys.rate_bps.map(|rate_bps| SharedChannel { seed, rate_bps, limit_s: keys.queue_limit_s })
+}
+
+/// The keys for frames that match a rule: those of `[radio]`, overridden by those of the rule.
+pub(super) fn with_rule(keys: &RadioKeys, rule: &RuleKeys) -> RadioKeys {
+    RadioKeys {
+        delay_s: rule.delay_s.unwrap_or(keys.delay_s),
+        jitter_s: rule.jitter_s.unwrap_or(keys.jitter_s),
+        delay_model: rule.delay_model.unwrap_or(keys.delay_model),
+        loss: rule.loss.unwrap_or(keys.loss),
+        range_m: rule.range_m.or(keys.range_m),
+        shadowing_db: rule.shadowing_db.unwrap_or(keys.shadowing_db),
+        duplicate: rule.duplicate.unwrap_or(keys.duplicate),
+        burst: rule.burst.clone().or_else(|| keys.burst.clone()),
+        rules: Vec::new(),
+        ..*keys
     }
 }
 
-impl RadioKeys {
-    fn air(&self) -> ChannelModel {
-        ChannelModel {
-            delay: Delay { model: self.delay_model.into(), mean_s: self.delay_s, jitter_s: self.jitter_s },
-            loss: self.loss,
-            burst: self.burst.as_ref().map(radio::Burst::from),
-            range: self.range_m.map(|half_m| Range {
-                half_m,
-                shadowing_db: self.shadowing_db,
-                exponent: self.path_loss_exponent,
-            }),
-            duplicate: self.duplicate,
-        }
+fn channel_model(keys: &RadioKeys) -> ChannelModel {
+    ChannelModel {
+        delay: Delay { model: keys.delay_model.into(), mean_s: keys.delay_s, jitter_s: keys.jitter_s },
+        loss: keys.loss,
+        burst: keys.burst.as_ref().map(radio::Burst::from),
+        range: keys.range_m.map(|half_m| Range {
+            half_m,
+            shadowing_db: keys.shadowing_db,
+            exponent: keys.path_loss_exponent,
+        }),
+        duplicate: keys.duplicate,
     }
+}
 
-    /// These keys with what a rule says in their place.
-    pub(super) fn under(&self, rule: &RuleKeys) -> Self {
-        Self {
-            delay_s: rule.delay_s.unwrap_or(self.delay_s),
-            jitter_s: rule.jitter_s.unwrap_or(self.jitter_s),
-            delay_model: rule.delay_model.unwrap_or(self.delay_model),
-            loss: rule.loss.unwrap_or(self.loss),
-            range_m: rule.range_m.or(self.range_m),
-            shadowing_db: rule.shadowing_db.unwrap_or(self.shadowing_db),
-            duplicate: rule.duplicate.unwrap_or(self.duplicate),
-            burst: rule.burst.clone().or_else(|| self.burst.clone()),
-            rules: Vec::new(),
-            ..*self
-        }
-    }
-
-    fn rule(&self, rule: &RuleKeys) -> Rule {
-        let drones = |ids: &Option<Vec<u32>>| ids.as_ref().map(|ids| ids.iter().copied().map(DroneId).collect());
-        Rule {
-            topics: rule.topics.as_ref().map(|topics| topics.iter().copied().map(Topic::from).collect()),
-            from: drones(&rule.from),
-            to: drones(&rule.to),
-            channel: self.under(rule).air(),
-        }
+fn channel_rule(keys: &RadioKeys, rule: &RuleKeys) -> Rule {
+    let drones = |ids: &Option<Vec<u32>>| ids.as_ref().map(|ids| ids.iter().copied().map(DroneId).collect());
+    Rule {
+        topics: rule.topics.as_ref().map(|topics| topics.iter().copied().map(Topic::from).collect()),
+        from: drones(&rule.from),
+        to: drones(&rule.to),
+        channel: channel_model(&with_rule(keys, rule)),
     }
 }
 
@@ -137,8 +128,9 @@ mod tests {
     fn every_preset_has_a_table_and_every_topic_a_key() {
         let schema = crate::schema();
         let words = |pointer| {
-            let options = crate::check::present(schema.pointer(pointer).unwrap());
-            let mut words: Vec<_> = crate::check::words(options).unwrap().into_iter().map(str::to_owned).collect();
+            let options = crate::schema_tree::present(schema.pointer(pointer).unwrap());
+            let mut words: Vec<_> =
+                crate::schema_tree::words(options).unwrap().into_iter().map(str::to_owned).collect();
             words.sort();
             words
         };
@@ -148,8 +140,8 @@ mod tests {
         let mut topics = Topic::ALL.map(|topic| serde_json::to_value(topic).unwrap().as_str().unwrap().to_owned());
         topics.sort();
         let path = "/properties/radio/properties/rule/items/properties/topics";
-        let items = crate::check::present(schema.pointer(path).unwrap())["items"].clone();
-        let mut keys: Vec<_> = crate::check::words(&items).unwrap();
+        let items = crate::schema_tree::present(schema.pointer(path).unwrap())["items"].clone();
+        let mut keys: Vec<_> = crate::schema_tree::words(&items).unwrap();
         keys.sort_unstable();
         assert_eq!(keys, topics);
     }

@@ -1,15 +1,15 @@
-//! What no single key of `[radio]` can say.
+//! Rules between the keys of `[radio]`.
 
-use super::{DelayModel, RadioKeys, RuleKeys};
-use crate::check::quantity;
+use super::resolve::with_rule;
+use crate::broken_rule::{BrokenRule, quantity};
 use crate::keys::Scenario;
-use crate::rules::Broken;
+use crate::radio_keys::{DelayModel, RadioKeys, RuleKeys};
 
-/// The rules between keys that `[radio]` breaks.
-pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
+/// The rules that the scenario's `[radio]` breaks.
+pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     let keys = &scenario.radio;
     let mut broken = delays(keys, "radio");
-    // What a rule takes over from there is blamed there.
+    // Values that a rule inherits from `[radio]` are blamed there.
     let base_holds = broken.is_empty();
     for (number, rule) in keys.rules.iter().enumerate() {
         let path = format!("radio.rule.{number}");
@@ -18,23 +18,23 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<Broken> {
         if *rule == (RuleKeys { topics, from, to, ..RuleKeys::default() }) {
             let message = "sets nothing: expected delay_s, jitter_s, delay_model, loss, range_m, shadowing_db, duplicate \
                            or burst";
-            broken.push(Broken { keys: vec![path], message: message.to_owned() });
+            broken.push(BrokenRule { keys: vec![path], message: message.to_owned() });
         } else if base_holds {
-            broken.extend(delays(&keys.under(rule), &path));
+            broken.extend(delays(&with_rule(keys, rule), &path));
         }
     }
     broken
 }
 
-/// What mean, deviation, model and range have to do with each other.
-fn delays(keys: &RadioKeys, path: &str) -> Vec<Broken> {
+/// Rules between the mean delay, its deviation, its model, and the range.
+fn delays(keys: &RadioKeys, path: &str) -> Vec<BrokenRule> {
     let RadioKeys { delay_s, jitter_s, delay_model, .. } = *keys;
     let (jitter, most_s) = (quantity(jitter_s, "s"), delay_s / 3f64.sqrt());
     let mut broken = Vec::new();
     let mut expect = |holds: bool, names: [&str; 3], message: String| {
         if !holds {
             let keys = names.iter().map(|name| format!("{path}.{name}")).chain(["radio.preset".to_owned()]);
-            broken.push(Broken { keys: keys.collect(), message });
+            broken.push(BrokenRule { keys: keys.collect(), message });
         }
     };
     let names = ["jitter_s", "delay_model", "delay_s"];
@@ -73,13 +73,13 @@ fn delays(keys: &RadioKeys, path: &str) -> Vec<Broken> {
     broken
 }
 
-/// Drones that a rule names and nobody flies.
-fn drones(rule: &RuleKeys, path: &str, drones: u32) -> Vec<Broken> {
+/// Drones that a rule names and that do not exist.
+fn drones(rule: &RuleKeys, path: &str, drones: u32) -> Vec<BrokenRule> {
     let lists = [("from", &rule.from), ("to", &rule.to)];
     let ids =
         lists.into_iter().flat_map(|(name, ids)| ids.iter().flatten().enumerate().map(move |(i, &id)| (name, i, id)));
     let unknown = ids.filter(|&(_, _, id)| id >= drones);
-    let broken = unknown.map(|(name, i, id)| Broken {
+    let broken = unknown.map(|(name, i, id)| BrokenRule {
         keys: vec![format!("{path}.{name}.{i}"), "formation.drones".to_owned()],
         message: format!("found drone {id}, expected one below formation.drones = {drones}"),
     });

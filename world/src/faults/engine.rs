@@ -1,237 +1,128 @@
-//! Which faults are due in a tick, which are in force, and what those do to each drone.
+//! Carries out the scheduled faults: on the drones at once, and on their processes by commands to the runtime.
 
-use super::chance::Chance;
-use super::moments::Moments;
-use super::targets::Scene;
-use super::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime};
-use crate::senses::SensorFault;
-use skein_protocol::{DroneId, SimTime, Tick, Vec2};
+use super::schedule::{FaultChange, FaultSchedule};
+use super::view::FaultView;
+use crate::drones::DroneTable;
+use crate::event_log::EventLog;
+use crate::fault_plan::{FaultEffect, FaultPlan, FaultTargets, ProcessCommand};
+use crate::stages::Stages;
+use skein_protocol::record::{EventKind, FaultKind};
+use skein_protocol::{DroneId, SimTime};
 
-/// A fault in force.
+/// The fault schedule, and what the faults of the current tick do to processes.
 #[derive(Clone, Debug)]
-struct Active {
-    /// Its place in the plan.
-    fault: usize,
-    /// In ascending order.
-    drones: Vec<DroneId>,
-    /// The first instant at which it is over.
-    until: SimTime,
+pub(crate) struct FaultEngine {
+    schedule: FaultSchedule,
+    commands: Vec<ProcessCommand>,
 }
 
-/// A fault that begins or ends.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Turn {
-    /// Its place in the plan.
-    pub fault: usize,
-    /// Whom it meets.
-    pub drones: Vec<DroneId>,
-}
-
-/// The plan and how far it is carried out.
-#[derive(Clone, Debug)]
-pub(crate) struct Engine {
-    plan: FaultPlan,
-    moments: Moments,
-    /// Places of faults that have not begun.
-    waiting: Vec<usize>,
-    active: Vec<Active>,
-    /// What is in force for each drone, but for noise, which is drawn anew in each tick.
-    standing: Vec<SensorFault>,
-}
-
-impl Engine {
-    /// For a swarm of so many drones.
-    pub fn new(plan: FaultPlan, drones: usize) -> Self {
-        let waiting = (0..plan.faults.len()).collect();
-        let standing = vec![SensorFault::default(); drones];
-        Self { plan, moments: Moments::default(), waiting, active: Vec::new(), standing }
+impl FaultEngine {
+    /// The plan for this number of drones, with nothing begun.
+    pub(crate) fn new(plan: FaultPlan, drones: usize) -> Self {
+        Self { schedule: FaultSchedule::new(plan, drones), commands: Vec::new() }
     }
 
-    /// A fault of the plan.
-    pub fn fault(&self, place: usize) -> &Fault {
-        &self.plan.faults[place]
+    /// What is in force.
+    pub(crate) fn schedule(&self) -> &FaultSchedule {
+        &self.schedule
     }
 
-    /// Takes out the faults that are over, in the order in which they began.
-    pub fn end(&mut self, now: SimTime) -> Vec<Turn> {
-        let mut over = Vec::new();
-        self.active.retain(|active| {
-            let holds = active.until > now;
-            if !holds {
-                over.push(Turn { fault: active.fault, drones: active.drones.clone() });
-            }
-            holds
-        });
-        if !over.is_empty() {
-            self.settle();
-        }
-        over
+    /// What the runtime has to do to processes in the current tick, in this order.
+    pub(crate) fn commands(&self) -> &[ProcessCommand] {
+        &self.commands
     }
 
-    /// Looks for events, if a fault waits for one.
-    pub fn observe(&mut self, now: SimTime, scene: &Scene<'_>) {
-        if self.waiting.iter().any(|&place| matches!(self.plan.faults[place].time, FaultTime::On { .. })) {
-            self.moments.observe(now, scene);
+    /// Begins a tick: ends the faults that are over.
+    pub(crate) fn end_due(&mut self, now: SimTime, drones: &mut DroneTable, log: &mut EventLog) {
+        self.commands.clear();
+        for change in self.schedule.end(now) {
+            self.end(&change, now, drones, log);
         }
     }
 
-    /// Begins the next fault that is due, and gives it: to be called until there is none, the world having followed each.
-    /// A role that nobody has is waited for; drones named that it cannot meet are left out.
-    pub fn begin(&mut self, now: SimTime, scene: &Scene<'_>) -> Option<Turn> {
-        let found = (0..self.waiting.len()).find_map(|index| {
-            let place = self.waiting[index];
-            let fault = &self.plan.faults[place];
-            if !self.is_due(fault, now) {
-                return None;
-            }
-            let drones = self.meets(place, scene);
-            let role = !matches!(fault.targets, FaultTargets::Drones(_) | FaultTargets::All)
-                && !matches!(fault.effect, FaultEffect::Partition(_));
-            (!drones.is_empty() || !role).then_some((index, Turn { fault: place, drones }))
-        });
-        let (index, turn) = found?;
-        self.waiting.remove(index);
-        let fault = &self.plan.faults[turn.fault];
-        if !turn.drones.is_empty() && fault.effect != FaultEffect::Kill {
-            let until = now.after(fault.for_s);
-            self.active.push(Active { fault: turn.fault, drones: turn.drones.clone(), until });
-            self.settle();
+    /// Begins the faults that are due. Returns whether any began.
+    pub(crate) fn begin_due(
+        &mut self,
+        now: SimTime,
+        drones: &mut DroneTable,
+        stages: &Stages,
+        log: &mut EventLog,
+    ) -> bool {
+        self.schedule.observe(now, &FaultView { drones, stages });
+        let mut begun = false;
+        while let Some(change) = self.schedule.begin(now, &FaultView { drones, stages }) {
+            self.begin(&change, now, drones, log);
+            begun = true;
         }
-        Some(turn)
+        begun
     }
 
-    /// Whether a dead drone is to get a new process.
-    pub fn awaits_restart(&self, drone: DroneId) -> bool {
-        let restarts = |active: &&Active| self.plan.faults[active.fault].effect == FaultEffect::Restart;
-        self.active.iter().filter(restarts).any(|active| active.has(drone))
-    }
-
-    /// Whether any is.
-    pub fn awaits_restarts(&self) -> bool {
-        self.active.iter().any(|active| self.plan.faults[active.fault].effect == FaultEffect::Restart)
-    }
-
-    /// What a drone is told differently from the truth in a tick.
-    pub fn sensor_fault(&self, drone: DroneId, tick: Tick) -> SensorFault {
-        let mut sensor_fault = self.standing[drone.index()];
-        for active in self.active.iter().filter(|active| active.has(drone)) {
-            if let FaultEffect::Noise(noise) = &self.plan.faults[active.fault].effect {
-                let mut chance = self.chance(active.fault, u64::from(drone.0), tick);
-                sensor_fault.position_error_m += noise.position_bias_m + chance.vector(noise.position_std_m);
-                sensor_fault.velocity_error_mps += noise.velocity_bias_mps + chance.vector(noise.velocity_std_mps);
-            }
+    fn begin(&mut self, change: &FaultChange, now: SimTime, drones: &mut DroneTable, log: &mut EventLog) {
+        let fault = self.schedule.fault(change.fault);
+        let (kind, mut detail) = (fault.effect.kind(), fault.effect.words());
+        if fault.for_s.is_finite() && kind != FaultKind::Kill {
+            detail += &format!("{} {} s", if kind == FaultKind::Restart { " after" } else { ", for" }, fault.for_s);
         }
-        sensor_fault
-    }
-
-    /// What of its radio is cut.
-    pub fn standing(&self, drone: DroneId) -> &SensorFault {
-        &self.standing[drone.index()]
-    }
-
-    /// What blows a drone about in the tick that begins now, m/s².
-    pub fn wind_mps2(&self, drone: DroneId, now: SimTime) -> Vec2 {
-        let mut sum = Vec2::zeros();
-        for active in self.active.iter().filter(|active| active.has(drone)) {
-            if let FaultEffect::Wind(wind) = &self.plan.faults[active.fault].effect {
-                let gust = (now.secs() / wind.gust_s).floor() as u64;
-                let mut chance = self.chance(active.fault, u64::from(drone.0), gust);
-                sum += wind.acceleration_mps2 + chance.vector(wind.gust_mps2);
-            }
+        if is_of_swarm(&fault.targets, &fault.effect) {
+            log.push(now, EventKind::Fault { kind, target: DroneId::NONE, scheduled: true, detail });
+            return;
         }
-        sum
-    }
-
-    fn chance(&self, fault: usize, who: u64, when: u64) -> Chance {
-        Chance::new(self.plan.seed, [fault as u64, who, when])
-    }
-
-    fn is_due(&self, fault: &Fault, now: SimTime) -> bool {
-        match fault.time {
-            FaultTime::At(at_s) => now >= SimTime::from_secs(at_s),
-            FaultTime::On { event, stage, after_s } => {
-                self.moments.of(event, stage).is_some_and(|moment| now >= moment.after(after_s))
-            }
-        }
-    }
-
-    /// Those whom a fault can meet now, in ascending order.
-    fn meets(&self, place: usize, scene: &Scene<'_>) -> Vec<DroneId> {
-        let fault = &self.plan.faults[place];
-        let mut drones = match &fault.effect {
-            // Sides are sides, whoever lives.
-            FaultEffect::Partition(sides) => {
-                return sorted(sides.concat().into_iter().filter(|drone| drone.index() < scene.bodies.len()).collect());
-            }
-            _ => scene.meets(&fault.targets, self.chance(place, u64::MAX, 0)),
-        };
-        drones.retain(|&drone| {
-            let (body, process) = (&scene.bodies[drone.index()], &scene.processes[drone.index()]);
-            match fault.effect {
-                FaultEffect::Freeze => body.alive && !process.frozen,
-                FaultEffect::Restart => body.flies() && !self.awaits_restart(drone),
-                _ => body.alive,
-            }
-        });
-        sorted(drones)
-    }
-
-    /// Works out anew what is in force for each drone.
-    fn settle(&mut self) {
-        self.standing.fill(SensorFault::default());
-        for active in &self.active {
-            let effect = &self.plan.faults[active.fault].effect;
-            if let FaultEffect::Partition(sides) = effect {
-                let number = self.plan.partition_number(active.fault);
-                for (side, drones) in sides.iter().enumerate() {
-                    let known = drones.iter().filter(|drone| active.has(**drone));
-                    known.for_each(|drone| self.standing[drone.index()].cuts.partitions.join(number, side));
+        for &drone in &change.drones {
+            match kind {
+                FaultKind::Kill | FaultKind::Restart if drones.kill(drone) => {
+                    self.commands.push(ProcessCommand::Kill(drone));
                 }
-                continue;
+                FaultKind::Freeze => {
+                    drones.freeze(drone);
+                    self.commands.push(ProcessCommand::Freeze(drone));
+                }
+                _ => {}
             }
-            active.drones.iter().for_each(|drone| self.standing[drone.index()].add(effect));
+            log.push(now, EventKind::Fault { kind, target: drone, scheduled: true, detail: detail.clone() });
         }
     }
-}
 
-impl Active {
-    fn has(&self, drone: DroneId) -> bool {
-        self.drones.binary_search(&drone).is_ok()
-    }
-}
-
-impl SensorFault {
-    fn add(&mut self, effect: &FaultEffect) {
-        match effect {
-            FaultEffect::Slow(extra_s) => self.extra_reaction_s += extra_s,
-            FaultEffect::Deaf => self.cuts.deaf = 1,
-            FaultEffect::Mute => self.cuts.mute = 1,
-            FaultEffect::Blind { obstacles, ranging } => {
-                self.no_obstacles |= obstacles;
-                self.no_ranging |= ranging;
+    fn end(&mut self, change: &FaultChange, now: SimTime, drones: &mut DroneTable, log: &mut EventLog) {
+        let fault = self.schedule.fault(change.fault);
+        let kind = fault.effect.kind();
+        if is_of_swarm(&fault.targets, &fault.effect) {
+            log.push(now, EventKind::FaultOver { kind, target: DroneId::NONE, detail: String::new() });
+            return;
+        }
+        for &drone in &change.drones {
+            let detail = match kind {
+                FaultKind::Freeze => self.resume(drone, drones),
+                FaultKind::Restart => self.restart(drone, drones),
+                _ => Some(String::new()),
+            };
+            if let Some(detail) = detail {
+                log.push(now, EventKind::FaultOver { kind, target: drone, detail });
             }
-            FaultEffect::Kill
-            | FaultEffect::Freeze
-            | FaultEffect::Restart
-            | FaultEffect::Partition(_)
-            | FaultEffect::Noise(_)
-            | FaultEffect::Wind(_) => {}
         }
     }
-}
 
-impl FaultPlan {
-    /// The number of a partition among the plan's partitions.
-    fn partition_number(&self, place: usize) -> usize {
-        self.faults[..place].iter().filter(|fault| matches!(fault.effect, FaultEffect::Partition(_))).count()
+    /// The description of the event; `None` if the process has been killed meanwhile.
+    fn resume(&mut self, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
+        if !drones.resume(drone) {
+            return None;
+        }
+        self.commands.push(ProcessCommand::Resume(drone));
+        Some("continued".to_owned())
+    }
+
+    /// The description of the event; `None` if the drone has landed meanwhile.
+    fn restart(&mut self, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
+        let incarnation = drones.restart(drone)?;
+        self.commands.push(ProcessCommand::Restart(drone, incarnation));
+        Some(format!("a new process, incarnation {incarnation}"))
     }
 }
 
-fn sorted(mut drones: Vec<DroneId>) -> Vec<DroneId> {
-    drones.sort_unstable();
-    drones.dedup();
-    drones
+/// Whether a fault has one event for the whole swarm. What is done to processes has one event per drone.
+fn is_of_swarm(targets: &FaultTargets, effect: &FaultEffect) -> bool {
+    match effect {
+        FaultEffect::Partition(_) => true,
+        FaultEffect::Kill | FaultEffect::Freeze | FaultEffect::Restart => false,
+        _ => *targets == FaultTargets::All,
+    }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,10 +1,10 @@
 //! Whole missions of a world, flown by hand.
 
-use super::motion::HOLD_S;
 use super::*;
 use crate::params::{End, Failsafe};
-use crate::testing::{command, events, happenings, params, rectangle, starts, tick};
-use skein_protocol::record::{ROW_ALIVE, ROW_LATE, RunEvent, ViolationKind};
+use crate::testing::{command, event_kinds, events, params, rectangle, starts, tick};
+use crate::tuning::COMMAND_HOLD_S;
+use skein_protocol::record::{ROW_ALIVE, ROW_LATE, RunEvent, Totals, ViolationKind};
 use skein_protocol::shape::ShapeError;
 use skein_protocol::slot::SLOT_LEADS;
 use skein_protocol::{Ballot, Message, ObstacleId, PlanStamp};
@@ -15,13 +15,13 @@ fn eight(params: WorldParams, obstacles: &[ConvexShape]) -> World {
     World::new(params, &starts(8), obstacles).unwrap()
 }
 
-/// Flies straight on until the end; all events.
+/// Flies straight on until the end. Gives all events.
 fn fly(world: &mut World, slot: &Slot) -> Vec<RunEvent> {
-    let mut told = Vec::new();
+    let mut all = Vec::new();
     while world.ended().is_none() {
-        told.extend(tick(world, slot));
+        all.extend(tick(world, slot));
     }
-    told
+    all
 }
 
 fn frame() -> Frame {
@@ -31,7 +31,7 @@ fn frame() -> Frame {
 }
 
 #[test]
-fn eight_drones_past_nothing_run_out_of_time() {
+fn eight_drones_without_obstacles_run_out_of_time() {
     let mut world = eight(params(), &[]);
     assert_eq!(fly(&mut world, &Slot::default()), []);
     assert_eq!((world.ended(), world.tick()), (Some(Outcome::Timeout), 500));
@@ -44,7 +44,7 @@ fn eight_drones_past_nothing_run_out_of_time() {
 }
 
 #[test]
-fn what_cannot_be_a_world_is_named() {
+fn an_invalid_start_or_obstacle_is_named() {
     let error = |starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]| {
         World::new(params(), starts, obstacles).map(|_| ()).unwrap_err()
     };
@@ -56,31 +56,33 @@ fn what_cannot_be_a_world_is_named() {
 }
 
 #[test]
-fn detection_is_told_at_the_opening_and_passing_at_the_end_of_a_tick() {
-    // From x = 0 at 10 m/s: in range (115 m of the front at x = 130) as the front reaches 15 m.
+fn detection_is_logged_at_the_opening_and_passing_at_the_end_of_a_tick() {
+    // From x = 0 at 10 m/s. The obstacle begins at x = 130 m, so it is 115 m away when the front reaches 15 m.
     let obstacle = rectangle(140.0, 0.0, 10.0, 5.0);
     let mut world = eight(WorldParams { timeout_s: 30.0, ..params() }, &[obstacle]);
-    let told = fly(&mut world, &Slot::default());
-    let Some(RunEvent { t_s, what: EventKind::Detected { stage: 0, drone, distance_m, .. } }) = told.first() else {
-        panic!("{told:?}");
+    let logged = fly(&mut world, &Slot::default());
+    let Some(RunEvent { t_s, what: EventKind::Detected { stage: 0, drone, distance_m, .. } }) = logged.first() else {
+        panic!("{logged:?}");
     };
     assert_eq!(*drone, DroneId(0));
     assert!((1.5..=1.521).contains(t_s) && (114.79..=115.0).contains(distance_m), "{t_s} s, {distance_m} m");
-    let passed = told.iter().find(|event| event.what == EventKind::Passed { stage: 0 }).unwrap();
+    let passed = logged.iter().find(|event| event.what == EventKind::Passed { stage: 0 }).unwrap();
     // The last drone starts 3·35/√2 behind.
     let wanted = (140.0 + 3.0 * 35.0 / 2f64.sqrt()) / 10.0;
     assert!((0.0..=0.021).contains(&(passed.t_s - wanted)), "{} s", passed.t_s);
-    assert!(told.is_sorted_by(|a, b| a.t_s <= b.t_s));
+    assert!(logged.is_sorted_by(|a, b| a.t_s <= b.t_s));
     assert_eq!(world.ended(), Some(Outcome::Unsafe), "the front flew through it");
     assert!(world.min_clearance_m() < 0.0);
 }
 
 #[test]
-fn bad_commands_are_counted_and_huge_ones_clipped() {
+fn commands_that_are_not_finite_are_counted_and_huge_ones_clipped() {
     let mut world = eight(params(), &[]);
     world.take_slot(DroneId(0), &command(f64::NAN, 0.0));
     world.take_slot(DroneId(1), &command(0.0, 1e200));
-    (2..8).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+    for id in 2..8 {
+        world.take_slot(DroneId(id), &Slot::default());
+    }
     world.take_slot(DroneId(99), &command(1.0, 0.0));
     world.advance();
     assert_eq!(world.record().rows[0].velocity_mps, CRUISE);
@@ -88,27 +90,29 @@ fn bad_commands_are_counted_and_huge_ones_clipped() {
     assert_eq!(totals_of(&mut world).rejected_commands, 1);
 }
 
-/// Ends the mission; what its end event counts.
+/// Ends the mission. Gives the totals of its end event.
 fn totals_of(world: &mut World) -> Totals {
     world.finish(&LinkStats::default(), 2.5);
-    match happenings(events(world)).pop() {
+    match event_kinds(events(world)).pop() {
         Some(EventKind::End { totals, .. }) => *totals,
         other => panic!("{other:?}"),
     }
 }
 
 #[test]
-fn a_late_drone_holds_its_last_command_and_hears_nothing() {
+fn a_late_drone_holds_its_last_command_and_receives_nothing() {
     let mut world = eight(params(), &[]);
     tick(&mut world, &Slot { heard: 3, step_ns: 9, ..command(1.0, 0.0) });
-    (1..8).for_each(|id| world.take_slot(DroneId(id), &command(1.0, 0.0)));
+    for id in 1..8 {
+        world.take_slot(DroneId(id), &command(1.0, 0.0));
+    }
     world.hold(DroneId(0));
     world.advance();
     let rows = world.record().rows;
     assert_eq!(rows[0].velocity_mps, rows[1].velocity_mps);
     assert_eq!((rows[0].flags, rows[0].heard, rows[0].step_ns), (ROW_ALIVE | ROW_LATE, 0, 0));
     world.advance();
-    assert_eq!(world.record().rows[7].flags, ROW_ALIVE | ROW_LATE, "no answer at all is a late one");
+    assert_eq!(world.record().rows[7].flags, ROW_ALIVE | ROW_LATE, "a missing answer counts as late");
     let totals = totals_of(&mut world);
     assert_eq!((totals.deadline_misses, totals.delivered), (9, 24));
 }
@@ -119,18 +123,20 @@ fn a_drone_without_commands_brakes_until_the_next_one() {
     tick(&mut world, &command(1.0, 0.0));
     let mut speeds = Vec::new();
     for _ in 0..200 {
-        (1..8).for_each(|id| world.take_slot(DroneId(id), &command(0.0, 0.0)));
+        for id in 1..8 {
+            world.take_slot(DroneId(id), &command(0.0, 0.0));
+        }
         world.advance();
         speeds.push(world.record().rows[0].velocity_mps[0]);
     }
-    let held = (HOLD_S / params().dt_s()).round() as usize;
+    let held = (COMMAND_HOLD_S / params().dt_s()).round() as usize;
     assert!(speeds[..held].is_sorted() && speeds[held] < speeds[held - 1] && speeds[199] == 0.0, "{speeds:?}");
     tick(&mut world, &command(1.0, 0.0));
     assert!(world.record().rows[0].velocity_mps[0] > 0.0);
 }
 
 #[test]
-fn frames_are_stamped_and_heard_in_the_next_tick() {
+fn frames_are_stamped_and_are_in_the_next_downlink() {
     let mut world = eight(params(), &[]);
     world.take_frames(DroneId(3), &[frame()]);
     world.take_frames(DroneId(1), &[frame(), frame()]);
@@ -139,7 +145,7 @@ fn frames_are_stamped_and_heard_in_the_next_tick() {
     world.take_frames(DroneId(1), &[frame()]);
     let heads = |frames: &[AirFrame]| frames.iter().map(|f| (f.tick, f.source.0, f.sequence)).collect::<Vec<_>>();
     assert_eq!(heads(&world.downlink().frames), [(0, 1, 0), (0, 1, 1), (0, 3, 0)]);
-    assert_eq!(world.downlink().frames[0].position(), starts(8)[1].0, "where it was when it sent");
+    assert_eq!(world.downlink().frames[0].position(), starts(8)[1].0, "the position is that of the sending");
     assert_eq!(world.downlink().head.frames, 3);
     world.advance();
     assert_eq!(heads(&world.downlink().frames), [(1, 1, 2)]);
@@ -147,7 +153,7 @@ fn frames_are_stamped_and_heard_in_the_next_tick() {
 }
 
 #[test]
-fn a_dead_drone_brakes_stays_and_says_nothing() {
+fn a_dead_drone_brakes_stays_and_sends_nothing() {
     let mut world = eight(WorldParams { timeout_s: 20.0, ..params() }, &[]);
     tick(&mut world, &Slot { flags: SLOT_LEADS, ..Slot::default() });
     world.mark_dead(DroneId(7), FaultKind::Kill, true, "SIGKILL");
@@ -182,24 +188,26 @@ fn dead_bodies_still_count_for_separation_until_they_have_landed() {
 }
 
 #[test]
-fn with_nobody_alive_the_mission_is_over() {
+fn without_living_drones_the_mission_is_over() {
     let mut world = eight(params(), &[]);
-    (0..8).for_each(|id| world.mark_dead(DroneId(id), FaultKind::Kill, false, "exit 1"));
+    for id in 0..8 {
+        world.mark_dead(DroneId(id), FaultKind::Kill, false, "exit 1");
+    }
     world.advance();
     assert_eq!(world.ended(), Some(Outcome::Timeout));
     world.finish(&LinkStats::default(), 0.0);
-    let Some(EventKind::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    let Some(EventKind::End { reason, .. }) = event_kinds(events(&world)).pop() else { panic!("no end") };
     assert_eq!(reason, "no drone is left alive");
 }
 
 #[test]
-fn a_held_formation_is_reached_and_told_in_a_last_record() {
+fn a_held_formation_ends_the_mission_with_a_last_record() {
     let end = End::Hold { stop_x_m: 15.0 };
     let mut world = eight(WorldParams { end, ..params() }, &[]);
     for _ in 0..50 {
         tick(&mut world, &Slot::default());
     }
-    // Each tick of braking takes 0.099 m/s: the 91st leaves less than 1 m/s.
+    // Each tick of braking takes away 0.099 m/s: after the 91st less than 1 m/s is left.
     while world.ended().is_none() {
         tick(&mut world, &command(-4.95, 0.0));
     }
@@ -208,42 +216,44 @@ fn a_held_formation_is_reached_and_told_in_a_last_record() {
     world.finish(&LinkStats::default(), 2.5);
     let record = world.record();
     assert_eq!((record.rows.len(), record.frames.len(), record.head.tick, record.head.digest), (0, 0, 140, digest));
-    let told = events(&world);
-    assert!((told[0].t_s - 2.82).abs() < 1e-9, "{told:?}");
-    let EventKind::End { outcome: Outcome::Reached, totals, .. } = &told[0].what else { panic!("{told:?}") };
+    let logged = events(&world);
+    assert!((logged[0].t_s - 2.82).abs() < 1e-9, "{logged:?}");
+    let EventKind::End { outcome: Outcome::Reached, totals, .. } = &logged[0].what else { panic!("{logged:?}") };
     assert_eq!(totals.wall_s, 2.5);
 }
 
 #[test]
-fn a_mission_can_be_stopped_once() {
+fn only_the_first_abort_counts() {
     let mut world = eight(params(), &[]);
     world.abort("SIGINT");
     world.abort("SIGTERM");
     assert_eq!(world.ended(), Some(Outcome::Aborted));
     world.finish(&LinkStats::default(), 0.0);
-    let Some(EventKind::End { reason, .. }) = happenings(events(&world)).pop() else { panic!("no end") };
+    let Some(EventKind::End { reason, .. }) = event_kinds(events(&world)).pop() else { panic!("no end") };
     assert_eq!(reason, "SIGINT");
 }
 
 #[test]
-fn obeying_backwards_is_unsafe_except_after_a_restart() {
+fn obeying_an_older_plan_is_unsafe_except_after_a_restart() {
     let obeys = |epoch| {
         let obeyed = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch };
         Slot { obeyed, part_hash: 1, ..Slot::default() }
     };
-    let told = |restarted: bool| {
+    let flown = |restarted: bool| {
         let mut world = eight(params(), &[]);
         tick(&mut world, &obeys(2));
         if restarted {
-            (0..8).for_each(|id| world.set_incarnation(DroneId(id), 2));
+            for id in 0..8 {
+                world.set_incarnation(DroneId(id), 2);
+            }
         }
-        let told = happenings(tick(&mut world, &obeys(1)));
+        let logged = event_kinds(tick(&mut world, &obeys(1)));
         assert_eq!(world.downlink().drones[0].incarnation, if restarted { 2 } else { 1 });
         fly(&mut world, &obeys(1));
-        (told, world.ended())
+        (logged, world.ended())
     };
-    assert_eq!(told(true), (vec![], Some(Outcome::Timeout)));
-    let (events, outcome) = told(false);
+    assert_eq!(flown(true), (vec![], Some(Outcome::Timeout)));
+    let (events, outcome) = flown(false);
     let back = |drone| EventKind::Violation {
         kind: ViolationKind::BallotWentBack,
         drones: vec![DroneId(drone)],
@@ -262,18 +272,20 @@ fn digest_with(change: impl Fn(&mut Slot)) -> u64 {
             change(&mut changed);
         }
         world.downlink();
-        // Against the order of ids, which must not matter.
-        (0..8).rev().for_each(|id| world.take_slot(DroneId(id), if id == 5 { &changed } else { &slot }));
+        // In the reverse order of ids, which must make no difference.
+        for id in (0..8).rev() {
+            world.take_slot(DroneId(id), if id == 5 { &changed } else { &slot });
+        }
         world.advance();
     }
     world.digest()
 }
 
 #[test]
-fn equal_runs_have_equal_digests_and_one_bit_makes_another() {
+fn equal_runs_have_equal_digests_and_one_bit_changes_them() {
     let plain = digest_with(|_| {});
     assert_eq!(plain, digest_with(|_| {}));
-    assert_eq!(plain, digest_with(|slot| slot.step_ns = 77), "wall time is no part of it");
+    assert_eq!(plain, digest_with(|slot| slot.step_ns = 77), "wall time is not in the digest");
     assert_ne!(plain, digest_with(|slot| slot.heard_hash ^= 1));
     assert_ne!(plain, digest_with(|slot| slot.heard += 1));
     assert_ne!(plain, digest_with(|slot| slot.dropped[4] += 1));
@@ -283,28 +295,30 @@ fn equal_runs_have_equal_digests_and_one_bit_makes_another() {
 }
 
 #[test]
-fn what_is_said_is_in_the_digest() {
-    let said = |kind, byte| {
+fn sent_frames_are_in_the_digest() {
+    let digest_of = |kind, byte| {
         let mut world = eight(params(), &[]);
         let mut frame = frame();
         (frame.kind, frame.len, frame.payload[5]) = (kind, 6, byte);
         world.downlink();
-        (0..8).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+        for id in 0..8 {
+            world.take_slot(DroneId(id), &Slot::default());
+        }
         world.take_frames(DroneId(3), &[frame]);
         world.advance();
         world.digest()
     };
-    assert_eq!(said(1, 7), said(1, 7));
-    assert_ne!(said(1, 7), said(1, 6));
-    assert_ne!(said(1, 7), said(2, 7));
+    assert_eq!(digest_of(1, 7), digest_of(1, 7));
+    assert_ne!(digest_of(1, 7), digest_of(1, 6));
+    assert_ne!(digest_of(1, 7), digest_of(2, 7));
 }
 
 #[test]
-fn a_swarm_of_a_thousand_is_sensed_and_kept_apart_by_the_grid() {
+fn the_grid_senses_and_checks_a_swarm_of_a_thousand() {
     let mut world = World::new(params(), &starts(1000), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap();
     tick(&mut world, &Slot::default());
     let front = world.downlink().drones[0];
-    // In a nested V of 35 m: two arms' next at 35 m, the next chevron's tip at 49.5 m, within 66 m.
+    // In a nested V of 35 m, within 66 m: the next drone of each arm at 35 m, and the tip of the next chevron at 49.5 m.
     assert_eq!(front.neighbour_count, 3);
     assert!((world.min_separation_m() - 35.0).abs() < 1e-6);
     assert_eq!(world.violations(), 0);

@@ -1,15 +1,15 @@
-//! When the events were that faults wait for: seen at the beginning of each tick.
+//! When the events happened that start faults.
 
-use super::FaultTrigger;
-use super::targets::Scene;
+use super::view::FaultView;
+use crate::fault_plan::FaultTrigger;
 use skein_protocol::slot::Slot;
 use skein_protocol::{Ballot, GroupId, Phase, PlanStamp, SimTime};
 
-/// What was seen of one obstacle set.
+/// When each event about one obstacle set happened.
 #[derive(Clone, Debug, Default)]
-struct Set {
+struct SetTimes {
     detected: Option<SimTime>,
-    /// What each drone obeyed then: no plan for this set.
+    /// What each drone obeyed at the detection. Those plans are not for this set.
     before: Vec<PlanStamp>,
     grouped: Option<SimTime>,
     queued: Option<SimTime>,
@@ -18,28 +18,28 @@ struct Set {
     reforming: Option<SimTime>,
 }
 
-/// All that was seen so far.
+/// When each event happened, as far as it has.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Moments {
-    sets: Vec<Set>,
-    /// What each drone leads.
+pub(crate) struct TriggerTimes {
+    sets: Vec<SetTimes>,
+    /// The group that each drone leads.
     leading: Vec<Option<(GroupId, Ballot)>>,
     elected: Vec<SimTime>,
     group_elected: Vec<SimTime>,
 }
 
-impl Moments {
-    /// Looks at the beginning of a tick.
-    pub fn observe(&mut self, now: SimTime, scene: &Scene<'_>) {
-        self.sets.resize_with(scene.stages.count(), Set::default);
+impl TriggerTimes {
+    /// Looks for events at the beginning of a tick.
+    pub(crate) fn observe(&mut self, now: SimTime, view: &FaultView<'_>) {
+        self.sets.resize_with(view.stages.count(), SetTimes::default);
         for (number, set) in self.sets.iter_mut().enumerate() {
-            set.observe(number, now, scene);
+            set.observe(number, now, view);
         }
-        self.observe_leaders(now, scene);
+        self.observe_leaders(now, view);
     }
 
-    /// When the event was, if it was.
-    pub fn of(&self, event: FaultTrigger, stage: usize) -> Option<SimTime> {
+    /// When the event happened; `None` if it has not.
+    pub(crate) fn of(&self, event: FaultTrigger, stage: usize) -> Option<SimTime> {
         let set = self.sets.get(stage);
         match event {
             FaultTrigger::Detected => set?.detected,
@@ -53,11 +53,11 @@ impl Moments {
         }
     }
 
-    fn observe_leaders(&mut self, now: SimTime, scene: &Scene<'_>) {
-        self.leading.resize(scene.bodies.len(), None);
+    fn observe_leaders(&mut self, now: SimTime, view: &FaultView<'_>) {
+        self.leading.resize(view.drones.bodies().len(), None);
         for (drone, before) in self.leading.iter_mut().enumerate() {
             let leads =
-                scene.answering(drone).and_then(|slot| (slot.leads()).then_some((slot.led, slot.obeyed.ballot)));
+                view.drones.answer(drone).and_then(|slot| slot.leads().then_some((slot.led, slot.obeyed.ballot)));
             if let Some((group, _)) = leads.filter(|_| *before != leads) {
                 self.elected.push(now);
                 self.group_elected.extend((group != GroupId::ALL).then_some(now));
@@ -67,12 +67,12 @@ impl Moments {
     }
 }
 
-impl Set {
-    fn observe(&mut self, number: usize, now: SimTime, scene: &Scene<'_>) {
-        let stages = scene.stages;
+impl SetTimes {
+    fn observe(&mut self, number: usize, now: SimTime, view: &FaultView<'_>) {
+        let stages = view.stages;
         if self.detected.is_none() && stages.is_detected(number) {
             self.detected = Some(now);
-            self.before = scene.processes.iter().map(|process| process.slot.obeyed).collect();
+            self.before = view.drones.processes().iter().map(|process| process.slot().obeyed).collect();
         }
         let gate_x_m = stages.centre_x_m(number);
         let note = |moment: &mut Option<SimTime>, happens: bool| {
@@ -80,10 +80,8 @@ impl Set {
                 *moment = Some(now);
             }
         };
-        let any = |holds: &dyn Fn(usize, &Slot) -> bool| {
-            (0..scene.bodies.len()).any(|drone| scene.answering(drone).is_some_and(|slot| holds(drone, slot)))
-        };
-        let past = |drone: usize| scene.bodies[drone].position.x >= gate_x_m;
+        let any = |holds: &dyn Fn(usize, &Slot) -> bool| view.drones.answers().any(|(drone, slot)| holds(drone, slot));
+        let past = |drone: usize| view.drones.bodies()[drone].position().x >= gate_x_m;
         if self.detected.is_some() {
             let avoids = |drone: usize, slot: &Slot| {
                 slot.phase() == Phase::Avoid && slot.obeyed != self.before[drone] && !past(drone)
@@ -92,7 +90,10 @@ impl Set {
             let queues = |drone: usize, slot: &Slot| slot.is_queued() && avoids(drone, slot);
             note(&mut self.queued, any(&queues));
         }
-        note(&mut self.gate, scene.bodies.iter().enumerate().any(|(drone, body)| body.alive && past(drone)));
+        note(
+            &mut self.gate,
+            view.drones.bodies().iter().enumerate().any(|(drone, body)| body.is_alive() && past(drone)),
+        );
         note(&mut self.passed, stages.is_passed(number));
         note(&mut self.reforming, any(&|drone, slot| past(drone) && slot.phase() == Phase::Reform));
     }

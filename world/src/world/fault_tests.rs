@@ -1,8 +1,8 @@
-//! Faults in whole worlds, flown by hand.
+//! Scheduled faults in whole worlds, flown by hand.
 
-use crate::faults::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, ProcessCommand, Wind};
+use crate::fault_plan::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, ProcessCommand, Wind};
 use crate::params::{Failsafe, WorldParams};
-use crate::testing::{command, events, happenings, params, rectangle, starts};
+use crate::testing::{command, event_kinds, events, params, rectangle, starts};
 use crate::world::World;
 use skein_protocol::record::{EventKind, FaultKind, ROW_ALIVE, ROW_FROZEN, RunEvent};
 use skein_protocol::slot::Slot;
@@ -16,18 +16,20 @@ fn world(effect: FaultEffect, time: FaultTime, for_s: f64, params: WorldParams) 
     World::new(WorldParams { faults, ..params }, &starts(8), &[rectangle(140.0, 0.0, 10.0, 5.0)]).unwrap()
 }
 
-/// Flies so many ticks; the orders and the events with the ticks in which they came.
+/// Flies this number of ticks. Gives the commands with their ticks, and the events.
 fn fly(world: &mut World, ticks: u64) -> (Vec<(u64, ProcessCommand)>, Vec<RunEvent>) {
-    let (mut orders, mut told) = (Vec::new(), Vec::new());
+    let (mut commands, mut flown) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
         let tick = world.tick();
-        orders.extend(world.process_commands().iter().map(|&order| (tick, order)));
+        commands.extend(world.process_commands().iter().map(|&command| (tick, command)));
         let drones = world.downlink().drones.len() as u32;
-        (0..drones).for_each(|id| world.take_slot(DroneId(id), &Slot::default()));
+        for id in 0..drones {
+            world.take_slot(DroneId(id), &Slot::default());
+        }
         world.advance();
-        told.extend(events(world));
+        flown.extend(events(world));
     }
-    (orders, told)
+    (commands, flown)
 }
 
 fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
@@ -40,16 +42,16 @@ fn fault_times(events: &[RunEvent]) -> Vec<(f64, bool)> {
 }
 
 #[test]
-fn a_kill_is_ordered_once_at_its_tick() {
+fn a_kill_is_commanded_once_at_its_tick() {
     let mut world = world(FaultEffect::Kill, FaultTime::At(1.0), f64::INFINITY, params());
-    let (orders, told) = fly(&mut world, 100);
-    assert_eq!(orders, [(50, ProcessCommand::Kill(ID))]);
-    assert_eq!(fault_times(&told), [(1.0, true)]);
+    let (commands, flown) = fly(&mut world, 100);
+    assert_eq!(commands, [(50, ProcessCommand::Kill(ID))]);
+    assert_eq!(fault_times(&flown), [(1.0, true)]);
     assert!(!world.is_alive(ID));
 }
 
 #[test]
-fn a_frozen_drone_holds_and_flies_on_later() {
+fn a_frozen_drone_hovers_and_flies_on_later() {
     let land = WorldParams { failsafe: Failsafe::Land, ..params() };
     let mut world = world(FaultEffect::Freeze, FaultTime::At(1.0), 3.0, land);
     fly(&mut world, 190);
@@ -57,10 +59,10 @@ fn a_frozen_drone_holds_and_flies_on_later() {
     assert!(world.is_frozen(ID) && world.is_alive(ID));
     assert_eq!((row.velocity_mps, row.flags & (ROW_ALIVE | ROW_FROZEN)), ([0.0, 0.0], ROW_ALIVE | ROW_FROZEN));
     let other = world.record().rows[2];
-    assert!(row.energy_j > other.energy_j, "hovering costs more than cruising, and is counted");
-    let (orders, told) = fly(&mut world, 30);
-    assert_eq!(orders, [(200, ProcessCommand::Resume(ID))]);
-    assert_eq!(fault_times(&told), [(4.0, false)]);
+    assert!(row.energy_j > other.energy_j, "hovering takes more power than cruising, and is counted");
+    let (commands, flown) = fly(&mut world, 30);
+    assert_eq!(commands, [(200, ProcessCommand::Resume(ID))]);
+    assert_eq!(fault_times(&flown), [(4.0, false)]);
     world.process_commands();
     world.downlink();
     world.take_slot(ID, &command(1.0, 0.0));
@@ -75,16 +77,16 @@ fn a_frozen_drone_that_is_killed_is_not_resumed() {
     fly(&mut world, 60);
     world.mark_dead(ID, FaultKind::Kill, false, "");
     assert!(!world.is_frozen(ID));
-    let (orders, told) = fly(&mut world, 100);
-    assert_eq!((orders, fault_times(&told)), (vec![], vec![]));
+    let (commands, flown) = fly(&mut world, 100);
+    assert_eq!((commands, fault_times(&flown)), (vec![], vec![]));
 }
 
 #[test]
 fn a_restarted_drone_has_the_next_incarnation() {
     let mut world = world(FaultEffect::Restart, FaultTime::At(1.0), 2.0, params());
-    let (orders, told) = fly(&mut world, 151);
-    assert_eq!(orders, [(50, ProcessCommand::Kill(ID)), (150, ProcessCommand::Restart(ID, 2))]);
-    assert_eq!(fault_times(&told), [(1.0, true), (3.0, false)]);
+    let (commands, flown) = fly(&mut world, 151);
+    assert_eq!(commands, [(50, ProcessCommand::Kill(ID)), (150, ProcessCommand::Restart(ID, 2))]);
+    assert_eq!(fault_times(&flown), [(1.0, true), (3.0, false)]);
     assert!(world.is_alive(ID));
     assert_eq!(world.incarnation(ID), Some(2));
     let head = world.downlink().drones[ID.index()];
@@ -92,35 +94,35 @@ fn a_restarted_drone_has_the_next_incarnation() {
 }
 
 #[test]
-fn who_has_landed_is_not_started_again() {
+fn a_landed_drone_is_not_started_again() {
     let land = WorldParams { failsafe: Failsafe::Land, timeout_s: 60.0, ..params() };
     let mut world = world(FaultEffect::Restart, FaultTime::At(0.0), 14.0, land);
-    let (orders, _) = fly(&mut world, 800);
-    assert_eq!(orders, [(0, ProcessCommand::Kill(ID))]);
+    let (commands, _) = fly(&mut world, 800);
+    assert_eq!(commands, [(0, ProcessCommand::Kill(ID))]);
     assert!(!world.is_alive(ID));
 }
 
 #[test]
-fn a_swarm_that_is_restarted_is_not_given_up() {
+fn a_swarm_that_awaits_a_restart_does_not_end_the_mission() {
     let targets = FaultTargets::All;
     let fault = Fault { effect: FaultEffect::Restart, time: FaultTime::At(1.0), targets, for_s: 1.0 };
     let faults = FaultPlan { seed: 1, faults: vec![fault] };
     let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &[]).unwrap();
-    let (orders, _) = fly(&mut world, 120);
-    assert_eq!((orders.len(), world.ended()), (16, None));
+    let (commands, _) = fly(&mut world, 120);
+    assert_eq!((commands.len(), world.ended()), (16, None));
 }
 
 #[test]
-fn who_is_blind_detects_nothing() {
-    // The front, drone 0, comes into range at 1.5 s; the next two 2.47 s later.
+fn a_blind_drone_detects_nothing() {
+    // Drone 0 at the front comes into range at 1.5 s, the next two 2.47 s later.
     let blind = FaultEffect::Blind { obstacles: true, ranging: true };
     let fault =
         Fault { effect: blind, time: FaultTime::At(0.0), targets: FaultTargets::Drones(vec![DroneId(0)]), for_s: 60.0 };
     let faults = FaultPlan { seed: 1, faults: vec![fault] };
     let shape = [rectangle(140.0, 0.0, 10.0, 5.0)];
     let mut world = World::new(WorldParams { faults, ..params() }, &starts(8), &shape).unwrap();
-    let (_, told) = fly(&mut world, 300);
-    let detected = happenings(told).into_iter().find_map(|what| match what {
+    let (_, flown) = fly(&mut world, 300);
+    let detected = event_kinds(flown).into_iter().find_map(|what| match what {
         EventKind::Detected { drone, .. } => Some(drone),
         _ => None,
     });
@@ -134,14 +136,14 @@ fn who_is_blind_detects_nothing() {
 fn a_fault_on_detection_begins_in_the_tick_that_detects() {
     let time = FaultTime::On { event: FaultTrigger::Detected, stage: 0, after_s: 0.0 };
     let mut world = world(FaultEffect::Slow(0.4), time, 1.0, params());
-    let (_, told) = fly(&mut world, 80);
-    let detected = told.iter().find(|event| matches!(event.what, EventKind::Detected { .. })).unwrap();
-    assert_eq!(fault_times(&told), [(detected.t_s, true)]);
+    let (_, flown) = fly(&mut world, 80);
+    let detected = flown.iter().find(|event| matches!(event.what, EventKind::Detected { .. })).unwrap();
+    assert_eq!(fault_times(&flown), [(detected.t_s, true)]);
     assert_eq!(world.downlink().drones[ID.index()].extra_reaction_s, 0.4);
 }
 
 #[test]
-fn wind_blows_those_that_fly() {
+fn wind_accelerates_its_targets_alone() {
     let wind = Wind { acceleration_mps2: Vec2::new(0.0, 1.0), gust_mps2: 0.0, gust_s: 1.0 };
     let mut world = world(FaultEffect::Wind(wind), FaultTime::At(0.0), 1.0, params());
     fly(&mut world, 100);
@@ -151,7 +153,7 @@ fn wind_blows_those_that_fly() {
 }
 
 #[test]
-fn frames_carry_their_senders_radio() {
+fn frames_carry_the_link_faults_of_their_sender() {
     let mut world = world(FaultEffect::Mute, FaultTime::At(0.0), 1.0, params());
     world.downlink();
     let passed = skein_protocol::payload::Passed {

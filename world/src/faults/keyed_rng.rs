@@ -1,20 +1,20 @@
-//! Chance by key: what is drawn depends on the seed and the key alone, never on who asks first. Sums, shifts and
-//! products only, so that no bit depends on a platform's logarithm.
+//! Random numbers by key: a draw depends on the seed and the key alone, not on the order of the draws. The generator uses
+//! sums, shifts and products only, so that no bit depends on a platform's logarithm.
 
 use skein_protocol::Vec2;
 use skein_protocol::digest::Digest;
 
-/// Numbers that belong to one key (SplitMix64).
-pub(crate) struct Chance(u64);
+/// The random numbers of one key (SplitMix64).
+pub(crate) struct KeyedRng(u64);
 
-impl Chance {
-    /// Of a seed and a key.
-    pub fn new(seed: u64, key: [u64; 3]) -> Self {
+impl KeyedRng {
+    /// The generator of a seed and a key.
+    pub(crate) fn new(seed: u64, key: [u64; 3]) -> Self {
         let mut digest = Digest::default();
         digest.word(seed);
-        key.into_iter().for_each(|word| {
+        for word in key {
             digest.word(word);
-        });
+        }
         Self(digest.value())
     }
 
@@ -25,19 +25,19 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// One of so many, from 0; 0 of none.
-    pub fn one_of(&mut self, count: usize) -> usize {
-        // Its bias, count/2⁶⁴, is beyond measure.
+    /// A uniform number from 0 to `count` − 1; 0 if `count` is 0.
+    pub(crate) fn one_of(&mut self, count: usize) -> usize {
+        // The bias, count/2⁶⁴, is too small to measure.
         ((u128::from(self.next()) * count as u128) >> 64) as usize
     }
 
-    /// Normal with standard deviation 1, as the sum of twelve uniform numbers: within ±6.
+    /// A normal number with standard deviation 1, as the sum of twelve uniform numbers. It is within ±6.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| (self.next() >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0
     }
 
-    /// Both coordinates normal with this standard deviation.
-    pub fn vector(&mut self, std: f64) -> Vec2 {
+    /// A vector whose coordinates are normal with this standard deviation.
+    pub(crate) fn vector(&mut self, std: f64) -> Vec2 {
         Vec2::new(self.normal(), self.normal()) * std
     }
 }
@@ -47,8 +47,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn normal_numbers_have_mean_and_deviation() {
-        let drawn: Vec<f64> = (0..20_000).map(|i| Chance::new(7, [1, 2, i]).vector(3.0).x).collect();
+    fn normal_numbers_have_mean_0_and_the_given_deviation() {
+        let drawn: Vec<f64> = (0..20_000).map(|i| KeyedRng::new(7, [1, 2, i]).vector(3.0).x).collect();
         let mean = drawn.iter().sum::<f64>() / 20_000.0;
         let std = (drawn.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 20_000.0).sqrt();
         // Five standard errors: 3/√n, and 3/√(2n).
@@ -57,17 +57,19 @@ mod tests {
     }
 
     #[test]
-    fn everybody_is_chosen_as_often() {
+    fn every_choice_is_equally_frequent() {
         let mut counts = [0; 5];
-        (0..10_000).for_each(|i| counts[Chance::new(3, [i, 0, 0]).one_of(5)] += 1);
+        for i in 0..10_000 {
+            counts[KeyedRng::new(3, [i, 0, 0]).one_of(5)] += 1;
+        }
         // Five standard deviations of a binomial with p = 0.2, n = 10 000.
         assert!(counts.iter().all(|&count: &i32| (count - 2000).abs() < 200), "{counts:?}");
-        assert_eq!(Chance::new(3, [0; 3]).one_of(0), 0);
+        assert_eq!(KeyedRng::new(3, [0; 3]).one_of(0), 0);
     }
 
     #[test]
-    fn a_key_is_a_key() {
-        let draw = |seed, key| Chance::new(seed, key).vector(1.0);
+    fn equal_keys_draw_equal_numbers() {
+        let draw = |seed, key| KeyedRng::new(seed, key).vector(1.0);
         assert_eq!(draw(1, [1, 2, 3]), draw(1, [1, 2, 3]));
         assert!([draw(2, [1, 2, 3]), draw(1, [2, 1, 3]), draw(1, [1, 2, 4])].iter().all(|v| *v != draw(1, [1, 2, 3])));
     }

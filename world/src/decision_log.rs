@@ -1,5 +1,6 @@
-//! Who leads and what leaders decided, told when it is first seen.
+//! Who leads and what leaders decided, logged when the world first sees it.
 
+use crate::event_log::EventLog;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
@@ -8,19 +9,20 @@ use skein_protocol::slot::Slot;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
 use std::collections::BTreeSet;
 
-use crate::log::Log;
-
-/// What has been told of one drone as a leader: of its latest plan alone, since plans are superseded, not revived.
+/// What has been logged about one drone as a leader. Only its latest plan counts: a superseded plan never comes back.
 #[derive(Clone, Debug, Default)]
-struct Told {
+struct LoggedLeader {
+    /// The group it leads, and the ballot of its term.
     leading: Option<(GroupId, Ballot)>,
     plan: PlanStamp,
+    /// Whether the grouping of the plan has been logged.
     grouping: bool,
+    /// The drones whose assignments of the plan have been logged.
     assigned: BTreeSet<DroneId>,
 }
 
-impl Told {
-    /// Whether `plan` is the latest one or later; a later one takes its place.
+impl LoggedLeader {
+    /// Whether `plan` is the latest plan. A later one becomes the latest.
     fn is_current(&mut self, plan: PlanStamp) -> bool {
         if plan > self.plan {
             self.plan = plan;
@@ -31,25 +33,25 @@ impl Told {
     }
 }
 
-/// What has been told of every drone as a leader.
+/// What has been logged about every drone as a leader.
 #[derive(Clone, Debug)]
-pub(crate) struct Decisions(Vec<Told>);
+pub(crate) struct DecisionLog(Vec<LoggedLeader>);
 
-impl Decisions {
-    /// For so many drones.
-    pub fn new(drones: usize) -> Self {
-        Self(vec![Told::default(); drones])
+impl DecisionLog {
+    /// Nothing logged yet, for this number of drones.
+    pub(crate) fn new(drones: usize) -> Self {
+        Self(vec![LoggedLeader::default(); drones])
     }
 
-    /// Forgets a drone whose process is gone: what the next one says is new. That it leads no more is not told, the
-    /// fault is.
-    pub fn forget(&mut self, drone: DroneId) {
-        self.0[drone.index()] = Told::default();
+    /// Forgets a drone whose process is gone: everything that its next process says is new. The end of its leadership is
+    /// not logged, because the fault is.
+    pub(crate) fn forget(&mut self, drone: DroneId) {
+        self.0[drone.index()] = LoggedLeader::default();
     }
 
-    /// Tells that a drone takes up or lays down leading.
-    pub fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut Log) {
-        let leads = (slot.leads()).then_some((slot.led, slot.term));
+    /// Logs that a drone begins or stops leading.
+    pub(crate) fn follow_slot(&mut self, drone: DroneId, slot: &Slot, at: SimTime, log: &mut EventLog) {
+        let leads = slot.leads().then_some((slot.led, slot.term));
         let before = std::mem::replace(&mut self.0[drone.index()].leading, leads);
         if before == leads {
             return;
@@ -61,29 +63,29 @@ impl Decisions {
         }
     }
 
-    /// Tells a plan or an assignment that is on the air for the first time.
-    pub fn follow_frame(&mut self, sent: &AirFrame, at: SimTime, log: &mut Log) {
+    /// Logs a plan or an assignment that is sent for the first time.
+    pub(crate) fn follow_frame(&mut self, sent: &AirFrame, at: SimTime, log: &mut EventLog) {
         if ![Topic::Plan as u16, Topic::Assignment as u16].contains(&sent.frame.kind) {
             return;
         }
         match Message::decode(&sent.frame) {
             Ok(Message::Plan(plan)) => self.follow_plan(&plan, at, log),
             Ok(Message::Assignment(part)) => self.follow_assignment(&part, at, log),
-            _ => {} // Malformed: its receivers count it.
+            _ => {} // The frame is malformed. Its receivers count it.
         }
     }
 
-    fn follow_plan(&mut self, plan: &Plan, at: SimTime, log: &mut Log) {
-        let Some(told) = self.0.get_mut(plan.id.ballot.claimant.index()) else { return };
-        if told.is_current(plan.id) && !std::mem::replace(&mut told.grouping, true) {
+    fn follow_plan(&mut self, plan: &Plan, at: SimTime, log: &mut EventLog) {
+        let Some(logged) = self.0.get_mut(plan.id.ballot.claimant.index()) else { return };
+        if logged.is_current(plan.id) && !std::mem::replace(&mut logged.grouping, true) {
             log.push(at, grouping(plan));
         }
     }
 
-    fn follow_assignment(&mut self, part: &Assignment, at: SimTime, log: &mut Log) {
+    fn follow_assignment(&mut self, part: &Assignment, at: SimTime, log: &mut EventLog) {
         let drones = self.0.len();
-        let Some(told) = self.0.get_mut(part.id.ballot.claimant.index()) else { return };
-        if part.drone.index() < drones && told.is_current(part.id) && told.assigned.insert(part.drone) {
+        let Some(logged) = self.0.get_mut(part.id.ballot.claimant.index()) else { return };
+        if part.drone.index() < drones && logged.is_current(part.id) && logged.assigned.insert(part.drone) {
             log.push(at, assigned(part));
         }
     }
@@ -116,8 +118,8 @@ fn assigned(part: &Assignment) -> EventKind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::tests::read;
-    use crate::testing::happenings;
+    use crate::event_log::tests::read;
+    use crate::testing::event_kinds;
     use skein_protocol::payload::MAX_SET;
     use skein_protocol::slot::SLOT_LEADS;
     use skein_protocol::{ObstacleId, Phase};
@@ -174,16 +176,18 @@ mod tests {
         }))
     }
 
-    fn told(frames: &[AirFrame]) -> Vec<EventKind> {
-        let (mut decisions, mut log) = (Decisions::new(8), Log::default());
-        frames.iter().for_each(|frame| decisions.follow_frame(frame, SimTime::ZERO, &mut log));
-        happenings(read(&mut log))
+    fn logged(frames: &[AirFrame]) -> Vec<EventKind> {
+        let (mut decisions, mut log) = (DecisionLog::new(8), EventLog::default());
+        for frame in frames {
+            decisions.follow_frame(frame, SimTime::ZERO, &mut log);
+        }
+        event_kinds(read(&mut log))
     }
 
     #[test]
-    fn repeated_plans_and_assignments_are_told_once() {
+    fn repeated_plans_and_assignments_are_logged_once() {
         let (first, second) = (stamp(1, 1), stamp(1, 2));
-        let events = told(&[
+        let events = logged(&[
             assignment(first, 5, 1),
             plan(first, Phase::Avoid),
             plan(first, Phase::Avoid),
@@ -202,16 +206,16 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_is_no_decision() {
-        let mut cut = plan(stamp(1, 1), Phase::Avoid);
-        cut.frame.len = 3;
+    fn malformed_and_foreign_frames_are_no_decisions() {
+        let mut malformed = plan(stamp(1, 1), Phase::Avoid);
+        malformed.frame.len = 3;
         let stranger = PlanStamp { ballot: Ballot { claimant: DroneId(99), ..stamp(1, 1).ballot }, epoch: 1 };
-        assert_eq!(told(&[cut, plan(stranger, Phase::Avoid), assignment(stamp(1, 1), 99, 0)]), []);
+        assert_eq!(logged(&[malformed, plan(stranger, Phase::Avoid), assignment(stamp(1, 1), 99, 0)]), []);
     }
 
     #[test]
-    fn leading_is_told_when_it_begins_changes_and_ends() {
-        let (mut decisions, mut log) = (Decisions::new(8), Log::default());
+    fn leadership_is_logged_when_it_begins_changes_and_ends() {
+        let (mut decisions, mut log) = (DecisionLog::new(8), EventLog::default());
         let leads = Slot { flags: SLOT_LEADS, term: stamp(1, 1).ballot, obeyed: stamp(1, 1), ..Slot::default() };
         let next_plan = Slot { obeyed: stamp(1, 2), ..leads };
         let next_term = Slot { term: stamp(2, 1).ballot, ..leads };
@@ -224,6 +228,6 @@ mod tests {
             leader: DroneId(2),
             leads,
         };
-        assert_eq!(happenings(read(&mut log)), [event(1, true), event(1, false), event(2, true), event(2, false)]);
+        assert_eq!(event_kinds(read(&mut log)), [event(1, true), event(1, false), event(2, true), event(2, false)]);
     }
 }

@@ -1,0 +1,62 @@
+//! Decides when the mission is over, and how it ended.
+
+use crate::body::Body;
+use crate::end_condition::EndCondition;
+use crate::params::WorldParams;
+use crate::stages::Stages;
+use skein_protocol::SimTime;
+use skein_protocol::record::Outcome;
+
+/// What the judge looks at, at the end of a tick.
+#[derive(Clone, Copy)]
+pub(crate) struct MissionState<'a> {
+    /// The bodies, by id.
+    pub(crate) bodies: &'a [Body],
+    /// The obstacle sets.
+    pub(crate) stages: &'a Stages,
+    /// The time of the tick's end.
+    pub(crate) end: SimTime,
+    /// Whether a dead drone will get a new process.
+    pub(crate) awaits_restarts: bool,
+    /// Violations of invariants so far.
+    pub(crate) violations: u64,
+}
+
+/// How the mission ended, once it has.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MissionJudge {
+    condition: EndCondition,
+    end: Option<(Outcome, String)>,
+}
+
+impl MissionJudge {
+    /// The outcome; `None` while the mission goes on.
+    pub(crate) fn outcome(&self) -> Option<Outcome> {
+        self.end.as_ref().map(|(outcome, _)| *outcome)
+    }
+
+    /// The outcome with its reason. A mission that goes on is aborted with this reason.
+    pub(crate) fn abort(&mut self, reason: &str) -> (Outcome, String) {
+        self.end.get_or_insert_with(|| (Outcome::Aborted, reason.to_owned())).clone()
+    }
+
+    /// Ends the mission if its end condition is met, no drone is left, or its time is over.
+    pub(crate) fn judge(&mut self, params: &WorldParams, state: MissionState<'_>) {
+        if self.end.is_some() {
+            return;
+        }
+        let (outcome, reason) = if self.condition.is_met(params, state.bodies, state.stages) {
+            (Outcome::Reached, "the end condition is met".to_owned())
+        } else if !state.bodies.iter().any(Body::is_alive) && !state.awaits_restarts {
+            (Outcome::Timeout, "no drone is left alive".to_owned())
+        } else if state.end >= SimTime::from_secs(params.timeout_s) {
+            (Outcome::Timeout, format!("the time of {} s is over", params.timeout_s))
+        } else {
+            return;
+        };
+        self.end = Some(match state.violations {
+            0 => (outcome, reason),
+            count => (Outcome::Unsafe, format!("{reason}, but invariants were broken {count} times")),
+        });
+    }
+}

@@ -1,0 +1,62 @@
+//! The digest of a mission: a hash over every tick's states, answers and frames, bit by bit.
+
+use crate::drones::DroneTable;
+use skein_protocol::Tick;
+use skein_protocol::digest::Digest;
+use skein_protocol::frame::AirFrame;
+use skein_protocol::radio::DropReason;
+
+/// This number of drop counters is in every digest. The number of duplicates and the later drop counters are in it only
+/// if they are not 0, so that a mission without them keeps the digest it had before those counters existed.
+const ALWAYS_FOLDED: usize = DropReason::Queue as usize;
+
+/// The digest so far.
+#[derive(Clone, Default)]
+pub(crate) struct TickDigest {
+    digest: Digest,
+    /// The words of one tick, in reused memory.
+    words: Vec<u8>,
+}
+
+impl TickDigest {
+    /// The digest over all ticks folded so far.
+    pub(crate) fn value(&self) -> u64 {
+        self.digest.value()
+    }
+
+    /// Folds one tick: its number, every drone's state and what it received, and the frames that were sent.
+    pub(crate) fn fold(&mut self, tick: Tick, drones: &DroneTable, frames: &[AirFrame]) {
+        self.words.clear();
+        self.word(tick);
+        for (body, process) in drones.bodies().iter().zip(drones.processes()) {
+            let (position, velocity) = (body.position(), body.velocity());
+            for value in [position.x, position.y, velocity.x, velocity.y, body.energy_j()] {
+                self.word(value.to_bits());
+            }
+            self.word(u64::from(body.is_alive()));
+            if body.is_alive() {
+                let slot = process.slot();
+                self.word(u64::from(slot.heard));
+                for &count in &slot.dropped[..ALWAYS_FOLDED] {
+                    self.word(u64::from(count));
+                }
+                self.word(slot.heard_hash);
+                let later = std::iter::once(&slot.duplicates).chain(&slot.dropped[ALWAYS_FOLDED..]);
+                for (&count, which) in later.zip(1u64..).filter(|(count, _)| **count > 0) {
+                    self.word(which << 32 | u64::from(count));
+                }
+            }
+        }
+        self.digest.bytes(&self.words);
+        // Each frame is folded once here, not once per receiver: the hashes above say who received which frame.
+        for AirFrame { source, sequence, frame, .. } in frames {
+            let len = frame.payload.len().min(frame.len as usize);
+            self.digest.word(u64::from(source.0) << 32 | u64::from(*sequence)).word(u64::from(frame.kind));
+            self.digest.bytes(&frame.payload[..len]);
+        }
+    }
+
+    fn word(&mut self, value: u64) {
+        self.words.extend_from_slice(&value.to_le_bytes());
+    }
+}

@@ -1,0 +1,32 @@
+//! Every tuned number of this crate, with its unit, how it was found, and the command that finds it again.
+
+/// How long a drone that sends no command keeps its last one, s. After that its autopilot brakes until the next command.
+///
+/// Chosen by hand, shorter than the time after which autopilots give up an offboard computer: a command here is an
+/// acceleration. Check it with `skein run FILE --clock wall` on a loaded machine and read the deadline misses.
+pub(crate) const COMMAND_HOLD_S: f64 = 0.2;
+
+/// Highest speed of a drone in a formation that counts as held, m/s.
+///
+/// Chosen by hand: a tenth of the paper's cruise speed. `skein reproduce` shows the mission times that follow from it.
+pub(crate) const HOLD_SPEED_MPS: f64 = 1.0;
+
+/// Altitude from which a drone without a process lands, m. Chosen by hand; no command measures it.
+pub(crate) const FLIGHT_ALTITUDE_M: f64 = 20.0;
+
+/// Speed at which a landing drone descends, m/s. Chosen by hand; no command measures it.
+pub(crate) const DESCENT_MPS: f64 = 2.0;
+
+/// Up to this number of bodies, comparing every pair is faster than filling a grid.
+///
+/// Chosen by hand. It changes the time of a step and nothing else: `skein bench runtime --drones 8,64` measures it.
+pub(crate) const PAIRWISE_MAX_BODIES: usize = 64;
+
+/// Number of plans per drone whose assignments are remembered.
+///
+/// Chosen by hand: more than a restarted drone can still receive.
+pub(crate) const PLANS_KEPT: usize = 16;
+
+/// Tolerance for rounding when distances are checked, m. It is no softer limit. Chosen by hand, far above the rounding
+/// error of coordinates within 10⁶ m and far below any distance that matters.
+pub(crate) const ROUNDING_M: f64 = 1e-6;
