@@ -2,9 +2,9 @@
 
 use std::env;
 
-/// At a fixed address. Every drone is a process, and tables of addresses that have to be fitted to where each process
-/// happens to lie cost each of them a quarter of a MiB of its own, time to start, and cold memory in every tick; a fixed
-/// one they all share.
+/// Links the program at a fixed address. With a position-independent executable, every drone process relocates its own copy of
+/// the address tables. That costs a quarter of a MiB per process, start-up time, and cold memory in every tick. At a fixed
+/// address all processes share these pages.
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let target = |key: &str| env::var(format!("CARGO_CFG_TARGET_{key}"));

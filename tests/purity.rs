@@ -10,7 +10,7 @@ use std::process::Command;
 const PURE: [&str; 5] = ["protocol", "leader", "agent", "world", "scenario"];
 
 /// The workspace packages that each package may depend on.
-const DIRECTIONS: [(&str, &[&str]); 9] = [
+const DIRECTIONS: [(&str, &[&str]); 12] = [
     ("skein-protocol", &[]),
     ("skein-leader", &["skein-protocol"]),
     ("skein-agent", &["skein-leader", "skein-protocol"]),
@@ -31,6 +31,15 @@ const DIRECTIONS: [(&str, &[&str]); 9] = [
         ],
     ),
     (
+        "skein-sweep",
+        &["skein-protocol", "skein-leader", "skein-scenario", "skein-bus", "skein-report", "skein-runtime"],
+    ),
+    ("skein-reproduce", &["skein-protocol", "skein-scenario", "skein-report", "skein-runtime", "skein-sweep"]),
+    (
+        "skein-bench",
+        &["skein-protocol", "skein-leader", "skein-scenario", "skein-bus", "skein-report", "skein-runtime"],
+    ),
+    (
         "skein",
         &[
             "skein-protocol",
@@ -41,6 +50,9 @@ const DIRECTIONS: [(&str, &[&str]); 9] = [
             "skein-bus",
             "skein-report",
             "skein-runtime",
+            "skein-sweep",
+            "skein-reproduce",
+            "skein-bench",
         ],
     ),
 ];

@@ -123,8 +123,8 @@ fn the_bench_prints_each_case_and_its_ratio_to_the_baseline() {
         assert!(block[key].as_f64().unwrap() > 0.0, "{key}: {block}");
     }
     let ratios = bench["ratios"].as_array().unwrap();
-    let floor = ratios.iter().filter(|ratio| ratio["to"] == "floor").count();
-    assert_eq!((ratios.len(), floor), (6, 3), "{ratios:?}");
+    let baseline = ratios.iter().filter(|ratio| ratio["to"] == "baseline").count();
+    assert_eq!((ratios.len(), baseline), (6, 3), "{ratios:?}");
     for part in ["radio", "grouping", "sense", "record"] {
         let done = place.run(&["bench", part, "--drones", "8", "--rounds", "1", "--json"]);
         let figures: Value = serde_json::from_str(&done.stdout).unwrap();

@@ -1,4 +1,4 @@
-//! `skein check`: validates a scenario and prints the plan; starts nothing.
+//! `skein check`: validates a scenario and prints the plan, without starting anything.
 
 use crate::cli::CheckArgs;
 use crate::exit::{Exit, Failure};
@@ -7,8 +7,8 @@ use serde_json::json;
 use skein_runtime::{mission, run_facts};
 use std::io::Write;
 
-/// Prints processes, services and routes.
-pub fn check(args: &CheckArgs) -> Result<Exit, Failure> {
+/// Prints the processes, services and routes of a mission.
+pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
     let scenario = input::scenario(&args.scenario)?;
     let sets = run_facts::obstacle_sets(&scenario).map_err(Failure::usage)?;
     let drones = mission::drones(&scenario);
@@ -30,7 +30,7 @@ pub fn check(args: &CheckArgs) -> Result<Exit, Failure> {
         let mut text = format!("{}: valid, {} with seed {}\n", scenario.name, scenario.strategy, scenario.seed);
         text += &format!("processes  launcher, world, {drones} drones\n");
         text += &format!("services   {}\n", services(shards).join(", "));
-        text += &format!("ticks      {} s each, {} s at most\n", scenario.time.dt_s, scenario.time.timeout_s);
+        text += &format!("ticks      {} s each, for {} s at most\n", scenario.time.dt_s, scenario.time.timeout_s);
         for (number, set) in sets.iter().enumerate() {
             let ids: Vec<String> = set.obstacles.iter().map(|id| id.0.to_string()).collect();
             let ids = ids.join(", ");

@@ -5,7 +5,7 @@ use skein_bus::{PinMode, WaitMode};
 use skein_runtime::{Clock, PilotKind};
 use std::path::PathBuf;
 
-/// Skein: a swarm runtime in which every drone is a process of its own.
+/// Skein: a swarm runtime in which every drone is a process
 #[derive(Debug, Parser)]
 #[command(
     name = "skein",
@@ -17,24 +17,24 @@ use std::path::PathBuf;
   skein check my-scenario.toml --set formation.drones=12
 
 Exit codes: 0 goal reached, 1 not reached, 2 bad usage or scenario, 3 environment failed,
-4 invariant broken, 130/143 interrupted."
+4 invariant broken, 130/143 interrupted by SIGINT/SIGTERM."
 )]
-pub struct Cli {
+pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
-    /// Fly one mission: one world process, one process a drone
+pub(crate) enum Command {
+    /// Fly one mission: one world process and one process per drone
     Run(RunArgs),
-    /// Check a scenario and print what would be started; starts nothing
+    /// Check a scenario and print what would be started, without starting it
     Check(CheckArgs),
-    /// Fly a grid of missions side by side, resumable: CSV, JSON and plots with 95 % intervals
+    /// Fly a grid of missions side by side; write CSV, JSON and plots with 95 % intervals; resumable
     Sweep(crate::sweep::SweepArgs),
-    /// Fly the paper: every table and figure, ours beside the published, in one report
+    /// Reproduce the paper's tables and figures, with the published numbers beside ours, in one report
     Reproduce(crate::reproduce::ReproduceArgs),
     /// Print the TOML of a random scene
     Scene(crate::sweep::SceneArgs),
@@ -46,85 +46,85 @@ pub enum Command {
     View(crate::view::ViewArgs),
     /// Watch the running swarms in the terminal
     Top(crate::top::TopArgs),
-    /// Tap what a running swarm says: list, echo, hz
+    /// Print the messages of a running swarm: list, echo, hz
     Topic(crate::topic::TopicArgs),
-    /// Measure: the runtime against its floors, its parts, failover
+    /// Benchmark the runtime
     Bench {
-        /// What is measured.
+        /// Which benchmark.
         #[command(subcommand)]
         of: Option<crate::bench::BenchCommand>,
     },
-    /// Say what of this machine limits a swarm
+    /// Show which limits of this machine restrict the size of a swarm
     Doctor(crate::doctor::DoctorArgs),
-    /// Remove what dead runs left behind
+    /// Remove the files that dead runs left behind
     Clean,
     /// Print a JSON schema
     Schema {
-        /// Of what.
+        /// What the schema describes
         of: SchemaOf,
     },
     /// Print shell completions
     Completions {
-        /// For which shell.
+        /// Shell that uses them
         shell: clap_complete::Shell,
     },
     /// Print the manual page
     Man,
-    /// The world's process; started by `run`
+    /// The world process; started by `run`
     #[command(hide = true)]
     World(WorldArgs),
-    /// A drone's process; started by `run`
+    /// A drone process; started by `run`
     #[command(hide = true)]
     Drone(DroneArgs),
-    /// A peer of the bench's floors
+    /// A peer process of the benchmark's baseline; started by `bench`
     #[command(hide = true)]
-    FloorPeer(crate::bench::FloorArgs),
+    BaselinePeer(skein_bench::runtime::BaselinePeer),
 }
 
-/// What schemas there are.
+/// The schemas.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum SchemaOf {
-    /// summary.json.
+pub(crate) enum SchemaOf {
+    /// summary.json
     Summary,
-    /// Scenario files.
+    /// Scenario files
     Scenario,
 }
 
-/// A scenario and what is changed of it.
+/// A scenario and its changes.
 #[derive(Debug, Args)]
-pub struct ScenarioArgs {
+pub(crate) struct ScenarioArgs {
     /// Scenario file (TOML)
-    pub scenario: PathBuf,
-    /// How drones are grouped: congestion-aware, congestion-aware-paper, shortest-path or
-    /// fixed:L/R
+    pub(crate) scenario: PathBuf,
+    /// How drones choose routes: congestion-aware, congestion-aware-paper, shortest-path or
+    /// fixed:L/R (number of drones to the left and to the right)
     #[arg(long, value_name = "STRATEGY")]
-    pub strategy: Option<String>,
+    pub(crate) strategy: Option<String>,
     /// Seed of everything random
     #[arg(long, value_name = "N")]
-    pub seed: Option<String>,
+    pub(crate) seed: Option<String>,
     /// Override a scenario key, such as radio.delay_s=0.1; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
-    pub overrides: Vec<(String, String)>,
+    pub(crate) overrides: Vec<(String, String)>,
 }
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  skein check scenarios/paper/s1-left.toml --set drone.safe_distance_m=30")]
-pub struct CheckArgs {
+pub(crate) struct CheckArgs {
     /// The scenario.
     #[command(flatten)]
-    pub scenario: ScenarioArgs,
+    pub(crate) scenario: ScenarioArgs,
     /// Print the plan as one JSON object
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  skein report runs/s2-right-1")]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// Folder of a recorded run
-    pub run_dir: PathBuf,
+    pub(crate) run_dir: PathBuf,
 }
 
 /// Arguments of `run`.
@@ -134,59 +134,59 @@ pub struct ReportArgs {
   skein run scenarios/paper/s2-right.toml --strategy fixed:4/4 --seed 7 --out /tmp/four-four
   skein run scenarios/paper/s1-left.toml --set radio.delay_s=0.1 --set radio.loss=0.2 --json
   skein run scenarios/paper/s1-left.toml --clock realtime:2")]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// The scenario.
     #[command(flatten)]
-    pub scenario: ScenarioArgs,
-    /// Processes (the product) or all in this one
+    pub(crate) scenario: ScenarioArgs,
+    /// Fly in processes, or inline in this one
     #[arg(long, value_enum, default_value_t)]
-    pub runtime: RuntimeChoice,
-    /// lockstep, realtime or realtime:SPEED
+    pub(crate) runtime: RuntimeChoice,
+    /// What paces the ticks: lockstep, realtime or realtime:SPEED
     #[arg(long, default_value = "lockstep", value_name = "CLOCK")]
-    pub clock: Clock,
-    /// Folder for the run; an existing one is refused [default: runs/<scenario>-<number>]
+    pub(crate) clock: Clock,
+    /// Folder of the run; an existing one is refused [default: runs/<scenario>-<number>]
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Replace the run in an existing --out folder
     #[arg(long, requires = "out")]
-    pub force: bool,
+    pub(crate) force: bool,
     /// Print the summary as one JSON object
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
     /// Print nothing but errors
     #[arg(long)]
-    pub quiet: bool,
-    /// Write no trace, events, recording, plots and report
+    pub(crate) quiet: bool,
+    /// Write no trace, events, recording, plots or report
     #[arg(long)]
-    pub no_record: bool,
-    /// Keep each process to one core
+    pub(crate) no_record: bool,
+    /// Pin each process to one core
     #[arg(long, value_enum, default_value_t)]
-    pub pin: PinChoice,
-    /// How processes wait for each other: block sleeps; yield is faster on a quiet machine, ruinous on a busy one
+    pub(crate) pin: PinChoice,
+    /// How processes wait for each other: yield is faster on an idle machine and much slower on a busy one
     #[arg(long, value_enum, default_value_t)]
-    pub wait: WaitChoice,
-    /// Drones that share a process; the digest stays the same
+    pub(crate) wait: WaitChoice,
+    /// Drones per process; the digest does not depend on it
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub drones_per_process: u32,
+    pub(crate) drones_per_process: u32,
 }
 
 /// Which runtime.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum RuntimeChoice {
-    /// A process for the world and one for each drone.
+pub(crate) enum RuntimeChoice {
+    /// One process for the world and one for each drone
     #[default]
     Processes,
-    /// Function calls in one thread.
+    /// Function calls in one thread
     Inline,
 }
 
-/// Whether to pin.
+/// Whether processes are pinned to cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PinChoice {
-    /// Drone i to core i modulo the number of cores.
+pub(crate) enum PinChoice {
+    /// Drone i to core i modulo the number of cores
     #[default]
     Auto,
-    /// Wherever the system puts them.
+    /// The operating system decides
     Off,
 }
 
@@ -199,13 +199,13 @@ impl From<PinChoice> for PinMode {
     }
 }
 
-/// How to wait.
+/// How processes wait for each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum WaitChoice {
-    /// Sleep.
+pub(crate) enum WaitChoice {
+    /// Sleep until woken
     #[default]
     Block,
-    /// Yield.
+    /// Look again and again, and yield the core in between
     Yield,
 }
 
@@ -218,64 +218,64 @@ impl From<WaitChoice> for WaitMode {
     }
 }
 
-/// What every child process is told.
+/// Arguments of every child process.
 #[derive(Debug, Args)]
-pub struct ChildArgs {
+pub(crate) struct ChildArgs {
     /// Folder of the run's domain.
     #[arg(long)]
-    pub domain: PathBuf,
+    pub(crate) domain: PathBuf,
     /// Descriptor of the control segment.
     #[arg(long)]
-    pub control: i32,
+    pub(crate) control: i32,
     /// Process id of the launcher.
     #[arg(long)]
-    pub parent: u32,
-    /// Whether to keep to one core.
+    pub(crate) parent: u32,
+    /// Whether the process is pinned to a core.
     #[arg(long, value_enum)]
-    pub pin: PinChoice,
+    pub(crate) pin: PinChoice,
 }
 
 /// Arguments of `world`.
 #[derive(Debug, Args)]
-pub struct WorldArgs {
-    /// As for every child.
+pub(crate) struct WorldArgs {
+    /// The arguments of every child process.
     #[command(flatten)]
-    pub child: ChildArgs,
+    pub(crate) child: ChildArgs,
     /// What paces the ticks.
     #[arg(long)]
-    pub clock: Clock,
+    pub(crate) clock: Clock,
 }
 
 /// Arguments of `drone`.
 #[derive(Debug, Args)]
-pub struct DroneArgs {
-    /// As for every child.
+pub(crate) struct DroneArgs {
+    /// The arguments of every child process.
     #[command(flatten)]
-    pub child: ChildArgs,
-    /// What flies it.
+    pub(crate) child: ChildArgs,
+    /// The pilot.
     #[arg(long, value_enum, default_value_t)]
-    pub pilot: PilotChoice,
-    /// Its number, or that of the first one in this process.
+    pub(crate) pilot: PilotChoice,
+    /// Number of the drone, or of the first drone in this process.
     #[arg(long)]
-    pub id: u32,
-    /// Drones in this process.
+    pub(crate) id: u32,
+    /// Number of drones in this process.
     #[arg(long)]
-    pub count: u32,
-    /// Which start of this drone it is, from 1.
+    pub(crate) count: u32,
+    /// Number of this start of the drone, from 1.
     #[arg(long)]
-    pub incarnation: u32,
-    /// The first tick it answers.
+    pub(crate) incarnation: u32,
+    /// First tick that it answers.
     #[arg(long)]
-    pub first_tick: u64,
+    pub(crate) first_tick: u64,
 }
 
-/// What flies a drone.
+/// The pilots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PilotChoice {
+pub(crate) enum PilotChoice {
     /// The paper's pilot.
     #[default]
     Swarm,
-    /// The trivial one.
+    /// A pilot that only sends beacons.
     Beacon,
 }
 
@@ -288,10 +288,15 @@ impl From<PilotChoice> for PilotKind {
     }
 }
 
-/// `KEY.PATH=VALUE`, of `--set`.
-pub fn key_value(text: &str) -> Result<(String, String), String> {
+/// Parses `KEY.PATH=VALUE`, the value of `--set`.
+pub(crate) fn key_value(text: &str) -> Result<(String, String), ArgumentError> {
     match text.split_once('=') {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
-        _ => Err("expected key.path=value".to_owned()),
+        _ => Err(ArgumentError("expected key.path=value")),
     }
 }
+
+/// Why an argument is refused.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct ArgumentError(pub &'static str);

@@ -1,4 +1,4 @@
-//! `skein doctor`: what of this machine limits a swarm, and how many drones fit.
+//! `skein doctor`: shows which limits of this machine restrict a swarm, and how many drones fit.
 
 use crate::exit::{Exit, Failure};
 use clap::Args;
@@ -12,37 +12,37 @@ use std::io::Write;
 #[command(after_help = "Examples:
   skein doctor
   skein doctor --json")]
-pub struct DoctorArgs {
+pub(crate) struct DoctorArgs {
     /// Print one JSON object
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
-/// Memory that a drone takes, its shared memory aside, bytes: 2.3 to 2.9 MiB of its own process (proportional set size)
-/// and 0.35 MiB of the world's, measured with 8, 64 and 200 drones.
+/// Memory per drone without shared memory, bytes: 2.3 to 2.9 MiB in its own process (proportional set size) and 0.35 MiB in
+/// the world's, measured with 8, 64 and 200 drones by `skein bench runtime`.
 const DRONE_BYTES: u64 = 7 << 19;
-/// Its share of shared memory, bytes: 76 to 86 KiB.
+/// Shared memory per drone, bytes. Measured: 76 to 86 KiB.
 const DRONE_SHARED: u64 = 1 << 17;
-/// Descriptors of the process that has most of them, the world, for each drone: 4.1.
+/// Descriptors per drone in the world process, which has the most. Measured: 4.1.
 const DRONE_FILES: u64 = 5;
-/// Descriptors of a process beside.
+/// Further descriptors of a process.
 const OTHER_FILES: u64 = 64;
-/// Processes of a run that are no drones.
+/// Processes of a run besides the drones: launcher and world.
 const OTHER_PROCESSES: u64 = 2;
 
-/// One limit.
+/// A limit of the machine.
 struct Limit {
     name: &'static str,
     /// What the machine has.
     has: String,
-    /// Drones that it allows; `None`: it limits speed, not number.
+    /// Number of drones that it allows; `None` if it limits the speed only.
     drones: Option<u64>,
     /// What to do about it.
     hint: &'static str,
 }
 
-/// Prints limits and what follows from them.
-pub fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
+/// Prints the limits and the number of drones that fit.
+pub(crate) fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
     let limits = [files(), processes(), memory(), shared_memory()?, cores()?, governor()];
     let fits = limits.iter().filter_map(|limit| limit.drones).min().unwrap_or(0);
     let mut out = std::io::stdout().lock();
@@ -56,7 +56,7 @@ pub fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
     } else {
         let tight = limits.iter().find(|limit| limit.drones == Some(fits));
         let first = tight.map_or(String::new(), |limit| format!(", limited by {}: {}", limit.name, limit.hint));
-        let mut text = format!("some {fits} drones fit{first}\n\n");
+        let mut text = format!("about {fits} drones fit{first}\n\n");
         for limit in &limits {
             let drones = limit.drones.map_or("-".to_owned(), |drones| drones.to_string());
             text += &format!("  {:<15}{:<42}{drones:>9}  {}\n", limit.name, limit.has, limit.hint);
@@ -66,14 +66,14 @@ pub fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
     Ok(Exit::Reached)
 }
 
-/// Refuses a swarm that the machine has no room for, `per_process` drones a process, before anything is started.
-pub fn check_room(drones: u32, per_process: u32) -> Result<(), Failure> {
+/// Refuses a swarm that does not fit on this machine with `per_process` drones per process.
+pub(crate) fn check_room(drones: u32, per_process: u32) -> Result<(), Failure> {
     let pack = u64::from(per_process);
     for (limit, pack) in [(files(), pack), (processes(), pack), (memory(), 1), (shared_memory()?, 1)] {
         let fits = limit.drones.unwrap_or(u64::MAX).saturating_mul(pack);
         if u64::from(drones) > fits {
             let Limit { name, has, hint, .. } = limit;
-            let share = if pack > 1 { "" } else { ", or put several in a process (--drones-per-process)" };
+            let share = if pack > 1 { "" } else { ", or put several drones into a process (--drones-per-process)" };
             let why = format!("{drones} drones do not fit, {fits} do: {name} ({has}); see {hint}{share}");
             return Err(Failure::environment(why));
         }
@@ -87,7 +87,7 @@ fn files() -> Limit {
     let show = |value: Option<u64>| value.map_or("unlimited".to_owned(), |value| value.to_string());
     Limit {
         name: "open files",
-        has: format!("{} a process, raised to {}", show(limit.current), show(limit.maximum)),
+        has: format!("{} per process, raised to {}", show(limit.current), show(limit.maximum)),
         drones: Some(most.saturating_sub(OTHER_FILES) / DRONE_FILES),
         hint: "`ulimit -Hn`, LimitNOFILE=",
     }
@@ -104,7 +104,7 @@ fn processes() -> Limit {
     let taken = number("/sys/fs/cgroup/pids.current").unwrap_or(0);
     Limit {
         name: "processes",
-        has: format!("{least}, {taken} of them taken"),
+        has: format!("{least}, {taken} of them in use"),
         drones: Some(least.saturating_sub(taken + OTHER_PROCESSES)),
         hint: "`ulimit -u`, pids.max of the control group",
     }
@@ -124,7 +124,7 @@ fn memory() -> Limit {
         name: "memory",
         has: format!("{} MiB free of {} MiB", free >> 20, all >> 20),
         drones: Some(free / (DRONE_BYTES + DRONE_SHARED)),
-        hint: "close what else runs",
+        hint: "close other programs",
     }
 }
 
@@ -147,13 +147,13 @@ fn cores() -> Result<Limit, Failure> {
         name: "cores",
         has: format!("{cores} allowed, load {load}"),
         drones: None,
-        hint: "more drones than cores fly slower, not worse",
+        hint: "more drones than cores: slower, same result",
     })
 }
 
 fn governor() -> Limit {
     let governor = fs::read_to_string("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
-    let has = governor.map_or("unknown (a virtual machine has none)".to_owned(), |text| text.trim().to_owned());
+    let has = governor.map_or("unknown (virtual machines have none)".to_owned(), |text| text.trim().to_owned());
     let hint = if has == "powersave" { "cpupower frequency-set -g performance" } else { "performance is fastest" };
     Limit { name: "governor", has, drones: None, hint }
 }

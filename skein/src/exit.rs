@@ -1,4 +1,4 @@
-//! Every exit code, and what leads to it.
+//! The exit codes.
 //!
 //! | code | when |
 //! |---|---|
@@ -9,24 +9,24 @@
 //! | 4 | an invariant was broken |
 //! | 130, 143 | interrupted by SIGINT or SIGTERM, after a clean shutdown |
 //!
-//! Where several hold: 130 and 143 before 3, before 4, before 1.
+//! If several apply: 130 and 143 come before 3, 3 before 4, 4 before 1.
 
 use std::process::ExitCode;
 
 /// An exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Exit {
-    /// 0.
+pub(crate) enum Exit {
+    /// 0: the goal was reached.
     Reached,
-    /// 1.
+    /// 1: the goal was not reached.
     NotReached,
-    /// 2.
+    /// 2: bad usage or a bad scenario.
     Usage,
-    /// 3.
+    /// 3: the environment failed.
     Environment,
-    /// 4.
+    /// 4: an invariant was broken.
     Unsafe,
-    /// 128 and the signal's number.
+    /// 128 plus the number of the signal that interrupted it.
     Interrupted(i32),
 }
 
@@ -43,11 +43,11 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Why a command ends early: a message for people, and an exit code.
-pub struct Failure {
-    /// The code.
-    pub exit: Exit,
-    /// What to show.
+/// Why a command failed: an exit code and a message.
+pub(crate) struct Failure {
+    /// The exit code.
+    pub(crate) exit: Exit,
+    /// The message.
     report: Report,
 }
 
@@ -57,23 +57,23 @@ enum Report {
 }
 
 impl Failure {
-    /// Bad usage or bad input.
-    pub fn usage(message: impl std::fmt::Display) -> Self {
+    /// A failure because of bad usage or bad input.
+    pub(crate) fn usage(message: impl std::fmt::Display) -> Self {
         Self { exit: Exit::Usage, report: Report::Text(message.to_string()) }
     }
 
-    /// The environment failed.
-    pub fn environment(message: impl std::fmt::Display) -> Self {
+    /// A failure of the environment.
+    pub(crate) fn environment(message: impl std::fmt::Display) -> Self {
         Self { exit: Exit::Environment, report: Report::Text(message.to_string()) }
     }
 
-    /// Bad input that can be shown in its place.
-    pub fn diagnostic(diagnostic: impl miette::Diagnostic + Send + Sync + 'static) -> Self {
+    /// A failure because of bad input, which can be shown in its file.
+    pub(crate) fn diagnostic(diagnostic: impl miette::Diagnostic + Send + Sync + 'static) -> Self {
         Self { exit: Exit::Usage, report: Report::Diagnostic(Box::new(diagnostic)) }
     }
 
-    /// Shows it on stderr: with the place in the file on a terminal, else one line an error.
-    pub fn print(&self) {
+    /// Prints the message to stderr. On a terminal it shows the place in the file; otherwise one line per error.
+    pub(crate) fn print(&self) {
         use std::io::IsTerminal;
         match &self.report {
             Report::Text(text) => eprintln!("skein: {text}"),

@@ -1,16 +1,16 @@
-//! SIGINT and SIGTERM, noted and asked for.
+//! SIGINT and SIGTERM: they set a flag that commands look at.
 
 use crate::exit::Failure;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The first signal that came in.
-pub struct Interrupt(Arc<AtomicUsize>);
+/// The last of these signals that came in.
+pub(crate) struct Interrupt(Arc<AtomicUsize>);
 
 impl Interrupt {
-    /// Takes SIGINT and SIGTERM over from the system.
-    pub fn watch() -> Result<Self, Failure> {
+    /// Replaces the default handling of SIGINT and SIGTERM, which ends the process.
+    pub(crate) fn watch() -> Result<Self, Failure> {
         let noted = Arc::new(AtomicUsize::new(0));
         for signal in [SIGINT, SIGTERM] {
             signal_hook::flag::register_usize(signal, Arc::clone(&noted), signal.unsigned_abs() as usize)
@@ -19,8 +19,8 @@ impl Interrupt {
         Ok(Self(noted))
     }
 
-    /// Its number.
-    pub fn signal(&self) -> Option<i32> {
+    /// The signal's number; `None` if none came in.
+    pub(crate) fn signal(&self) -> Option<i32> {
         i32::try_from(self.0.load(Ordering::Relaxed)).ok().filter(|&signal| signal != 0)
     }
 }

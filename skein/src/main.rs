@@ -1,11 +1,11 @@
-//! The `skein` binary: it parses, calls and prints.
+//! The `skein` binary: parses the command line, calls the libraries and prints.
 
 mod bench;
 mod check;
+mod clean;
 mod cli;
 mod doctor;
 mod exit;
-mod housekeeping;
 mod input;
 mod interrupt;
 mod progress;
@@ -29,7 +29,7 @@ fn main() -> std::process::ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // clap knows where help and where errors go; a closed pipe is no reason to fail.
+            // clap prints help to stdout and errors to stderr. A closed pipe is not an error.
             let _ = error.print();
             return if error.use_stderr() { Exit::Usage.into() } else { Exit::Reached.into() };
         }
@@ -58,17 +58,17 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Topic(args) => topic::topic(&args),
         Command::Bench { of } => bench::bench(of.as_ref()),
         Command::Doctor(args) => doctor::doctor(&args),
-        Command::Clean => housekeeping::clean(),
+        Command::Clean => clean::clean(),
         Command::Schema { of } => schema::schema(of),
         Command::Completions { shell } => schema::completions(shell),
         Command::Man => schema::man(),
         Command::World(args) => roles::world(&args),
         Command::Drone(args) => roles::drone(&args),
-        Command::FloorPeer(args) => bench::peer(&args),
+        Command::BaselinePeer(args) => bench::peer(&args),
     }
 }
 
-/// Logs go to stderr, warnings and worse unless `SKEIN_LOG` says otherwise; coloured on a terminal.
+/// Logs to stderr: warnings and errors, unless `SKEIN_LOG` sets another filter. Coloured on a terminal.
 fn start_logging() {
     use std::io::IsTerminal;
     use tracing_subscriber::EnvFilter;

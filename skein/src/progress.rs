@@ -1,38 +1,34 @@
-//! A progress bar on a terminal, in front of the recorder.
+//! Progress bars on stderr, if it is a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
+use skein_sweep::Progress;
 use std::io::IsTerminal;
+use std::time::Duration;
 
-/// Ticks between two looks at the bar.
+/// Ticks between two updates of the bar.
 const STRIDE: u64 = 64;
 
-/// Hands records on and shows how far the mission is.
-pub struct Progress<S> {
+/// Forwards records and shows how far the mission is.
+pub(crate) struct MissionBar<S> {
     inner: S,
     bar: ProgressBar,
 }
 
-impl<S: RecordSink> Progress<S> {
-    /// A bar up to the mission's time-out, unless `quiet` or stderr is no terminal.
-    pub fn new(inner: S, quiet: bool, ticks: u64) -> Self {
-        let bar =
-            if quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(ticks) };
-        let template = "{spinner} {msg} {wide_bar} {per_sec}, at most {eta} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        Self { inner, bar }
+impl<S: RecordSink> MissionBar<S> {
+    /// A bar up to the mission's time-out. It is hidden if `quiet` or if stderr is not a terminal.
+    pub(crate) fn new(inner: S, quiet: bool, ticks: u64) -> Self {
+        Self { inner, bar: bar(quiet, ticks, "{spinner} {msg} {wide_bar} {per_sec}, at most {eta} left") }
     }
 
-    /// Takes the bar off the screen and gives the recorder back.
-    pub fn finish(self) -> S {
+    /// Removes the bar from the screen and returns the recorder.
+    pub(crate) fn finish(self) -> S {
         self.bar.finish_and_clear();
         self.inner
     }
 }
 
-impl<S: RecordSink> RecordSink for Progress<S> {
+impl<S: RecordSink> RecordSink for MissionBar<S> {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         if record.head.tick.is_multiple_of(STRIDE) {
             self.bar.set_position(record.head.tick);
@@ -44,4 +40,46 @@ impl<S: RecordSink> RecordSink for Progress<S> {
     fn ready(&self) -> bool {
         self.inner.ready()
     }
+}
+
+/// Shows how many of several runs are done.
+pub(crate) struct RunsBar {
+    quiet: bool,
+    bar: Option<ProgressBar>,
+}
+
+impl RunsBar {
+    /// A bar that appears with the first progress. It is hidden if `quiet` or if stderr is not a terminal.
+    pub(crate) fn new(quiet: bool) -> Self {
+        Self { quiet, bar: None }
+    }
+
+    /// Shows the progress. Runs that are done at the first call do not count for the speed.
+    pub(crate) fn show(&mut self, progress: Progress) {
+        let (done, runs) = (progress.done as u64, progress.runs as u64);
+        let quiet = self.quiet;
+        let new = || {
+            let bar = bar(quiet, runs, "{spinner} {pos} of {len} runs {wide_bar} {per_sec}, {eta} left");
+            bar.with_position(done).with_elapsed(Duration::ZERO)
+        };
+        let bar = self.bar.get_or_insert_with(new);
+        bar.set_position(done);
+        bar.tick();
+    }
+
+    /// Removes the bar from the screen.
+    pub(crate) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn bar(quiet: bool, length: u64, template: &str) -> ProgressBar {
+    let hidden = quiet || !std::io::stderr().is_terminal();
+    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(length) };
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar
 }

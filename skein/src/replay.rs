@@ -19,20 +19,20 @@ use std::path::PathBuf;
   skein replay runs/s2-right-1
   skein replay runs/s2-right-1 --runtime inline --json
 
-Exit codes: 0 the digests are equal, 1 they differ, 2 not a recorded run, 3 the environment failed.")]
-pub struct ReplayArgs {
+Exit codes: 0 the digests are equal, 1 they differ, 2 the folder is not a recorded run, 3 the environment failed.")]
+pub(crate) struct ReplayArgs {
     /// Folder of a recorded run
-    pub run_dir: PathBuf,
-    /// Fly it in this runtime [default: the recorded run's]; the digest is the same in both
+    pub(crate) run_dir: PathBuf,
+    /// Runtime to fly in; the digest does not depend on it [default: the recorded run's]
     #[arg(long, value_enum)]
-    pub runtime: Option<RuntimeChoice>,
+    pub(crate) runtime: Option<RuntimeChoice>,
     /// Print one JSON object
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
-/// Flies the run again, in lockstep, and writes nothing.
-pub fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
+/// Flies the run again in lockstep, and compares the digests. Writes nothing.
+pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
     let folder = RunFolder::open(&args.run_dir).map_err(Failure::usage)?;
     let manifest = folder.read_manifest().map_err(Failure::usage)?;
     let recorded = folder.read_summary().map_err(Failure::usage)?;
@@ -85,11 +85,11 @@ fn fly(
     supervisor::run(launch, recorder)
 }
 
-/// What made the recorded run one that its scenario alone does not give again.
+/// Why the recorded run cannot be repeated from its scenario alone.
 fn reasons(recorded: &Summary) -> Vec<String> {
-    let unasked = recorded.faults.iter().filter(|fault| !fault.scheduled).count();
+    let unscheduled = recorded.faults.iter().filter(|fault| !fault.scheduled).count();
     let reasons = [
-        (unasked > 0).then(|| format!("{unasked} faults of it were not in its scenario")),
+        (unscheduled > 0).then(|| format!("{unscheduled} of its faults were not in its scenario")),
         (recorded.deadline_misses > 0).then(|| format!("{} deadlines were missed", recorded.deadline_misses)),
         (recorded.outcome == Outcome::Aborted).then(|| "it was aborted".to_owned()),
     ];
@@ -109,10 +109,10 @@ fn print(args: &ReplayArgs, recorded: &Summary, flown: &Summary, equal: bool) {
             json!({ "equal": equal, "recorded": was, "replayed": is, "ticks": ticks, "reasons": reasons })
         )
     } else {
-        let verdict = if equal { "equal" } else { "different" };
+        let result = if equal { "equal" } else { "different" };
         let why = if reasons.is_empty() { String::new() } else { format!("\nbecause   {}", reasons.join("; ")) };
         let (was, is) = (was.unwrap_or("none"), is.unwrap_or("none"));
         let (before, after) = (recorded.ticks, flown.ticks);
-        writeln!(out, "{verdict}\nrecorded  {was} after {before} ticks\nreplayed  {is} after {after} ticks{why}")
+        writeln!(out, "{result}\nrecorded  {was} after {before} ticks\nreplayed  {is} after {after} ticks{why}")
     };
 }

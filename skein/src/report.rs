@@ -1,12 +1,12 @@
-//! `skein report`: report.html and the plots of a recorded run, and its summary.
+//! `skein report`: writes report.html and the plots of a recorded run, and prints its summary.
 
 use crate::cli::ReportArgs;
 use crate::exit::{Exit, Failure};
 use skein_report::{RunFolder, page, text};
 use std::io::{IsTerminal, Write};
 
-/// Writes report.html and the plots anew and prints the summary.
-pub fn report(args: &ReportArgs) -> Result<Exit, Failure> {
+/// Writes report.html and the plots again, and prints the summary.
+pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     let folder = RunFolder::open(&args.run_dir).map_err(Failure::usage)?;
     let manifest = folder.read_manifest().map_err(Failure::usage)?;
     let summary = folder.read_summary().map_err(Failure::usage)?;

@@ -5,14 +5,14 @@ use crate::exit::{Exit, Failure};
 use skein_protocol::DroneId;
 use skein_runtime::{ChildArgs, DroneRange, drone_process, world_process};
 
-/// Runs the world.
-pub fn world(args: &WorldArgs) -> Result<Exit, Failure> {
+/// Runs the world process.
+pub(crate) fn world(args: &WorldArgs) -> Result<Exit, Failure> {
     let run = world_process::run(&child(&args.child), args.clock);
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("world: {error}")))
 }
 
-/// Runs one drone.
-pub fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
+/// Runs a drone process, which may carry several drones.
+pub(crate) fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
     let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
     let range = DroneRange { first: DroneId(id), count, incarnation, first_tick };
     let run = drone_process::run(&child(&args.child), range, args.pilot.into());

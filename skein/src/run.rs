@@ -5,7 +5,7 @@ use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
+use crate::progress::MissionBar;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};
 use skein_runtime::run_facts::run_facts;
@@ -15,8 +15,8 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::time::Instant;
 
-/// Flies the mission, writes its folder, prints its summary.
-pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
+/// Flies the mission, writes its folder and prints its summary.
+pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let started = Instant::now();
     let scenario = input::scenario(&args.scenario)?;
     check_packing(args, &scenario)?;
@@ -36,7 +36,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         false => Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?,
     };
     let ticks = (scenario.time.timeout_s / scenario.time.dt_s).ceil() as u64;
-    let mut sink = Progress::new(recorder, args.quiet || args.json, ticks);
+    let mut sink = MissionBar::new(recorder, args.quiet || args.json, ticks);
     let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
@@ -45,7 +45,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if let (None, Some(signal)) = (&summary.reason, end.signal) {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
-    // A report that cannot be written does not cost the summary.
+    // The summary is written even if the report cannot be written.
     let reported = if args.no_record { Ok(Vec::new()) } else { page::write(&folder, &manifest, &summary) };
     summary.report_s = Some(reporting.elapsed().as_secs_f64());
     folder.write_summary(&summary).map_err(Failure::environment)?;
@@ -58,12 +58,12 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     Ok(exit(&end, trouble.is_some(), &summary))
 }
 
-/// A fault that ends or stops one drone's process would take along whoever is in it.
+/// Refuses process faults if drones share processes: the fault would hit all drones of the process.
 fn check_packing(args: &RunArgs, scenario: &Scenario) -> Result<(), Failure> {
     use skein_scenario::FaultKind::{Freeze, Kill, Restart};
     let of_process = |fault: &skein_scenario::Fault| [Kill, Freeze, Restart].contains(&fault.kind);
     if args.drones_per_process > 1 && scenario.fault_plan.iter().any(of_process) {
-        let why = "the scenario kills, freezes or restarts processes, and each drone must have one of its own for that";
+        let why = "the scenario kills, freezes or restarts drones, which needs one process per drone";
         return Err(Failure::usage(format!("--drones-per-process {}: {why}", args.drones_per_process)));
     }
     Ok(())
@@ -81,8 +81,8 @@ fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure
     })
 }
 
-/// Writes what was ordered into the run's folder.
-pub fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> {
+/// Writes the manifest, which says what is flown, into the run's folder.
+fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> {
     let resolved = serde_json::to_value(scenario).map_err(Failure::environment)?;
     let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
     let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);

@@ -6,7 +6,7 @@ use clap::CommandFactory;
 use std::io::Write;
 
 /// Prints a JSON schema.
-pub fn schema(of: SchemaOf) -> Result<Exit, Failure> {
+pub(crate) fn schema(of: SchemaOf) -> Result<Exit, Failure> {
     let schema = match of {
         SchemaOf::Summary => skein_report::schema_summary(),
         SchemaOf::Scenario => skein_scenario::schema(),
@@ -16,14 +16,14 @@ pub fn schema(of: SchemaOf) -> Result<Exit, Failure> {
 }
 
 /// Prints completions for a shell.
-pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
+pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "skein", &mut text);
     print(&text)
 }
 
 /// Prints the manual page.
-pub fn man() -> Result<Exit, Failure> {
+pub(crate) fn man() -> Result<Exit, Failure> {
     let mut text = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut text).map_err(Failure::environment)?;
     print(&text)

@@ -1,8 +1,8 @@
-//! `skein topic`: taps what a running swarm says.
+//! `skein topic`: prints the messages, senses and records of a running swarm.
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::tap::{Running, Tap, nobody, running};
+use crate::tap::{RunningSwarm, SwarmTap, no_swarm, running};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use skein_bus::BusError;
@@ -15,9 +15,9 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// Between two looks.
-const LOOK: Duration = Duration::from_millis(1);
-/// Between two looks whether the swarm still lives.
+/// Time between two looks for new samples.
+const POLL: Duration = Duration::from_millis(1);
+/// Time between two checks whether the swarm still runs.
 const ALIVE: Duration = Duration::from_millis(500);
 /// Wall time over which `hz` counts.
 const WINDOW: Duration = Duration::from_secs(1);
@@ -29,53 +29,53 @@ const WINDOW: Duration = Duration::from_secs(1);
   skein topic echo air --kind plan
   skein topic echo senses --drone 3 --count 1
   skein topic hz air")]
-pub struct TopicArgs {
+pub(crate) struct TopicArgs {
     /// What to do.
     #[command(subcommand)]
-    pub action: Action,
-    /// The swarm whose name begins so, as `skein top` shows it; without it, the first one
+    pub(crate) action: Action,
+    /// Use the swarm whose name begins with NAME, as shown by `skein top` [default: the first one]
     #[arg(long, global = true, value_name = "NAME")]
-    pub run: Option<String>,
+    pub(crate) run: Option<String>,
 }
 
 /// What to do with a topic.
 #[derive(Debug, Subcommand)]
-pub enum Action {
+pub(crate) enum Action {
     /// Print the topics of the running swarms
     List,
-    /// Print what is said, a JSON object a line, until the swarm or the count ends
+    /// Print each message as one line of JSON, until the swarm ends or --count is reached
     Echo(Filter),
-    /// Print once a second how often something is said, a JSON object a line
+    /// Print the message rate once per second, as one line of JSON
     Hz(Filter),
 }
 
 /// Which messages.
 #[derive(Debug, Args)]
-pub struct Filter {
-    /// senses, air (as the drones get it), uplink (as the drones send it) or record
+pub(crate) struct Filter {
+    /// senses, air (frames that the world passes on), uplink (frames that drones send) or record
     #[arg(value_enum)]
-    pub topic: Name,
-    /// Only of this drone
+    pub(crate) topic: Name,
+    /// Only messages of this drone
     #[arg(long, value_name = "ID")]
-    pub drone: Option<u32>,
-    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed
+    pub(crate) drone: Option<u32>,
+    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed, arrivals
     #[arg(long, value_parser = kind)]
-    pub kind: Option<String>,
-    /// End after so many lines
+    pub(crate) kind: Option<String>,
+    /// Stop after N lines
     #[arg(long, value_name = "N")]
-    pub count: Option<u64>,
+    pub(crate) count: Option<u64>,
 }
 
 /// The topics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Name {
-    /// What each drone senses of itself and around it.
+pub(crate) enum Name {
+    /// What each drone senses: its own state, neighbours, obstacles
     Senses,
-    /// Frames on the air.
+    /// Frames that the world passes on to the drones
     Air,
-    /// Frames that drones hand to their radios.
+    /// Frames that drones send
     Uplink,
-    /// The truth, a row a drone.
+    /// The true state of each drone
     Record,
 }
 
@@ -88,12 +88,12 @@ impl Name {
     ];
 }
 
-fn kind(text: &str) -> Result<String, String> {
+fn kind(text: &str) -> Result<String, KindError> {
     let known: Vec<String> = Topic::ALL.iter().map(|topic| name(*topic as u16)).collect();
     if known.iter().any(|name| name == text) {
         Ok(text.to_owned())
     } else {
-        Err(format!("one of {}", known.join(", ")))
+        Err(KindError { expected: known.join(", ") })
     }
 }
 
@@ -102,10 +102,17 @@ fn name(kind: u16) -> String {
     topic.and_then(|topic| topic.as_str().map(str::to_owned)).unwrap_or_else(|| "unknown".to_owned())
 }
 
-/// Lists or listens.
-pub fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
+/// Why a kind of frame is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("expected one of {expected}")]
+struct KindError {
+    expected: String,
+}
+
+/// Lists topics, or prints messages or rates.
+pub(crate) fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
     let found = running(args.run.as_deref())?;
-    let first = found.first().ok_or_else(|| nobody(args.run.as_deref()))?;
+    let first = found.first().ok_or_else(|| no_swarm(args.run.as_deref()))?;
     match &args.action {
         Action::List => list(&found),
         Action::Echo(filter) => {
@@ -113,7 +120,7 @@ pub fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
             listen(first, filter, |line| {
                 let Some(line) = line else { return true };
                 left -= 1;
-                // A closed pipe ends it.
+                // A closed pipe ends the output.
                 writeln!(std::io::stdout().lock(), "{line}").is_ok() && left > 0
             })
         }
@@ -121,9 +128,9 @@ pub fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
     }
 }
 
-fn list(found: &[Running]) -> Result<Exit, Failure> {
+fn list(found: &[RunningSwarm]) -> Result<Exit, Failure> {
     for run in found {
-        let drones = Tap::attach(&run.path)?.facts.drones;
+        let drones = SwarmTap::attach(&run.path)?.facts.drones;
         for (_, name, service) in Name::ALL {
             println!("{}", json!({ "run": run.name(), "topic": name, "service": service, "drones": drones }));
         }
@@ -131,7 +138,7 @@ fn list(found: &[Running]) -> Result<Exit, Failure> {
     Ok(Exit::Reached)
 }
 
-fn hz(run: &Running, filter: &Filter) -> Result<Exit, Failure> {
+fn hz(run: &RunningSwarm, filter: &Filter) -> Result<Exit, Failure> {
     let (mut counts, mut since): (BTreeMap<String, u64>, Instant) = (BTreeMap::new(), Instant::now());
     let mut left = filter.count.unwrap_or(u64::MAX);
     listen(run, filter, |line| {
@@ -145,30 +152,30 @@ fn hz(run: &Running, filter: &Filter) -> Result<Exit, Failure> {
         }
         let rate = |count: &u64| (*count as f64 / passed.as_secs_f64() * 10.0).round() / 10.0;
         let rates: BTreeMap<&String, f64> = counts.iter().map(|(kind, count)| (kind, rate(count))).collect();
-        let told = writeln!(std::io::stdout().lock(), "{}", json!({ "hz": rates })).is_ok();
+        let written = writeln!(std::io::stdout().lock(), "{}", json!({ "hz": rates })).is_ok();
         (counts, since) = (BTreeMap::new(), Instant::now());
         left -= 1;
-        told && left > 0
+        written && left > 0
     })
 }
 
-/// Hands on every line that passes the filter, and `None` now and then when nothing is said; until the swarm has ended
-/// or `take` says no.
-fn listen(run: &Running, filter: &Filter, mut take: impl FnMut(Option<Value>) -> bool) -> Result<Exit, Failure> {
+/// Passes each line that matches the filter to `take`, and `None` when there are no new samples. Ends when the swarm has
+/// ended or `take` returns false.
+fn listen(run: &RunningSwarm, filter: &Filter, mut take: impl FnMut(Option<Value>) -> bool) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    let tap = Tap::attach(&run.path)?;
+    let tap = SwarmTap::attach(&run.path)?;
     let dt_s = tap.facts.dt_s;
     let downlink = match filter.topic {
         Name::Senses | Name::Air => Some(tap.downlink()?),
         Name::Uplink | Name::Record => None,
     };
-    let mut looked = Instant::now();
+    let mut checked = Instant::now();
     loop {
         let lines = match &downlink {
-            Some(port) => heard(port.receive(), |sample| {
+            Some(port) => lines_of(port.receive(), |sample| {
                 DownlinkView::parse(sample.bytes()).map(|down| of_downlink(&down, filter, dt_s)).unwrap_or_default()
             })?,
-            None => heard(tap.records.receive(), |sample| {
+            None => lines_of(tap.records.receive(), |sample| {
                 RecordView::parse(sample.bytes()).map(|record| of_record(record, filter, dt_s)).unwrap_or_default()
             })?,
         };
@@ -182,9 +189,9 @@ fn listen(run: &Running, filter: &Filter, mut take: impl FnMut(Option<Value>) ->
             }
         }
         if idle {
-            std::thread::sleep(LOOK);
-            if looked.elapsed() > ALIVE {
-                looked = Instant::now();
+            std::thread::sleep(POLL);
+            if checked.elapsed() > ALIVE {
+                checked = Instant::now();
                 if !tap.alive() {
                     return Ok(Exit::Reached);
                 }
@@ -193,7 +200,7 @@ fn listen(run: &Running, filter: &Filter, mut take: impl FnMut(Option<Value>) ->
     }
 }
 
-fn heard<S>(
+fn lines_of<S>(
     sample: Result<Option<S>, BusError>,
     lines: impl FnOnce(S) -> Vec<Value>,
 ) -> Result<Option<Vec<Value>>, Failure> {

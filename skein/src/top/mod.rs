@@ -1,123 +1,120 @@
 //! `skein top`: the running swarms in the terminal.
 
+mod display_state;
 mod screen;
-mod watch;
+mod swarm_view;
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::tap::running;
 use clap::Args;
 use crossterm::event::{Event, KeyCode, KeyModifiers, poll, read};
+use display_state::DisplayState;
 use screen::{Screen, page};
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
-use watch::Watch;
+use swarm_view::SwarmView;
 
 /// Arguments of `top`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   skein top
-  skein top --once     a second's look, as text, for scripts
+  skein top --once     watch for one second and print text, for scripts
 
-Keys: up and down choose a swarm, d shows its drones, space pauses, q ends.")]
-pub struct TopArgs {
-    /// Look for a second, print it as text, and end
+Keys: up and down select a swarm, d shows its drones, space pauses, q quits.")]
+pub(crate) struct TopArgs {
+    /// Watch for one second, print the result as text, and exit
     #[arg(long)]
-    pub once: bool,
+    pub(crate) once: bool,
 }
 
-/// Between two pictures.
-const PICTURE: Duration = Duration::from_millis(500);
-/// Between two looks at records.
-const LOOK: Duration = Duration::from_millis(2);
-/// How long `--once` looks.
+/// Time between two redraws.
+const REDRAW: Duration = Duration::from_millis(500);
+/// Time between two looks for records.
+const POLL: Duration = Duration::from_millis(2);
+/// Time for which `--once` watches.
 const ONCE: Duration = Duration::from_secs(1);
 
-/// What the keys have changed.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Shown {
-    /// The swarm whose groups are shown.
-    pub chosen: usize,
-    /// Whether its drones are.
-    pub drones: bool,
-    /// Whether the picture stands still.
-    pub paused: bool,
-}
-
-/// Shows until it is ended.
-pub fn top(args: &TopArgs) -> Result<Exit, Failure> {
+/// Shows the swarms until the user quits.
+pub(crate) fn top(args: &TopArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     if args.once {
         return once(&interrupt);
     }
     if !std::io::stdout().is_terminal() {
-        return Err(Failure::usage("stdout is no terminal; `skein top --once` prints text"));
+        return Err(Failure::usage("stdout is not a terminal; `skein top --once` prints text"));
     }
     let mut screen = Screen::open().map_err(Failure::environment)?;
-    let (mut watches, mut shown) = (Vec::new(), Shown::default());
-    let mut drawn = Instant::now() - PICTURE;
+    let (mut swarms, mut shown) = (Vec::new(), DisplayState::default());
+    let mut drawn = Instant::now() - REDRAW;
     while interrupt.signal().is_none() {
-        gather(&mut watches);
-        while poll(LOOK).map_err(Failure::environment)? {
-            if !key(&read().map_err(Failure::environment)?, &mut shown, watches.len()) {
+        gather(&mut swarms);
+        while poll(POLL).map_err(Failure::environment)? {
+            if !key(&read().map_err(Failure::environment)?, &mut shown, swarms.len()) {
                 return Ok(Exit::Reached);
             }
-            drawn = Instant::now() - PICTURE;
+            drawn = Instant::now() - REDRAW;
         }
-        if drawn.elapsed() >= PICTURE {
+        if drawn.elapsed() >= REDRAW {
             drawn = Instant::now();
-            attach(&mut watches)?;
+            attach(&mut swarms)?;
             if !shown.paused {
-                watches.iter_mut().for_each(Watch::turn);
+                for swarm in &mut swarms {
+                    swarm.turn();
+                }
             }
-            screen.show(&page(&watches, shown)).map_err(Failure::environment)?;
+            screen.show(&page(&swarms, shown)).map_err(Failure::environment)?;
         }
     }
     Ok(interrupt.signal().map_or(Exit::Reached, Exit::Interrupted))
 }
 
 fn once(interrupt: &Interrupt) -> Result<Exit, Failure> {
-    let mut watches = Vec::new();
-    attach(&mut watches)?;
+    let mut swarms = Vec::new();
+    attach(&mut swarms)?;
     let since = Instant::now();
     while since.elapsed() < ONCE && interrupt.signal().is_none() {
-        gather(&mut watches);
-        std::thread::sleep(LOOK);
+        gather(&mut swarms);
+        std::thread::sleep(POLL);
     }
-    watches.iter_mut().for_each(Watch::turn);
-    let lines = page(&watches, Shown { drones: true, ..Shown::default() });
+    for swarm in &mut swarms {
+        swarm.turn();
+    }
+    let lines = page(&swarms, DisplayState { drones: true, ..DisplayState::default() });
     let text: String = lines.iter().map(|line| format!("{}\n", line.text)).collect();
     // A closed pipe is the reader's choice.
     let _ = std::io::stdout().write_all(text.as_bytes());
     Ok(Exit::Reached)
 }
 
-fn gather(watches: &mut [Watch]) {
-    watches.iter_mut().for_each(Watch::gather);
+fn gather(swarms: &mut [SwarmView]) {
+    for swarm in swarms {
+        swarm.gather();
+    }
 }
 
-/// Attaches to swarms that are new, and forgets those that have gone.
-fn attach(watches: &mut Vec<Watch>) -> Result<(), Failure> {
+/// Attaches to new swarms, and drops those that have ended.
+fn attach(swarms: &mut Vec<SwarmView>) -> Result<(), Failure> {
     let found = running(None)?;
-    watches.retain(|watch| found.contains(&watch.run));
+    swarms.retain(|swarm| found.contains(&swarm.run));
     for run in found {
-        if !watches.iter().any(|watch| watch.run == run) {
-            // One that has just begun is there at the next look.
-            watches.extend(Watch::attach(run).ok());
+        if !swarms.iter().any(|swarm| swarm.run == run) {
+            // Attaching to a swarm that has just started can fail; it is tried again at the next redraw.
+            swarms.extend(SwarmView::attach(run).ok());
         }
     }
     Ok(())
 }
 
-/// False to end.
-fn key(event: &Event, shown: &mut Shown, swarms: usize) -> bool {
+/// Handles a key. False if the user quits.
+fn key(event: &Event, shown: &mut DisplayState, count: usize) -> bool {
     let Event::Key(key) = event else { return true };
     match key.code {
         KeyCode::Char('q') | KeyCode::Esc => return false,
         KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => return false,
         KeyCode::Char('d') => shown.drones = !shown.drones,
         KeyCode::Char(' ') => shown.paused = !shown.paused,
-        KeyCode::Down | KeyCode::Char('j') => shown.chosen = (shown.chosen + 1).min(swarms.saturating_sub(1)),
+        KeyCode::Down | KeyCode::Char('j') => shown.chosen = (shown.chosen + 1).min(count.saturating_sub(1)),
         KeyCode::Up | KeyCode::Char('k') => shown.chosen = shown.chosen.saturating_sub(1),
         _ => {}
     }

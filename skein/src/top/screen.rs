@@ -1,7 +1,7 @@
-//! The terminal: what is on it, and how it is given back.
+//! The terminal display.
 
-use super::Shown;
-use super::watch::Watch;
+use super::display_state::DisplayState;
+use super::swarm_view::SwarmView;
 use crossterm::style::{Attribute, Print, SetAttribute};
 use crossterm::terminal::{
     BeginSynchronizedUpdate, Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
@@ -12,12 +12,12 @@ use skein_protocol::Phase;
 use std::collections::BTreeMap;
 use std::io::{Stdout, Write, stdout};
 
-/// A line and whether it stands out.
-pub struct Line {
-    /// What it says.
-    pub text: String,
-    /// Heads and the chosen swarm.
-    pub bold: bool,
+/// A line of the display.
+pub(crate) struct Line {
+    /// Its text.
+    pub(crate) text: String,
+    /// Whether it is bold: headings and the selected swarm.
+    pub(crate) bold: bool,
 }
 
 fn plain(text: String) -> Line {
@@ -28,21 +28,21 @@ fn bold(text: String) -> Line {
     Line { text, bold: true }
 }
 
-/// The terminal, given back as it was when this is dropped.
-pub struct Screen(Stdout);
+/// The terminal in raw mode. Dropping this restores the terminal.
+pub(crate) struct Screen(Stdout);
 
 impl Screen {
-    /// Takes the terminal.
-    pub fn open() -> std::io::Result<Self> {
+    /// Switches the terminal to raw mode and to its alternate screen.
+    pub(crate) fn open() -> std::io::Result<Self> {
         enable_raw_mode()?;
-        // From here on, whatever happens gives it back.
+        // From here on, dropping it restores the terminal.
         let mut screen = Self(stdout());
         execute!(screen.0, EnterAlternateScreen, cursor::Hide)?;
         Ok(screen)
     }
 
-    /// Shows lines, as many and as much of them as there is room for.
-    pub fn show(&mut self, lines: &[Line]) -> std::io::Result<()> {
+    /// Shows the lines, cut to the size of the terminal.
+    pub(crate) fn show(&mut self, lines: &[Line]) -> std::io::Result<()> {
         let (width, height) = size()?;
         queue!(self.0, BeginSynchronizedUpdate)?;
         for (row, line) in (0..height).zip(lines) {
@@ -63,17 +63,17 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // There is nobody left to tell.
+        // If the terminal is gone, nothing can be restored.
         let _ = execute!(self.0, cursor::Show, LeaveAlternateScreen);
         let _ = disable_raw_mode();
     }
 }
 
-/// What is to be seen.
-pub fn page(watches: &[Watch], shown: Shown) -> Vec<Line> {
+/// The lines of the display.
+pub(crate) fn page(swarms: &[SwarmView], shown: DisplayState) -> Vec<Line> {
     let paused = if shown.paused { "  PAUSED" } else { "" };
     let mut lines = vec![plain(format!("skein top    up/down swarm   d drones   space pause   q quit{paused}"))];
-    if watches.is_empty() {
+    if swarms.is_empty() {
         lines.push(plain("no swarm runs; start one with `skein run SCENARIO`".to_owned()));
         return lines;
     }
@@ -81,31 +81,31 @@ pub fn page(watches: &[Watch], shown: Shown) -> Vec<Line> {
         "{:<28}{:>7}{:>9}{:>10}{:>8}{:>8}{:>10}{:>10}{:>10}{:>8}",
         "SWARM", "DRONES", "T (s)", "TICKS/s", "x REAL", "MIN m", "SENT/s", "HEARD/s", "DROP/s", "LOSS"
     )));
-    let chosen = shown.chosen.min(watches.len() - 1);
-    for (place, watch) in watches.iter().enumerate() {
-        let line = swarm(watch);
+    let chosen = shown.chosen.min(swarms.len() - 1);
+    for (place, view) in swarms.iter().enumerate() {
+        let line = swarm(view);
         lines.push(if place == chosen { bold(line) } else { plain(line) });
     }
     lines.push(plain(String::new()));
-    lines.extend(groups(&watches[chosen]));
+    lines.extend(groups(&swarms[chosen]));
     if shown.drones {
         lines.push(plain(String::new()));
-        lines.extend(drones(&watches[chosen]));
+        lines.extend(drones(&swarms[chosen]));
     }
     lines
 }
 
-fn swarm(watch: &Watch) -> String {
-    let rates = watch.rates;
-    let alive = watch.rows.iter().filter(|row| row.alive()).count();
-    let least = watch.separation_m.map_or("-".to_owned(), |m| format!("{m:.1}"));
+fn swarm(view: &SwarmView) -> String {
+    let rates = view.rates;
+    let alive = view.rows.iter().filter(|row| row.alive()).count();
+    let least = view.separation_m.map_or("-".to_owned(), |m| format!("{m:.1}"));
     let all = rates.heard + rates.dropped;
     let loss = if all > 0.0 { format!("{:.1} %", 100.0 * rates.dropped / all) } else { "-".to_owned() };
     format!(
         "{:<28}{:>7}{:>9.1}{:>10.0}{:>8.1}{least:>8}{:>10.0}{:>10.0}{:>10.0}{loss:>8}",
-        watch.run.name(),
-        format!("{alive}/{}", watch.tap.facts.drones),
-        watch.t_s,
+        view.run.name(),
+        format!("{alive}/{}", view.tap.facts.drones),
+        view.t_s,
         rates.ticks,
         rates.real,
         rates.sent,
@@ -114,16 +114,16 @@ fn swarm(watch: &Watch) -> String {
     )
 }
 
-fn groups(watch: &Watch) -> Vec<Line> {
+fn groups(view: &SwarmView) -> Vec<Line> {
     let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for (drone, row) in watch.rows.iter().enumerate().filter(|(_, row)| row.alive()) {
+    for (drone, row) in view.rows.iter().enumerate().filter(|(_, row)| row.alive()) {
         groups.entry(row.group.to_string()).or_default().push(drone);
     }
     let mut lines =
         vec![bold(format!("{:<12}{:>7}{:>10}{:>12}{:>12}", "GROUP", "DRONES", "LEADER", "SPEED m/s", "PHASE"))];
     for (group, members) in groups {
-        let rows = || members.iter().map(|&drone| &watch.rows[drone]);
-        let leads = |drone: &&usize| watch.rows[**drone].leads();
+        let rows = || members.iter().map(|&drone| &view.rows[drone]);
+        let leads = |drone: &&usize| view.rows[**drone].leads();
         let leaders: Vec<String> = members.iter().filter(leads).map(usize::to_string).collect();
         let speed = rows().map(|row| row.velocity_mps[0].hypot(row.velocity_mps[1])).sum::<f64>();
         let phase = rows().map(|row| row.phase()).max().map_or("-", Phase::name);
@@ -134,13 +134,13 @@ fn groups(watch: &Watch) -> Vec<Line> {
     lines
 }
 
-fn drones(watch: &Watch) -> Vec<Line> {
+fn drones(view: &SwarmView) -> Vec<Line> {
     let head = format!(
         "{:>6}{:>10}{:>10}{:>9}{:>10}{:>8}{:>12}{:>8}{:>9}",
         "DRONE", "x m", "y m", "m/s", "GROUP", "LEADER", "ENERGY kJ", "PHASE", "STEP us"
     );
     let mut lines = vec![bold(head)];
-    for (drone, row) in watch.rows.iter().enumerate() {
+    for (drone, row) in view.rows.iter().enumerate() {
         let [x, y] = row.position_m;
         let speed = row.velocity_mps[0].hypot(row.velocity_mps[1]);
         let leader = row.leader().map_or("-".to_owned(), |leader| leader.to_string());

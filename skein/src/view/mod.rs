@@ -1,13 +1,13 @@
 //! `skein view`: a running swarm, or a recorded run, in the browser of this machine.
 
-mod gate;
-mod hub;
+mod live_feed;
+mod request;
 mod server;
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use clap::Args;
-use hub::Hub;
+use live_feed::LiveFeed;
 use server::Content;
 use skein_report::{RunFolder, page};
 use std::net::{Ipv4Addr, TcpListener};
@@ -18,39 +18,39 @@ use std::sync::Arc;
 /// Arguments of `view`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  skein view                      the swarm that runs now, or the next one
+  skein view                      the running swarm, or the next one
   skein view runs/s2-right-1      a recorded run
   skein view --port 8080 --open
 
-The page is served to this machine alone, on 127.0.0.1. Ctrl-C ends it; the swarm flies on.")]
-pub struct ViewArgs {
-    /// Folder of a recorded run; without it, a running swarm
-    pub run_dir: Option<PathBuf>,
-    /// Port on 127.0.0.1; 0 takes a free one
+The page is served on 127.0.0.1, to this machine only. Ctrl-C stops the server; the swarm flies on.")]
+pub(crate) struct ViewArgs {
+    /// Folder of a recorded run [default: a running swarm]
+    pub(crate) run_dir: Option<PathBuf>,
+    /// Port on 127.0.0.1; 0 selects a free one
     #[arg(long, default_value_t = 0, value_name = "PORT")]
-    pub port: u16,
+    pub(crate) port: u16,
     /// Open the page in the browser
     #[arg(long)]
-    pub open: bool,
-    /// Watch swarms whose name begins so, as `skein top` shows it
+    pub(crate) open: bool,
+    /// Watch swarms whose name begins with NAME, as shown by `skein top`
     #[arg(long, value_name = "NAME", conflicts_with = "run_dir")]
-    pub run: Option<String>,
+    pub(crate) run: Option<String>,
 }
 
-/// How far a view stands back behind the swarm that it shows, as in `nice -n`.
+/// Niceness of the view, as in `nice -n`, so that the swarm has precedence.
 const NICE: i32 = 10;
 
 /// Serves the page until it is interrupted.
-pub fn view(args: &ViewArgs) -> Result<Exit, Failure> {
+pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    // The swarm comes first. Where it cannot be done, a view costs a little more.
+    // If it fails, the view takes a little more CPU time from the swarm.
     let _ = rustix::process::nice(NICE);
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, args.port))
-        .map_err(|error| Failure::environment(format!("127.0.0.1:{}: {error}; another --port?", args.port)))?;
+        .map_err(|error| Failure::environment(format!("127.0.0.1:{}: {error}; try another --port", args.port)))?;
     let port = listener.local_addr().map_err(Failure::environment)?.port();
     let content = match &args.run_dir {
         Some(path) => Content::Page(recorded(path)?),
-        None => Content::Live { page: page::live(port), hub: Arc::new(Hub::start(args.run.clone())) },
+        None => Content::Live { page: page::live(port), feed: Arc::new(LiveFeed::start(args.run.clone())) },
     };
     let url = format!("http://127.0.0.1:{port}/");
     println!("{url}");
@@ -68,7 +68,7 @@ fn recorded(path: &std::path::Path) -> Result<String, Failure> {
     page::report(&folder, &manifest, &summary).map_err(Failure::usage)
 }
 
-/// Asks the desktop; where there is none, the address stands on stdout.
+/// Opens the address with the desktop's browser. Without a desktop, the address is on stdout.
 fn open(url: &str) {
     let mut command = Command::new("xdg-open");
     command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());

@@ -1,7 +1,7 @@
-//! HTTP and the socket: a thread a client, no more than a few clients.
+//! The HTTP and WebSocket server: one thread per client, and a limited number of clients.
 
-use super::gate::{Asked, HEAD_MAX, judge};
-use super::hub::{Hub, Listener};
+use super::live_feed::{Listener, LiveFeed};
+use super::request::{MAX_HEAD, Request, classify};
 use crate::interrupt::Interrupt;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -10,44 +10,49 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
-/// Between two looks at new clients and at what a client says.
-const LOOK: Duration = Duration::from_millis(4);
-/// A client that does not ask, or does not read, for so long is let go.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Clients at a time.
-const CLIENTS: usize = 32;
+/// Time between two looks for new clients and for messages of a client.
+const POLL: Duration = Duration::from_millis(4);
+/// A client that neither sends a request nor reads for this long is disconnected.
+const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
+/// Greatest number of clients at a time.
+const MAX_CLIENTS: usize = 32;
 
 /// What is served.
-pub enum Content {
+pub(crate) enum Content {
     /// One page.
     Page(String),
-    /// A page and the socket it listens to.
+    /// A page and the WebSocket that it connects to.
     Live {
         /// The page.
         page: String,
-        /// Where its lines come from.
-        hub: Arc<Hub>,
+        /// The source of its lines.
+        feed: Arc<LiveFeed>,
     },
 }
 
 /// Serves clients until it is interrupted.
-pub fn serve(listener: &TcpListener, port: u16, content: &Content, interrupt: &Interrupt) -> std::io::Result<()> {
+pub(crate) fn serve(
+    listener: &TcpListener,
+    port: u16,
+    content: &Content,
+    interrupt: &Interrupt,
+) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
     let clients = AtomicUsize::new(0);
     std::thread::scope(|scope| {
         while interrupt.signal().is_none() {
             match listener.accept() {
-                Ok((stream, _)) if clients.load(Ordering::Relaxed) < CLIENTS => {
+                Ok((stream, _)) if clients.load(Ordering::Relaxed) < MAX_CLIENTS => {
                     clients.fetch_add(1, Ordering::Relaxed);
                     let clients = &clients;
                     scope.spawn(move || {
-                        // A client that goes is no trouble of ours.
+                        // A client that disconnects is not an error.
                         let _ = answer(stream, port, content, interrupt);
                         clients.fetch_sub(1, Ordering::Relaxed);
                     });
                 }
                 Ok(_) => {}
-                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(LOOK),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(POLL),
                 Err(error) => tracing::warn!(%error, "a client could not be accepted"),
             }
         }
@@ -58,45 +63,45 @@ pub fn serve(listener: &TcpListener, port: u16, content: &Content, interrupt: &I
 fn answer(mut stream: TcpStream, port: u16, content: &Content, interrupt: &Interrupt) -> std::io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(LOOK))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(POLL))?;
+    stream.set_write_timeout(Some(CLIENT_TIMEOUT))?;
     let Some(head) = head(&stream, interrupt)? else { return Ok(()) };
-    match (judge(&head, port), content) {
-        (Asked::Socket, Content::Live { hub, .. }) => return talk(stream, hub, interrupt),
-        (Asked::Page, Content::Page(page) | Content::Live { page, .. }) => respond(&mut stream, "200 OK", page)?,
-        (Asked::Refused(status), _) => respond(&mut stream, status, status)?,
-        (Asked::Socket, Content::Page(_)) => respond(&mut stream, "404 Not Found", "a recording has no socket")?,
+    match (classify(&head, port), content) {
+        (Request::Socket, Content::Live { feed, .. }) => return talk(stream, feed, interrupt),
+        (Request::Page, Content::Page(page) | Content::Live { page, .. }) => respond(&mut stream, "200 OK", page)?,
+        (Request::Refused(status), _) => respond(&mut stream, status, status)?,
+        (Request::Socket, Content::Page(_)) => respond(&mut stream, "404 Not Found", "a recorded run has no socket")?,
     }
-    // What was peeked at is read, or the system resets the connection under the answer.
-    let mut rest = [0; HEAD_MAX];
+    // The request was only peeked at. If it stays unread, the system resets the connection before the answer arrives.
+    let mut rest = [0; MAX_HEAD];
     let _ = stream.read(&mut rest);
     Ok(())
 }
 
-/// The head of a request, left in the socket; `None` if it does not come.
+/// The head of a request. It stays in the socket. `None` if it does not come in time.
 fn head(stream: &TcpStream, interrupt: &Interrupt) -> std::io::Result<Option<String>> {
-    let limit = Instant::now() + PATIENCE;
-    let mut bytes = vec![0; HEAD_MAX];
+    let limit = Instant::now() + CLIENT_TIMEOUT;
+    let mut bytes = vec![0; MAX_HEAD];
     while Instant::now() < limit && interrupt.signal().is_none() {
         let length = match stream.peek(&mut bytes) {
             Ok(0) => return Ok(None),
             Ok(length) => length,
-            Err(error) if waits(&error) => continue,
+            Err(error) if would_block(&error) => continue,
             Err(error) => return Err(error),
         };
         let text = String::from_utf8_lossy(&bytes[..length]);
         if let Some((head, _)) = text.split_once("\r\n\r\n") {
             return Ok(Some(head.to_owned()));
         }
-        if length == HEAD_MAX {
+        if length == MAX_HEAD {
             return Ok(None);
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL);
     }
     Ok(None)
 }
 
-fn waits(error: &std::io::Error) -> bool {
+fn would_block(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
@@ -112,42 +117,42 @@ fn respond(stream: &mut TcpStream, status: &str, body: &str) -> std::io::Result<
     stream.flush()
 }
 
-/// Sends what the hub tells, takes what the page selects.
-fn talk(stream: TcpStream, hub: &Hub, interrupt: &Interrupt) -> std::io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
+/// Sends the feed's lines to the page, and takes the page's selection.
+fn talk(stream: TcpStream, feed: &LiveFeed, interrupt: &Interrupt) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(CLIENT_TIMEOUT))?;
     let Ok(mut socket) = tungstenite::accept(stream) else { return Ok(()) };
-    socket.get_ref().set_read_timeout(Some(LOOK))?;
-    let listener = hub.listen();
+    socket.get_ref().set_read_timeout(Some(POLL))?;
+    let listener = feed.listen();
     while interrupt.signal().is_none() {
-        if !hear(&mut socket, hub)? || !tell(&mut socket, &listener) {
+        if !receive(&mut socket, feed)? || !send(&mut socket, &listener) {
             return Ok(());
         }
     }
-    // The page shows that it has lost its server; more is not needed.
+    // The page shows that the connection is lost.
     let _ = socket.close(None);
     let _ = socket.flush();
     Ok(())
 }
 
-/// Waits a little for a word of the page. False once it has gone.
-fn hear(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> std::io::Result<bool> {
+/// Waits briefly for a message of the page. False if the page has disconnected.
+fn receive(socket: &mut WebSocket<TcpStream>, feed: &LiveFeed) -> std::io::Result<bool> {
     match socket.read() {
         Ok(Message::Text(text)) => {
-            let said: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-            if let Some(drone) = said.get("select") {
-                hub.select(drone.as_u64().and_then(|drone| u32::try_from(drone).ok()));
+            let message: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+            if let Some(drone) = message.get("select") {
+                feed.select(drone.as_u64().and_then(|drone| u32::try_from(drone).ok()));
             }
             Ok(true)
         }
         Ok(Message::Close(_)) => Ok(false),
         Ok(_) => Ok(true),
-        Err(tungstenite::Error::Io(error)) if waits(&error) => Ok(true),
+        Err(tungstenite::Error::Io(error)) if would_block(&error) => Ok(true),
         Err(_) => Ok(false),
     }
 }
 
-/// Sends all lines there are, in one message. False once the page has gone.
-fn tell(socket: &mut WebSocket<TcpStream>, listener: &Listener) -> bool {
+/// Sends all waiting lines in one message. False if the page has disconnected.
+fn send(socket: &mut WebSocket<TcpStream>, listener: &Listener) -> bool {
     let lines = listener.lines();
     lines.is_empty() || socket.send(Message::text(lines.join("\n"))).is_ok()
 }

@@ -1,0 +1,38 @@
+//! Benchmarks of Skein: the runtime, its parts, real-time operation and leader failover.
+//!
+//! - [`runtime::RuntimeBench`] measures what a tick costs, for function calls, for processes, and for a baseline that
+//!   exchanges the same bytes by raw shared memory. All cases are interleaved in rounds, and ratios are taken within a
+//!   round, because absolute figures belong to the machine.
+//! - [`failover::FailoverBench`] kills leaders again and again, and measures the time until all drones follow another one.
+//! - [`clock::ClockBench`] flies by the wall clock, and measures how late ticks open.
+//! - [`parts::PartBench`] measures single parts of a tick: radio, grouping, sensing, recording.
+//!
+//! Each benchmark is a plain struct of settings with a method `run`, which gives rows that serialise to JSON. The structs
+//! derive [`clap::Args`], so that a command line can take them over. Flights in processes need a program that plays
+//! Skein's roles; [`Context`] names it. This crate does not print and does not watch signals.
+//!
+//! ```
+//! use skein_bench::parts::{Part, PartBench};
+//! use skein_bench::Context;
+//! use std::path::Path;
+//!
+//! let context = Context { executable: Path::new("skein"), interrupted: &|| None };
+//! let bench = PartBench { drones: vec![8], rounds: 1 };
+//! let figures = bench.run(Part::Grouping, &context)?.expect("nothing interrupts it");
+//! assert_eq!(figures.len(), 4, "two and four routes, with and without the tie-break");
+//! assert!(figures.iter().all(|figure| figure.value > 0.0 && figure.unit == "ms"));
+//! # Ok::<(), skein_bench::BenchError>(())
+//! ```
+
+pub mod clock;
+mod context;
+mod error;
+pub mod failover;
+mod median;
+pub mod parts;
+pub mod runtime;
+mod scratch;
+
+pub use context::{Context, Interrupted};
+pub use error::BenchError;
+pub use median::median;

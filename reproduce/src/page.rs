@@ -1,0 +1,117 @@
+//! The report as Markdown and as one self-contained HTML page, from the same blocks.
+
+use crate::block::Block;
+use std::fmt::Write as _;
+
+const STYLE: &str = "\
+:root{color-scheme:light dark;--ink:#222;--paper:#fff;--line:#ccc;--soft:#f3f3f3}
+@media(prefers-color-scheme:dark){:root{--ink:#ddd;--paper:#16181b;--line:#444;--soft:#22262b}}
+body{font:16px/1.5 system-ui,Helvetica,Arial,sans-serif;color:var(--ink);background:var(--paper);max-width:1140px;\
+margin:2rem auto;padding:0 1rem}
+p{max-width:48rem}
+.wide{overflow-x:auto}
+table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
+th,td{border-bottom:1px solid var(--line);padding:.25rem .6rem;text-align:left;vertical-align:top}
+th{background:var(--soft)}
+td:first-child{white-space:nowrap}
+code{font-size:12px;background:var(--soft);padding:0 .2em}
+figure{margin:1.5rem 0;background:#fff;color:#222;border:1px solid var(--line);break-inside:avoid}
+figure svg{display:block;width:100%;height:auto}
+figcaption{padding:.4rem .8rem}
+@media print{:root{--ink:#000;--paper:#fff;--line:#999;--soft:#fff}body{margin:0;max-width:none;font-size:10pt}\
+table{font-size:7pt}code{font-size:6pt;overflow-wrap:anywhere}tr{break-inside:avoid}}
+";
+
+/// The report as Markdown. It links to the files of the figures.
+pub(crate) fn markdown(title: &str, blocks: &[Block]) -> String {
+    let mut text = format!("# {title}\n");
+    for block in blocks {
+        text.push('\n');
+        // Writing to a string cannot fail.
+        let _ = match block {
+            Block::Heading(heading) => writeln!(text, "## {heading}"),
+            Block::Text(words) => writeln!(text, "{words}"),
+            Block::Table { head, lines } => {
+                let rule = vec!["---"; head.len()].join(" | ");
+                let _ = writeln!(text, "| {} |\n| {rule} |", head.join(" | "));
+                lines.iter().try_for_each(|line| writeln!(text, "| {} |", line.join(" | ")))
+            }
+            Block::Figure(figure) => {
+                writeln!(text, "![{}](figures/{})\n\n{}", figure.file, figure.file, figure.caption)
+            }
+        };
+    }
+    text
+}
+
+/// The report as an HTML page that contains the figures.
+pub(crate) fn html(title: &str, blocks: &[Block]) -> String {
+    let mut page = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width,initial-scale=1\">\n<title>{0}</title>\n<style>\n{STYLE}</style>\n</head>\n\
+         <body>\n<h1>{0}</h1>\n",
+        inline(title)
+    );
+    for block in blocks {
+        let _ = match block {
+            Block::Heading(heading) => writeln!(page, "<h2>{}</h2>", inline(heading)),
+            Block::Text(words) => writeln!(page, "<p>{}</p>", inline(words)),
+            Block::Table { head, lines } => {
+                let cells = |tag: &str, line: &[String]| -> String {
+                    line.iter().map(|cell| format!("<{tag}>{}</{tag}>", inline(cell))).collect()
+                };
+                let body: String = lines.iter().map(|line| format!("<tr>{}</tr>\n", cells("td", line))).collect();
+                let head = cells("th", head);
+                writeln!(
+                    page,
+                    "<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>"
+                )
+            }
+            Block::Figure(figure) => {
+                let caption = inline(&figure.caption);
+                writeln!(page, "<figure>\n{}\n<figcaption>{caption}</figcaption>\n</figure>", figure.svg.trim())
+            }
+        };
+    }
+    page.push_str("</body>\n</html>\n");
+    page
+}
+
+/// Escapes text for HTML. Text between backticks becomes code.
+fn inline(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let mut html = String::new();
+    for (i, part) in text.split('`').enumerate() {
+        if i % 2 == 0 {
+            html.push_str(part);
+        } else {
+            html.extend(["<code>", part, "</code>"]);
+        }
+    }
+    html
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_forms_hold_the_same_blocks() {
+        let blocks = [
+            Block::Heading("Times".to_owned()),
+            Block::Text("1 < 2, by `skein run`.".to_owned()),
+            Block::Table {
+                head: vec!["a".to_owned(), "b".to_owned()],
+                lines: vec![vec!["1".to_owned(), "2".to_owned()]],
+            },
+        ];
+        let text = markdown("Report", &blocks);
+        assert!(
+            text.starts_with("# Report\n\n## Times\n\n1 < 2, by `skein run`.\n\n| a | b |\n| --- | --- |\n| 1 | 2 |\n")
+        );
+        let page = html("Report", &blocks);
+        for part in ["<h2>Times</h2>", "1 &lt; 2, by <code>skein run</code>.", "<td>1</td><td>2</td>"] {
+            assert!(page.contains(part), "{part} is not in {page}");
+        }
+    }
+}

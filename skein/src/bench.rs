@@ -1,0 +1,189 @@
+//! `skein bench`.
+
+use crate::exit::{Exit, Failure};
+use crate::interrupt::Interrupt;
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use skein_bench::clock::{self, ClockBench};
+use skein_bench::failover::FailoverBench;
+use skein_bench::parts::{self, Part, PartBench};
+use skein_bench::runtime::{BaselinePeer, RuntimeBench};
+use skein_bench::{BenchError, Context};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The benchmarks.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// Benchmark a tick against function calls and against raw shared memory, by swarm size [default]
+    Runtime(RuntimeArgs),
+    /// Kill leaders again and again; measure the time until all drones follow another one
+    Failover(FailoverArgs),
+    /// Benchmark real-time operation: late ticks and late answers
+    Clock(ClockArgs),
+    /// Benchmark the radio model
+    Radio(PartArgs),
+    /// Benchmark the exact assignment of drones to routes
+    Grouping(PartArgs),
+    /// Benchmark the world's part of a tick
+    Sense(PartArgs),
+    /// Benchmark recording
+    Record(PartArgs),
+}
+
+/// Arguments of `bench runtime`.
+#[derive(Debug, Default, Args)]
+#[command(after_help = "Examples:
+  skein bench runtime
+  skein bench runtime --drones 8,64 --rounds 7 --compare uds --out bench.json")]
+pub(crate) struct RuntimeArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: RuntimeBench,
+    /// Plot the CPU time per agent-step against the swarm size to this file (SVG)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Print one JSON object instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Also write the JSON object to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `bench failover`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Eight drones cruise with heartbeats at 50 Hz. Again and again the leader is killed, and restarted a \
+little later. With the lockstep clock all drones fly in this process; with the realtime clock they are processes that get \
+SIGKILL.
+
+Examples:
+  skein bench failover --quick
+  skein bench failover --clock realtime --loss 0,0.5 --delay 0 --json --out failover.json"
+)]
+pub(crate) struct FailoverArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: FailoverBench,
+    /// Print one JSON object instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Also write the JSON object to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Arguments of `bench clock`.
+#[derive(Debug, Args)]
+pub(crate) struct ClockArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: ClockBench,
+    /// Print one JSON object instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of the benchmarks of parts.
+#[derive(Debug, Args)]
+pub(crate) struct PartArgs {
+    /// How it is measured.
+    #[command(flatten)]
+    pub(crate) bench: PartBench,
+    /// Print one JSON object instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Runs one benchmark.
+pub(crate) fn bench(command: Option<&BenchCommand>) -> Result<Exit, Failure> {
+    let interrupt = Interrupt::watch()?;
+    let interrupted = || interrupt.signal();
+    let executable = std::env::current_exe().map_err(Failure::environment)?;
+    let context = Context { executable: &executable, interrupted: &interrupted };
+    let exit = match command {
+        None => runtime(&RuntimeArgs::default(), &context),
+        Some(BenchCommand::Runtime(args)) => runtime(args, &context),
+        Some(BenchCommand::Failover(args)) => failover(args, &context),
+        Some(BenchCommand::Clock(args)) => clock(args, &context),
+        Some(BenchCommand::Radio(args)) => part(Part::Radio, args, &context),
+        Some(BenchCommand::Grouping(args)) => part(Part::Grouping, args, &context),
+        Some(BenchCommand::Sense(args)) => part(Part::Sense, args, &context),
+        Some(BenchCommand::Record(args)) => part(Part::Record, args, &context),
+    };
+    Ok(exit?.unwrap_or_else(|| Exit::Interrupted(interrupt.signal().unwrap_or_default())))
+}
+
+/// Runs a peer process of the baseline.
+pub(crate) fn peer(peer: &BaselinePeer) -> Result<Exit, Failure> {
+    peer.run().map_err(failure)?;
+    Ok(Exit::Reached)
+}
+
+fn runtime(args: &RuntimeArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let report = args.bench.run(context, |progress| {
+        let skein_bench::runtime::Progress { drones, round, rounds, case } = progress;
+        eprint!("\r{drones} drones, round {round} of {rounds}: {:<24}", case.name());
+    });
+    eprintln!();
+    let Some(report) = report.map_err(failure)? else { return Ok(None) };
+    let json = serde_json::to_string_pretty(&report).map_err(Failure::environment)?;
+    if let Some(path) = &args.out {
+        write(path, &json)?;
+    }
+    if let Some(path) = &args.plot {
+        write(path, &report.plot().map_err(failure)?)?;
+    }
+    print(&if args.json { json + "\n" } else { report.table() + "\n" });
+    Ok(Some(Exit::Reached))
+}
+
+fn failover(args: &FailoverArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(report) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
+    if let Some(path) = &args.out {
+        write(path, &(serde_json::to_string_pretty(&report).map_err(Failure::environment)? + "\n"))?;
+    }
+    if args.json {
+        print(&(serde_json::to_string(&report).map_err(Failure::environment)? + "\n"));
+    } else {
+        print(&report.table());
+    }
+    Ok(Some(if report.is_unsafe() { Exit::Unsafe } else { Exit::Reached }))
+}
+
+fn clock(args: &ClockArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(rows) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
+    print_rows(args.json, &rows, clock::table)
+}
+
+fn part(part: Part, args: &PartArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(figures) = args.bench.run(part, context).map_err(failure)? else { return Ok(None) };
+    print_rows(args.json, &figures, parts::table)
+}
+
+fn print_rows<T: Serialize>(json: bool, rows: &[T], table: fn(&[T]) -> String) -> Result<Option<Exit>, Failure> {
+    if json {
+        print(&(serde_json::to_string_pretty(rows).map_err(Failure::environment)? + "\n"));
+    } else {
+        print(&table(rows));
+    }
+    Ok(Some(Exit::Reached))
+}
+
+fn print(text: &str) {
+    // A closed pipe is the reader's choice.
+    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|error| Failure::environment(format!("writing {}: {error}", path.display())))
+}
+
+fn failure(error: BenchError) -> Failure {
+    match error {
+        BenchError::Scenario(errors) => Failure::diagnostic(errors),
+        error if error.is_usage() => Failure::usage(error),
+        error => Failure::environment(error),
+    }
+}

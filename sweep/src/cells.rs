@@ -1,0 +1,139 @@
+//! Cells: the runs of one combination, averaged over the seeds, with 95 % intervals.
+
+use crate::grid::Grid;
+use crate::metrics::{METRICS, SUCCESS};
+use crate::row::Row;
+use crate::statistics::{Estimate, mean, rate};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// The results of one combination of scenario, strategy and grid values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Strategy as flown.
+    pub strategy: String,
+    /// One value, as TOML, for each key of the grid.
+    pub values: Vec<String>,
+    /// Number of runs by outcome.
+    pub outcomes: BTreeMap<String, usize>,
+    /// Share of runs that reached their goal and kept every invariant.
+    pub success: Option<Estimate>,
+    /// One mean for each of [`METRICS`]; `None` if no run has a value.
+    pub metrics: Vec<Option<Estimate>>,
+}
+
+impl Cell {
+    /// The estimate of the metric with this name; `None` if there is none.
+    #[must_use]
+    pub fn estimate(&self, name: &str) -> Option<Estimate> {
+        match METRICS.iter().position(|metric| metric.name == name) {
+            Some(i) => self.metrics[i],
+            None if name == SUCCESS => self.success,
+            None => None,
+        }
+    }
+
+    /// The cell as it stands in summary.json.
+    pub(crate) fn json(&self, keys: &[&str]) -> Value {
+        let grid: Map<String, Value> =
+            keys.iter().zip(&self.values).map(|(key, v)| ((*key).to_owned(), toml_json(v))).collect();
+        let metrics: Map<String, Value> =
+            METRICS.iter().zip(&self.metrics).map(|(metric, found)| (metric.name.to_owned(), json!(found))).collect();
+        json!({
+            "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
+            "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
+            "success": self.success, "metrics": metrics,
+        })
+    }
+}
+
+/// A TOML value as JSON. What is not TOML stays text.
+fn toml_json(value: &str) -> Value {
+    toml_value(value).and_then(|value| serde_json::to_value(value).ok()).unwrap_or_else(|| json!(value))
+}
+
+/// Parses one TOML value; `None` if the text is not one.
+pub(crate) fn toml_value(text: &str) -> Option<toml::Value> {
+    toml::from_str::<toml::Table>(&format!("value = {text}")).ok()?.remove("value")
+}
+
+/// One cell for each combination that has rows, in the grid's order. Rows are in the order of their jobs.
+pub(crate) fn cells(grid: &Grid<'_>, rows: &[Row]) -> Vec<Cell> {
+    let combination = |row: &Row| std::ptr::from_ref(grid.job(row.job).0);
+    rows.chunk_by(|a, b| combination(a) == combination(b)).map(|rows| cell(grid, rows)).collect()
+}
+
+fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
+    let combination = grid.job(rows[0].job).0;
+    let mut outcomes = BTreeMap::new();
+    for row in rows {
+        *outcomes.entry(row.outcome.clone()).or_insert(0) += 1;
+    }
+    let reached = rows.iter().filter(|row| row.reached()).count();
+    let flown = rows.iter().map(|row| &row.strategy).find(|strategy| !strategy.is_empty());
+    let estimate = |i: usize| {
+        let counts = |row: &&Row| row.reached() || !METRICS[i].reached_only;
+        let values = rows.iter().filter(counts).filter_map(|row| row.metrics.get(i).copied().flatten());
+        mean(&values.collect::<Vec<f64>>())
+    };
+    Cell {
+        scenario: grid.scenario_name(combination),
+        strategy: flown.or(combination.strategy.as_ref()).cloned().unwrap_or_default(),
+        values: combination.values.clone(),
+        outcomes,
+        success: rate(reached, rows.len()),
+        metrics: (0..METRICS.len()).map(estimate).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{Axis, Experiment, Mission};
+    use crate::random_scene::SceneBounds;
+
+    #[test]
+    fn times_are_averaged_over_reached_runs_and_distances_over_all() {
+        let experiment = Experiment {
+            name: "e".to_owned(),
+            scenarios: vec![Mission::Random],
+            strategies: vec![],
+            seeds: vec![1, 2, 3],
+            grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
+            processes: false,
+            metrics: vec![],
+            bounds: SceneBounds::default(),
+        };
+        let grid = Grid::new(&experiment, &[]);
+        let row = |job: usize, outcome: &str, time_s: f64, separation_m: f64| Row {
+            metrics: METRICS
+                .iter()
+                .map(|metric| match metric.name {
+                    "mission_s" => Some(time_s),
+                    "min_separation_m" => Some(separation_m),
+                    _ => None,
+                })
+                .collect(),
+            strategy: "shortest-path".to_owned(),
+            ..Row::unflown(job, outcome, "")
+        };
+        let rows = [
+            row(0, "reached", 50.0, 40.0),
+            row(1, "timeout", 600.0, 30.0),
+            row(2, "reached", 60.0, 35.0),
+            Row::unflown(3, "failed", "no"),
+        ];
+        let cells = cells(&grid, &rows);
+        assert_eq!(cells.len(), 2);
+        let time = cells[0].estimate("mission_s").unwrap();
+        assert_eq!((time.n, time.mean), (2, 55.0));
+        assert_eq!(cells[0].estimate("min_separation_m").unwrap().min, 30.0);
+        let success = cells[0].estimate(SUCCESS).unwrap();
+        assert_eq!((success.n, success.mean), (3, 2.0 / 3.0));
+        let json = cells[1].json(&["radio.loss"]);
+        assert_eq!((&json["grid"]["radio.loss"], &json["outcomes"]["failed"]), (&json!(0.5), &json!(1)));
+        assert_eq!(json["metrics"]["mission_s"], Value::Null);
+    }
+}

@@ -1,0 +1,267 @@
+//! The runs of an experiment: every combination of scenario, strategy and grid values, with every seed.
+
+use crate::error::JobError;
+use crate::experiment::{Experiment, Mission};
+use crate::random_scene::{SceneBounds, random_scene};
+use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
+use std::path::Path;
+
+/// All runs of an experiment. A run is known by its job number, from 0, in the order of runs.csv.
+#[derive(Debug)]
+pub struct Grid<'a> {
+    experiment: &'a Experiment,
+    /// Overrides of every run, from the command line.
+    overrides: &'a [(String, String)],
+    combinations: Vec<Combination>,
+}
+
+/// Everything that a run has besides its seed. The runs of one combination are averaged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Combination {
+    /// Index of the scenario in the experiment's list.
+    pub scenario: usize,
+    /// The strategy; `None`: the scenario's own.
+    pub strategy: Option<String>,
+    /// One value, as TOML, for each key of the grid.
+    pub values: Vec<String>,
+}
+
+impl<'a> Grid<'a> {
+    /// The runs of an experiment with these overrides (key path and TOML value) in each. The seed varies fastest, then
+    /// the grid's last key, then the strategy, then the scenario.
+    #[must_use]
+    pub fn new(experiment: &'a Experiment, overrides: &'a [(String, String)]) -> Self {
+        let strategies: Vec<Option<String>> = if experiment.strategies.is_empty() {
+            vec![None]
+        } else {
+            experiment.strategies.iter().cloned().map(Some).collect()
+        };
+        let points = points(experiment);
+        let mut combinations = Vec::new();
+        for scenario in 0..experiment.scenarios.len() {
+            for strategy in &strategies {
+                combinations.extend(points.iter().map(|values| Combination {
+                    scenario,
+                    strategy: strategy.clone(),
+                    values: values.clone(),
+                }));
+            }
+        }
+        Self { experiment, overrides, combinations }
+    }
+
+    /// The experiment.
+    #[must_use]
+    pub fn experiment(&self) -> &'a Experiment {
+        self.experiment
+    }
+
+    /// Overrides of every run.
+    #[must_use]
+    pub fn overrides(&self) -> &'a [(String, String)] {
+        self.overrides
+    }
+
+    /// Keys that the grid varies.
+    #[must_use]
+    pub fn keys(&self) -> Vec<&'a str> {
+        self.experiment.grid.iter().map(|axis| axis.key.as_str()).collect()
+    }
+
+    /// Number of runs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.combinations.len() * self.experiment.seeds.len()
+    }
+
+    /// Whether there are no runs.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Combination and seed of a run.
+    ///
+    /// # Panics
+    /// If `number` is not below [`Grid::len`].
+    #[must_use]
+    pub fn job(&self, number: usize) -> (&Combination, u64) {
+        let seeds = self.experiment.seeds.len();
+        (&self.combinations[number / seeds], self.experiment.seeds[number % seeds])
+    }
+
+    /// The checked scenario of a run.
+    ///
+    /// # Errors
+    /// [`JobError`] if the scenario is not valid.
+    pub fn scenario(&self, number: usize) -> Result<Scenario, JobError> {
+        let (combination, seed) = self.job(number);
+        let mut overrides = self.changes(combination);
+        overrides.push(("seed".to_owned(), seed.to_string()));
+        match &self.experiment.scenarios[combination.scenario] {
+            Mission::Random => Ok(random_scene(seed, self.experiment.bounds, &overrides)?),
+            Mission::File { path, text } => Ok(parse(path, text, &overrides)?),
+        }
+    }
+
+    /// Checks each combination with its first seed. Another seed can only change the start's jitter; if that makes the
+    /// scenario invalid, the run gets a row with the outcome `invalid`.
+    ///
+    /// # Errors
+    /// The first combination that is not a valid scenario.
+    pub fn check(&self) -> Result<(), JobError> {
+        let seeds = self.experiment.seeds.len();
+        for number in 0..self.combinations.len() {
+            self.scenario(number * seeds)?;
+        }
+        Ok(())
+    }
+
+    /// What a combination changes of its scenario, besides the seed.
+    fn changes(&self, combination: &Combination) -> Vec<(String, String)> {
+        let keys = self.experiment.grid.iter().map(|axis| axis.key.clone());
+        let grid = keys.zip(combination.values.iter().cloned());
+        let strategy = combination.strategy.iter().map(|word| ("strategy".to_owned(), format!("{word:?}")));
+        self.overrides.iter().cloned().chain(grid).chain(strategy).collect()
+    }
+
+    /// Name of the combination's scenario, as it stands in rows.
+    #[must_use]
+    pub fn scenario_name(&self, combination: &Combination) -> String {
+        match &self.experiment.scenarios[combination.scenario] {
+            Mission::Random => "random".to_owned(),
+            Mission::File { path, .. } => stem(path),
+        }
+    }
+
+    /// The command that repeats a run, in processes: the digest is the same as inline.
+    #[must_use]
+    pub fn command(&self, number: usize) -> String {
+        let (combination, seed) = self.job(number);
+        let (before, path) = match &self.experiment.scenarios[combination.scenario] {
+            Mission::File { path, .. } => (String::new(), path.display().to_string()),
+            Mission::Random => {
+                let file = format!("random-{seed}.toml");
+                (format!("skein scene {seed}{} > {file} && ", flags(self.experiment.bounds)), file)
+            }
+        };
+        let mut command = format!("{before}skein run {}", quoted(&path));
+        command += &combination.strategy.iter().map(|word| format!(" --strategy {word}")).collect::<String>();
+        if before.is_empty() {
+            command += &format!(" --seed {seed}");
+        }
+        for (key, value) in self.changes(combination).iter().filter(|(key, _)| key != "strategy") {
+            command += &format!(" --set {}", quoted(&format!("{key}={value}")));
+        }
+        command
+    }
+}
+
+/// The arguments of `skein scene` that give these bounds.
+fn flags(bounds: SceneBounds) -> String {
+    let flag = |name: &str, [least, most]: [u32; 2], default: [u32; 2]| {
+        if [least, most] == default { String::new() } else { format!(" --{name} {least}..{most}") }
+    };
+    let default = SceneBounds::default();
+    flag("drones", bounds.drones, default.drones) + &flag("obstacles", bounds.obstacles, default.obstacles)
+}
+
+fn parse(path: &Path, text: &str, overrides: &[(String, String)]) -> Result<Scenario, ScenarioErrors> {
+    let (name, stem) = (path.display().to_string(), stem(path));
+    Scenario::parse(text, ScenarioSource { name: &name, stem: &stem }, overrides)
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// All combinations of the grid's values, the last key fastest.
+fn points(experiment: &Experiment) -> Vec<Vec<String>> {
+    experiment.grid.iter().fold(vec![Vec::new()], |points, axis| {
+        let longer = |point: &Vec<String>, value: &String| point.iter().chain([value]).cloned().collect();
+        points.iter().flat_map(|point| axis.values.iter().map(move |value| longer(point, value))).collect()
+    })
+}
+
+/// Quotes a word for a shell, if it needs quotes.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,+%@".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::Axis;
+
+    fn experiment() -> Experiment {
+        let axis = |key: &str, values: &[&str]| Axis {
+            key: key.to_owned(),
+            values: values.iter().map(|&value| value.to_owned()).collect(),
+        };
+        let text = "[formation]\ndrones = 3\nspacing_m = 60\n".to_owned();
+        Experiment {
+            name: "e".to_owned(),
+            scenarios: vec![Mission::File { path: "a b.toml".into(), text }, Mission::Random],
+            strategies: vec!["shortest-path".to_owned(), "congestion-aware".to_owned()],
+            seeds: vec![4, 9],
+            grid: vec![axis("radio.delay_s", &["0", "0.5"]), axis("radio.loss", &["0", "0.1", "0.2"])],
+            processes: false,
+            metrics: vec![],
+            bounds: SceneBounds { drones: [5, 6], ..SceneBounds::default() },
+        }
+    }
+
+    #[test]
+    fn every_combination_comes_once_and_seeds_vary_fastest() {
+        let experiment = experiment();
+        let grid = Grid::new(&experiment, &[]);
+        assert_eq!(grid.len(), 2 * 2 * 6 * 2);
+        let (first, seed) = grid.job(0);
+        assert_eq!((first.scenario, first.values.join(" "), seed), (0, "0 0".to_owned(), 4));
+        assert_eq!(grid.job(1).1, 9);
+        assert_eq!(grid.job(2).0.values.join(" "), "0 0.1");
+        let (last, seed) = grid.job(47);
+        assert_eq!((last.scenario, last.strategy.as_deref(), seed), (1, Some("congestion-aware"), 9));
+        assert_eq!(last.values.join(" "), "0.5 0.2");
+        let mut all = grid.combinations.clone();
+        all.dedup();
+        assert_eq!(all.len(), 24);
+    }
+
+    #[test]
+    fn a_run_has_its_seed_strategy_and_values() {
+        let experiment = experiment();
+        let overrides = [("drone.safe_distance_m".to_owned(), "30".to_owned())];
+        let grid = Grid::new(&experiment, &overrides);
+        grid.check().unwrap();
+        let scenario = grid.scenario(5).unwrap();
+        assert_eq!((scenario.seed, scenario.radio.delay_s, scenario.radio.loss), (9, 0.0, 0.2));
+        assert_eq!((scenario.strategy.to_string().as_str(), scenario.drone.safe_distance_m), ("shortest-path", 30.0));
+        assert_eq!(grid.scenario(47).unwrap().seed, 9);
+    }
+
+    #[test]
+    fn commands_repeat_their_runs() {
+        let experiment = experiment();
+        let grid = Grid::new(&experiment, &[]);
+        let wanted =
+            "skein run 'a b.toml' --strategy shortest-path --seed 9 --set radio.delay_s=0 --set radio.loss=0.2";
+        assert_eq!(grid.command(5), wanted);
+        let wanted = "skein scene 4 --drones 5..6 > random-4.toml && skein run random-4.toml --strategy shortest-path \
+                      --set radio.delay_s=0 --set radio.loss=0";
+        assert_eq!(grid.command(24), wanted);
+    }
+
+    #[test]
+    fn an_invalid_combination_is_found_before_the_flight() {
+        let mut experiment = experiment();
+        experiment.grid[1].values.push("1.5".to_owned());
+        let error = Grid::new(&experiment, &[]).check().unwrap_err().to_string();
+        assert!(error.contains("--set radio.loss=1.5"), "{error}");
+    }
+}

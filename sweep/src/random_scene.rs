@@ -1,0 +1,253 @@
+//! Random scenes: a formation and obstacles that follow from a seed alone. Start and end lie clear of all obstacles in
+//! an unbounded plane, so a free path always exists.
+
+use crate::error::SceneError;
+use crate::splitmix::SplitMix64;
+use skein_leader::geometry::separation;
+use skein_protocol::Vec2;
+use skein_protocol::shape::ConvexShape;
+use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
+
+/// How many drones and obstacles a scene may have, each as least and greatest number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneBounds {
+    /// Number of drones, from 1 to 64.
+    pub drones: [u32; 2],
+    /// Number of obstacles, from 0 to 8.
+    pub obstacles: [u32; 2],
+}
+
+impl SceneBounds {
+    /// Returns these bounds if scenes can be made within them.
+    ///
+    /// # Errors
+    /// [`SceneError::Bounds`].
+    pub fn checked(self) -> Result<Self, SceneError> {
+        let limits = [("drones", self.drones, [1, 64]), ("obstacles", self.obstacles, [0, 8])];
+        for (what, [least, most], [lowest, highest]) in limits {
+            if least > most || least < lowest || most > highest {
+                return Err(SceneError::Bounds { what, least, most, lowest, highest });
+            }
+        }
+        Ok(self)
+    }
+}
+
+impl Default for SceneBounds {
+    fn default() -> Self {
+        Self { drones: [5, 16], obstacles: [1, 4] }
+    }
+}
+
+/// Clearance of every scene, m.
+const CLEARANCE_M: f64 = 15.0;
+/// Planning distance of every scene, m.
+const PLANNING_M: f64 = 20.0;
+
+/// A gap narrower than this is closed, in units of the narrowest passable gap.
+const CLOSED: f64 = 0.9;
+/// A gap wider than this is open, in the same unit. No scene has a gap between the two limits, because rounding would
+/// decide whether it is open.
+const OPEN: f64 = 1.2;
+
+/// Attempts to place one obstacle before the scene is drawn again.
+const PLACES: usize = 32;
+/// Attempts to draw a scene before giving up.
+const SCENES: u64 = 64;
+
+/// The scene of this seed, as the TOML text of a scenario.
+///
+/// # Errors
+/// [`SceneError::NoScene`] if no valid scene was found.
+pub fn scene_toml(seed: u64, bounds: SceneBounds) -> Result<String, SceneError> {
+    let mut last = None;
+    for attempt in 0..SCENES {
+        let Some(text) = scene(&mut SplitMix64::keyed(seed, attempt), seed, bounds) else { continue };
+        match parse(seed, &text, &[]) {
+            Ok(_) => return Ok(text),
+            Err(error) => last = Some(error),
+        }
+    }
+    Err(SceneError::NoScene { seed, attempts: SCENES, last })
+}
+
+/// The checked scenario of this seed's scene, with these overrides (key path and TOML value).
+///
+/// # Errors
+/// As [`scene_toml`], and [`SceneError::Overrides`] if the overrides do not fit the scene.
+pub fn random_scene(seed: u64, bounds: SceneBounds, overrides: &[(String, String)]) -> Result<Scenario, SceneError> {
+    parse(seed, &scene_toml(seed, bounds)?, overrides).map_err(SceneError::Overrides)
+}
+
+fn parse(seed: u64, text: &str, overrides: &[(String, String)]) -> Result<Scenario, ScenarioErrors> {
+    let name = format!("random-{seed}");
+    Scenario::parse(text, ScenarioSource { name: &name, stem: &name }, overrides)
+}
+
+/// An obstacle and its table in the scenario.
+struct PlacedObstacle {
+    shape: ConvexShape,
+    toml: String,
+}
+
+/// Half the width of a formation across the direction of flight, and its depth along it, m.
+struct Extent {
+    half_width_m: f64,
+    depth_m: f64,
+}
+
+/// One attempt at a scene; `None` if an obstacle found no place.
+fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds) -> Option<String> {
+    let drones = rng.integer(bounds.drones[0], bounds.drones[1]);
+    let shape = rng.one(&["nested-v", "v", "line", "column", "grid", "circle"]);
+    let safe_m = rng.between(20.0, 40.0).round();
+    // Rounded up: the spacing is 1.5 safe distances at least.
+    let spacing_m = (safe_m * rng.between(1.5, 2.5)).ceil();
+    let count = rng.integer(bounds.obstacles[0], bounds.obstacles[1]);
+    let extent = extent(shape, drones, spacing_m);
+    let obstacles = obstacles(rng, count, extent.half_width_m)?;
+    let rear_m = obstacles.iter().map(|obstacle| obstacle.shape.bounds().1.x).fold(0.0, f64::max);
+    // Where the formation comes to rest: its last slot is beyond the last obstacle's planning distance.
+    let end_x_m = (rear_m + PLANNING_M + extent.depth_m + 20.0).ceil();
+    let mission = match rng.integer(0, 2) {
+        0 => format!("end = \"goal\"\ngoal_m = [{end_x_m}, 0]"),
+        _ => format!("end = \"hold\"\nstop_x_m = {end_x_m}"),
+    };
+    let mut text = format!("# Random scene {seed}.\n\nname = \"random-{seed}\"\nseed = {seed}\n");
+    let _ = write!(text, "\n[time]\ntimeout_s = 600\n");
+    let _ = write!(text, "\n[formation]\nshape = \"{shape}\"\ndrones = {drones}\nspacing_m = {spacing_m}\n");
+    let _ = write!(text, "\n[mission]\n{mission}\nreform_speed_max_mps = {}\n", rng.one(&["10", "15", "20"]));
+    let _ = write!(text, "\n[drone]\nsafe_distance_m = {safe_m}\n");
+    let _ = write!(text, "\n[sensors]\ndetection_range_m = {}\n", rng.between(60.0, 120.0).round());
+    let _ = write!(text, "\n[avoidance]\nclearance_m = {CLEARANCE_M}\nplanning_distance_m = {PLANNING_M}\n");
+    for obstacle in &obstacles {
+        text.push_str(&obstacle.toml);
+    }
+    Some(text)
+}
+
+fn extent(shape: &str, drones: u32, spacing_m: f64) -> Extent {
+    use skein_protocol::formation::Shape;
+    let shape = match shape {
+        "nested-v" => Shape::NestedV,
+        "v" => Shape::V,
+        "line" => Shape::Line,
+        "column" => Shape::Column,
+        "grid" => Shape::Grid,
+        _ => Shape::Circle,
+    };
+    let slots = shape.slots(drones as usize, spacing_m);
+    Extent {
+        half_width_m: slots.iter().map(|slot| slot.y.abs()).fold(0.0, f64::max),
+        depth_m: slots.iter().map(|slot| -slot.x).fold(0.0, f64::max),
+    }
+}
+
+/// Places the obstacles across the formation's course: at least 80 m ahead of the front slot, and over a length that
+/// grows with their number. `None` if an obstacle found no place.
+fn obstacles(rng: &mut SplitMix64, count: u32, half_width_m: f64) -> Option<Vec<PlacedObstacle>> {
+    let reach_m = 80.0 + rng.between(50.0, 250.0) * f64::from(count);
+    let across_m = half_width_m.max(60.0);
+    let mut placed: Vec<PlacedObstacle> = Vec::new();
+    for _ in 0..count {
+        let found = (0..PLACES).find_map(|_| {
+            let centre = Vec2::new(rng.between(120.0, 120.0 + reach_m), rng.between(-across_m, across_m));
+            let new = obstacle(rng, tenths(centre))?;
+            let ahead = new.shape.bounds().0.x >= 80.0;
+            let fits = ahead && placed.iter().all(|other| gap_is_clear_cut(&new.shape, &other.shape));
+            fits.then_some(new)
+        });
+        placed.push(found?);
+    }
+    Some(placed)
+}
+
+/// Whether the gap between two obstacles is either clearly closed or clearly open.
+fn gap_is_clear_cut(a: &ConvexShape, b: &ConvexShape) -> bool {
+    let core = |shape: &ConvexShape| shape.vertices().collect::<Vec<_>>();
+    let gap_m = separation(&core(a), &core(b)).norm() - a.radius_m - b.radius_m;
+    !(CLOSED..OPEN).contains(&(gap_m / (2.0 * CLEARANCE_M)))
+}
+
+/// One obstacle of any shape around a centre.
+fn obstacle(rng: &mut SplitMix64, centre: Vec2) -> Option<PlacedObstacle> {
+    let half = tenths(Vec2::new(rng.between(5.0, 40.0), rng.between(10.0, 90.0)));
+    let turn_rad = (rng.between(-PI / 2.0, PI / 2.0) * 100.0).round() / 100.0;
+    let at = format!("centre_m = [{}, {}]", centre.x, centre.y);
+    let sides = format!("[{}, {}]\nrotation_rad = {turn_rad}", half.x, half.y);
+    let table = match rng.integer(0, 3) {
+        0 => format!("shape = \"rectangle\"\n{at}\nhalf_size_m = {sides}"),
+        1 => format!("shape = \"circle\"\n{at}\nradius_m = {}", half.y.min(50.0)),
+        2 => format!("shape = \"ellipse\"\n{at}\nsemi_axes_m = {sides}"),
+        _ => format!("shape = \"polygon\"\nvertices_m = {}", polygon(rng, centre, half + Vec2::repeat(5.0))),
+    };
+    let parsed: skein_scenario::Obstacle = toml::from_str(&table).ok()?;
+    Some(PlacedObstacle { shape: parsed.shape().ok()?, toml: format!("\n[[obstacle]]\n{table}\n") })
+}
+
+/// Corners on an ellipse, so far from each other that rounding keeps the polygon convex.
+fn polygon(rng: &mut SplitMix64, centre: Vec2, half: Vec2) -> String {
+    let corners = rng.integer(3, 8);
+    let corner = |k: u32, rng: &mut SplitMix64| {
+        let angle = TAU * (f64::from(k) + rng.between(0.25, 0.75)) / f64::from(corners);
+        let at = centre + Vec2::new(angle.cos() * half.x, angle.sin() * half.y);
+        format!("[{:.2}, {:.2}]", at.x, at.y)
+    };
+    let list: Vec<String> = (0..corners).map(|k| corner(k, rng)).collect();
+    format!("[{}]", list.join(", "))
+}
+
+/// Rounds to a tenth of a metre.
+fn tenths(point: Vec2) -> Vec2 {
+    point.map(|value| (value * 10.0).round() / 10.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn three_hundred_seeds_give_valid_and_different_scenes() {
+        let mut texts = BTreeSet::new();
+        for seed in 1..=300 {
+            let scenario = random_scene(seed, SceneBounds::default(), &[]).unwrap();
+            assert_eq!(scenario.seed, seed);
+            assert!((5..=16).contains(&scenario.formation.drones));
+            assert!((1..=4).contains(&scenario.obstacles.len()));
+            assert!(scenario.formation.spacing_m >= 1.5 * scenario.drone.safe_distance_m);
+            let shapes = scenario.shapes().unwrap();
+            for (i, a) in shapes.iter().enumerate() {
+                assert!(a.bounds().0.x >= 80.0, "seed {seed}: drones start with room to stop");
+                for b in &shapes[..i] {
+                    let (p, q): (Vec<Vec2>, Vec<Vec2>) = (a.vertices().collect(), b.vertices().collect());
+                    let gap_m = separation(&p, &q).norm() - a.radius_m - b.radius_m;
+                    assert!(!(27.0..36.0).contains(&gap_m), "seed {seed}: {gap_m} m is neither closed nor open");
+                }
+            }
+            texts.insert(scene_toml(seed, SceneBounds::default()).unwrap());
+        }
+        assert_eq!(texts.len(), 300);
+    }
+
+    #[test]
+    fn all_shapes_and_ends_occur_and_a_seed_always_gives_the_same_scene() {
+        let all: String = (1..=60).map(|seed| scene_toml(seed, SceneBounds::default()).unwrap()).collect();
+        for word in ["rectangle", "circle", "ellipse", "polygon", "nested-v", "line", "grid", "goal", "hold"] {
+            assert!(all.contains(word), "{word}");
+        }
+        let again = || scene_toml(7, SceneBounds::default()).unwrap();
+        assert_eq!(again(), again());
+    }
+
+    #[test]
+    fn bounds_are_kept() {
+        let bounds = SceneBounds { drones: [3, 3], obstacles: [6, 6] };
+        for seed in 0..20 {
+            let scenario = random_scene(seed, bounds, &[]).unwrap();
+            assert_eq!((scenario.formation.drones, scenario.obstacles.len()), (3, 6));
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The results of a complete sweep, and the files and texts that show them.
+
+use crate::cells::{Cell, cells};
+use crate::energy_ratios::{self, EnergyRatios, energy_ratios};
+use crate::error::SweepError;
+use crate::experiment::Mission;
+use crate::grid::Grid;
+use crate::plots::{Plot, plots};
+use crate::row::{Row, write_csv};
+use crate::table::table;
+use serde_json::{Value, json};
+
+/// The results of a complete sweep.
+#[derive(Debug)]
+pub struct SweepReport<'a> {
+    grid: &'a Grid<'a>,
+    rows: Vec<Row>,
+    cells: Vec<Cell>,
+    ratios: Vec<EnergyRatios>,
+}
+
+impl<'a> SweepReport<'a> {
+    /// Evaluates the rows of all runs, which may be in any order.
+    pub(crate) fn new(grid: &'a Grid<'a>, mut rows: Vec<Row>) -> Self {
+        rows.sort_by_key(|row| row.job);
+        Self { grid, cells: cells(grid, &rows), ratios: energy_ratios(grid, &rows), rows }
+    }
+
+    /// One row for each run, in the order of the jobs.
+    #[must_use]
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// One cell for each combination, in the grid's order.
+    #[must_use]
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// The energy of each strategy against that of `shortest-path`.
+    #[must_use]
+    pub fn energy_ratios(&self) -> &[EnergyRatios] {
+        &self.ratios
+    }
+
+    /// The content of summary.json.
+    #[must_use]
+    pub fn summary(&self) -> Value {
+        let (experiment, keys) = (self.grid.experiment(), self.grid.keys());
+        json!({
+            "schema": "skein-sweep/1", "experiment": experiment.name, "runs": self.rows.len(),
+            "scenarios": experiment.scenarios.iter().map(scenario).collect::<Vec<Value>>(),
+            "seeds": experiment.seeds, "keys": keys,
+            "cells": self.cells.iter().map(|cell| cell.json(&keys)).collect::<Vec<Value>>(),
+            "ratios": self.ratios.iter().map(EnergyRatios::json).collect::<Vec<Value>>(),
+        })
+    }
+
+    /// The content of runs.csv: one line for each run.
+    #[must_use]
+    pub fn csv(&self) -> Vec<u8> {
+        let mut csv = Vec::new();
+        // Writing to memory cannot fail.
+        let _ = write_csv(&mut csv, self.grid, &self.rows);
+        csv
+    }
+
+    /// The content of ratios.csv; `None` if there are no energy ratios.
+    #[must_use]
+    pub fn ratios_csv(&self) -> Option<String> {
+        (!self.ratios.is_empty()).then(|| energy_ratios::csv(&self.ratios, &self.grid.keys()))
+    }
+
+    /// All plots.
+    ///
+    /// # Errors
+    /// [`SweepError::Plot`].
+    pub fn plots(&self) -> Result<Vec<Plot>, SweepError> {
+        let experiment = self.grid.experiment();
+        let mut all = plots(experiment, &self.cells)?;
+        let ratios = energy_ratios::figure(&experiment.name, &self.ratios)?;
+        all.extend(ratios.map(|svg| Plot { file: "ratios.svg".to_owned(), svg }));
+        Ok(all)
+    }
+
+    /// The results as a text table, followed by the energy ratios.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let table = table(&self.cells, &self.grid.keys(), &self.grid.experiment().metrics);
+        table + &energy_ratios::text(&self.ratios)
+    }
+}
+
+fn scenario(mission: &Mission) -> Value {
+    match mission {
+        Mission::Random => json!("random"),
+        Mission::File { path, .. } => json!(path),
+    }
+}

@@ -1,0 +1,131 @@
+//! The result of one run: a line of rows.jsonl, and of runs.csv.
+
+use crate::grid::Grid;
+use crate::metrics::METRICS;
+use serde::{Deserialize, Serialize};
+use skein_report::{Summary, Violation};
+use skein_scenario::Scenario;
+use std::io::Write;
+
+/// The result of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Job number of the run in the grid.
+    pub job: usize,
+    /// `reached`, `timeout`, `unsafe` or `aborted` if the run was flown; `invalid` if its scenario is not valid;
+    /// `failed` if it could not be flown.
+    pub outcome: String,
+    /// Why it did not reach its goal, in words.
+    pub reason: Option<String>,
+    /// Strategy as flown; empty if the run was not flown.
+    pub strategy: String,
+    /// Time to pass each obstacle set, s.
+    pub pass_times_s: Vec<Option<f64>>,
+    /// Drones on each route of each obstacle set, rightmost route first.
+    pub splits: Vec<Option<Vec<u32>>>,
+    /// One value for each of [`METRICS`]; empty if the run was not flown.
+    pub metrics: Vec<Option<f64>>,
+    /// Digest of the run, hex.
+    pub digest: Option<String>,
+}
+
+impl Row {
+    /// The row of a run that was flown.
+    #[must_use]
+    pub fn flown(job: usize, summary: &Summary, scenario: &Scenario) -> Self {
+        let outcome = serde_json::to_value(summary.outcome).ok().and_then(|word| word.as_str().map(str::to_owned));
+        let count = summary.violations.len();
+        let broken = summary.violations.first().map(|first| violation_text(first, count));
+        Self {
+            job,
+            outcome: outcome.unwrap_or_default(),
+            reason: broken.or_else(|| summary.reason.clone()),
+            strategy: summary.strategy.clone(),
+            pass_times_s: summary.stages.iter().map(|stage| stage.pass_time_s).collect(),
+            splits: summary.stages.iter().map(|stage| stage.split.clone()).collect(),
+            metrics: METRICS.iter().map(|metric| (metric.value)(summary, scenario)).collect(),
+            digest: summary.digest.clone(),
+        }
+    }
+
+    /// The row of a run that was not flown. Its outcome is `invalid` or `failed`.
+    #[must_use]
+    pub fn unflown(job: usize, outcome: &str, reason: &str) -> Self {
+        Self {
+            job,
+            outcome: outcome.to_owned(),
+            reason: Some(reason.to_owned()),
+            strategy: String::new(),
+            pass_times_s: Vec::new(),
+            splits: Vec::new(),
+            metrics: Vec::new(),
+            digest: None,
+        }
+    }
+
+    /// Whether the run reached its goal and kept every invariant.
+    #[must_use]
+    pub fn reached(&self) -> bool {
+        self.outcome == "reached"
+    }
+}
+
+fn violation_text(first: &Violation, count: usize) -> String {
+    let kind = serde_json::to_value(first.kind).unwrap_or_default();
+    let kind = kind.as_str().unwrap_or_default();
+    format!("{kind} of {:?}: {:.3} m at {} s, {count} in all", first.drones, first.value_m, first.t_s)
+}
+
+/// Writes runs.csv: one line for each row. Rows are in the order of their jobs.
+pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> std::io::Result<()> {
+    let mut head: Vec<&str> = vec!["scenario", "strategy", "seed"];
+    head.extend(grid.keys());
+    head.extend(["outcome", "pass_times_s", "splits"]);
+    head.extend(METRICS.iter().map(|metric| metric.name));
+    head.extend(["digest", "reason", "command"]);
+    line(out, head.iter().map(|&name| name.to_owned()))?;
+    for row in rows {
+        line(out, fields(grid, row).into_iter())?;
+    }
+    Ok(())
+}
+
+fn fields(grid: &Grid<'_>, row: &Row) -> Vec<String> {
+    let (combination, seed) = grid.job(row.job);
+    let number = |value: &Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let strategy =
+        if row.strategy.is_empty() { combination.strategy.clone().unwrap_or_default() } else { row.strategy.clone() };
+    let mut fields = vec![grid.scenario_name(combination), strategy, seed.to_string()];
+    fields.extend(combination.values.iter().map(|value| value.trim_matches('"').to_owned()));
+    fields.push(row.outcome.clone());
+    fields.push(row.pass_times_s.iter().map(number).collect::<Vec<_>>().join(" "));
+    fields.push(row.splits.iter().map(|split| slashed(split.as_deref())).collect::<Vec<_>>().join(" "));
+    fields.extend((0..METRICS.len()).map(|i| row.metrics.get(i).map(number).unwrap_or_default()));
+    fields.extend([row.digest.clone(), row.reason.clone()].map(Option::unwrap_or_default));
+    fields.push(grid.command(row.job));
+    fields
+}
+
+fn slashed(split: Option<&[u32]>) -> String {
+    let counts: Vec<String> = split.unwrap_or_default().iter().map(u32::to_string).collect();
+    counts.join("/")
+}
+
+fn line(out: &mut impl Write, fields: impl Iterator<Item = String>) -> std::io::Result<()> {
+    let quoted = |field: String| {
+        if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field }
+    };
+    writeln!(out, "{}", fields.map(quoted).collect::<Vec<_>>().join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_with_commas_and_quotes_are_quoted() {
+        let mut out = Vec::new();
+        line(&mut out, ["a", "b,c", "say \"d\"", ""].into_iter().map(str::to_owned)).unwrap();
+        assert_eq!(String::from_utf8(out).unwrap(), "a,\"b,c\",\"say \"\"d\"\"\",\n");
+    }
+}

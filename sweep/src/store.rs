@@ -1,0 +1,171 @@
+//! A sweep's folder: which experiment it belongs to, and the rows of the runs that are done.
+
+use crate::error::SweepError;
+use crate::row::Row;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+const IDENTITY: &str = "experiment.json";
+const PART: &str = "experiment.json.part";
+const ROWS: &str = "rows.jsonl";
+
+/// Which experiment a folder belongs to.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Identity {
+    /// Name and version of the folder's layout.
+    pub(crate) schema: String,
+    /// Name of the experiment.
+    pub(crate) name: String,
+    /// Hash of everything that decides what is flown: experiment, scenarios, overrides and program version.
+    pub(crate) hash: String,
+    /// Number of runs.
+    pub(crate) runs: usize,
+}
+
+/// An open folder. It is locked against a second sweep.
+#[derive(Debug)]
+pub(crate) struct Store {
+    folder: PathBuf,
+    rows: File,
+}
+
+impl Store {
+    /// Opens the folder, or makes it. Returns the rows that it already holds; an incomplete last line is dropped.
+    pub(crate) fn open(folder: &Path, identity: &Identity) -> Result<(Self, Vec<Row>), SweepError> {
+        identify(folder, identity)?;
+        let path = folder.join(ROWS);
+        let file = OpenOptions::new().read(true).append(true).create(true).open(&path);
+        let mut file = file.map_err(SweepError::io(&path))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(SweepError::Locked(folder.to_owned())),
+            Err(TryLockError::Error(error)) => return Err(SweepError::io(&path)(error)),
+        }
+        let (rows, complete) = read(&mut file, &path, identity.runs)?;
+        file.set_len(complete).map_err(SweepError::io(&path))?;
+        Ok((Self { folder: folder.to_owned(), rows: file }, rows))
+    }
+
+    /// Appends a row. When this returns, the line is in the file even if the process is killed right after.
+    pub(crate) fn keep(&mut self, row: &Row) -> Result<(), SweepError> {
+        let mut line = serde_json::to_vec(row)?;
+        line.push(b'\n');
+        self.rows.write_all(&line).map_err(SweepError::io(&self.folder.join(ROWS)))
+    }
+
+    /// Path of a file in the folder.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes a file of the folder atomically.
+    pub(crate) fn write(&self, name: &str, content: &[u8]) -> Result<(), SweepError> {
+        let (path, part) = (self.path(name), self.path(&format!("{name}.part")));
+        let folder = path.parent().unwrap_or(&self.folder);
+        let written = std::fs::create_dir_all(folder)
+            .and_then(|()| std::fs::write(&part, content))
+            .and_then(|()| std::fs::rename(&part, &path));
+        written.map_err(SweepError::io(&path))
+    }
+}
+
+/// Makes sure that the folder belongs to this experiment. Makes the folder if it does not exist or is empty.
+fn identify(folder: &Path, identity: &Identity) -> Result<(), SweepError> {
+    let path = folder.join(IDENTITY);
+    let found = match std::fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice::<Identity>(&bytes).ok(),
+        Err(_) if !folder.exists() => return create(folder, &path, identity),
+        Err(_) => None,
+    };
+    let folder = folder.to_owned();
+    match found {
+        Some(found) if found == *identity => Ok(()),
+        Some(Identity { name, .. }) if name == identity.name => Err(SweepError::Changed { folder, name }),
+        Some(Identity { name, .. }) => Err(SweepError::OtherExperiment { folder, name }),
+        None if is_empty(&folder) => create(&folder, &path, identity),
+        None => Err(SweepError::NotASweep(folder)),
+    }
+}
+
+/// Whether the folder holds nothing, except the file of a sweep that was killed while it made the folder.
+fn is_empty(folder: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    entries.flatten().all(|entry| entry.file_name() == PART)
+}
+
+fn create(folder: &Path, path: &Path, identity: &Identity) -> Result<(), SweepError> {
+    let text = serde_json::to_vec_pretty(identity)?;
+    let part = folder.join(PART);
+    let made = std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&part, text))
+        .and_then(|()| std::fs::rename(&part, path));
+    made.map_err(SweepError::io(folder))
+}
+
+/// The rows of the file, and the number of bytes up to the end of the last complete line.
+fn read(file: &mut File, path: &Path, runs: usize) -> Result<(Vec<Row>, u64), SweepError> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(0)).map_err(SweepError::io(path))?;
+    file.read_to_end(&mut bytes).map_err(SweepError::io(path))?;
+    let complete = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+    let lines = bytes[..complete].split(|&byte| byte == b'\n').filter(|line| !line.is_empty());
+    let mut rows: Vec<Row> = Vec::new();
+    let mut seen = vec![false; runs];
+    for (number, line) in lines.enumerate() {
+        let broken = |problem: String| SweepError::Row { path: path.to_owned(), line: number + 1, problem };
+        let row: Row = serde_json::from_slice(line).map_err(|error| broken(error.to_string()))?;
+        let known =
+            seen.get_mut(row.job).ok_or_else(|| broken(format!("expected a run below {runs}, found {}", row.job)))?;
+        if !std::mem::replace(known, true) {
+            rows.push(row);
+        }
+    }
+    Ok((rows, complete as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn identity(hash: &str) -> Identity {
+        Identity { schema: "s".to_owned(), name: "e".to_owned(), hash: hash.to_owned(), runs: 3 }
+    }
+
+    fn row(job: usize) -> Row {
+        Row { metrics: vec![Some(0.1), None], ..Row::unflown(job, "failed", "a\nb") }
+    }
+
+    #[test]
+    fn a_torn_last_line_is_dropped_and_the_rest_kept() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("deep/out");
+        let (mut store, rows) = Store::open(&folder, &identity("1")).unwrap();
+        assert_eq!(rows, []);
+        store.keep(&row(2)).unwrap();
+        store.keep(&row(0)).unwrap();
+        store.rows.write_all(b"{\"job\":1,\"outc").unwrap();
+        drop(store);
+        let (mut store, rows) = Store::open(&folder, &identity("1")).unwrap();
+        assert_eq!(rows, [row(2), row(0)]);
+        store.keep(&row(1)).unwrap();
+        drop(store);
+        let (_, rows) = Store::open(&folder, &identity("1")).unwrap();
+        assert_eq!(rows, [row(2), row(0), row(1)], "a row that is kept after a torn line has a line of its own");
+    }
+
+    #[test]
+    fn other_folders_and_broken_lines_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("out");
+        let (store, _) = Store::open(&folder, &identity("1")).unwrap();
+        assert!(matches!(Store::open(&folder, &identity("1")), Err(SweepError::Locked(_))));
+        drop(store);
+        assert!(matches!(Store::open(&folder, &identity("2")), Err(SweepError::Changed { .. })));
+        std::fs::write(folder.join(ROWS), "{}\n").unwrap();
+        assert!(matches!(Store::open(&folder, &identity("1")), Err(SweepError::Row { line: 1, .. })));
+        std::fs::write(root.path().join("mine.txt"), "").unwrap();
+        assert!(matches!(Store::open(root.path(), &identity("1")), Err(SweepError::NotASweep(_))));
+    }
+}

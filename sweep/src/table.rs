@@ -1,0 +1,69 @@
+//! A sweep's cells as a text table.
+
+use crate::cells::Cell;
+use crate::metrics::SUCCESS;
+use crate::statistics::Estimate;
+
+/// Greatest number of cells in the table. The others are in summary.json and the plots.
+const MAX_LINES: usize = 40;
+
+/// The table. Each line is a cell: its scenario and strategy, the keys that vary, the number of runs, and the mean ± half
+/// the interval of each metric.
+pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[&str]) -> String {
+    let varies = |&i: &usize| cells.iter().any(|cell| cell.values[i] != cells[0].values[i]);
+    let varying: Vec<usize> = (0..keys.len()).filter(varies).collect();
+    let mut head = vec!["scenario", "strategy"];
+    head.extend(varying.iter().map(|&i| keys[i]));
+    head.push("runs");
+    head.extend(metrics);
+    let mut lines: Vec<Vec<String>> = vec![head.into_iter().map(str::to_owned).collect()];
+    for cell in cells.iter().take(MAX_LINES) {
+        let mut line = vec![cell.scenario.clone(), cell.strategy.clone()];
+        line.extend(varying.iter().map(|&i| cell.values[i].clone()));
+        line.push(cell.outcomes.values().sum::<usize>().to_string());
+        line.extend(metrics.iter().map(|name| shown(name, cell.estimate(name))));
+        lines.push(line);
+    }
+    let columns = lines[0].len();
+    let width = |i: usize| lines.iter().map(|line| line[i].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for line in &lines {
+        let padded: Vec<String> = line.iter().zip(&widths).map(|(field, &width)| format!("{field:<width$}")).collect();
+        text += padded.join("  ").trim_end();
+        text.push('\n');
+    }
+    if cells.len() > MAX_LINES {
+        text += &format!("… and {} more in summary.json\n", cells.len() - MAX_LINES);
+    }
+    text
+}
+
+fn shown(name: &str, found: Option<Estimate>) -> String {
+    match found {
+        None => "-".to_owned(),
+        Some(found) if name == SUCCESS => {
+            format!("{:.1} % [{:.1}, {:.1}]", 100.0 * found.mean, 100.0 * found.low, 100.0 * found.high)
+        }
+        Some(found) => format!("{} ± {}", brief(found.mean), brief((found.high - found.low) / 2.0)),
+    }
+}
+
+/// Rounds to four significant digits; digits before the point are all kept.
+fn brief(value: f64) -> String {
+    let digits = if value == 0.0 { 0 } else { 3 - value.abs().log10().floor() as i32 };
+    let text = format!("{value:.*}", digits.clamp(0, 4) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (value, text) in [(0.0, "0"), (50.734_2, "50.73"), (54_113.2, "54113"), (1.0, "1"), (0.123_456, "0.1235")] {
+            assert_eq!(brief(value), text);
+        }
+    }
+}
