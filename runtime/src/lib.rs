@@ -21,7 +21,7 @@
 //!
 //! # Example
 //!
-//! Five drones fly past a tree. The sink reads the end of the mission from the record.
+//! Three drones fly past a tree. The sink reads the end of the mission from the record.
 //!
 //! ```
 //! use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
@@ -45,7 +45,9 @@
 //!
 //! let text = r#"
 //!     [formation]
-//!     drones = 5
+//!     shape = "v"
+//!     drones = 3
+//!     spacing_m = 60
 //!
 //!     [[obstacle]]
 //!     shape = "circle"

@@ -33,7 +33,7 @@ const MAX_RECOVERY_STEPS: u32 = 60;
 
 /// The faults that the adversary may still cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Faults {
+pub(crate) struct Faults {
     /// Number of messages lost, delayed or doubled.
     pub messages: u8,
     /// Number of drones killed. Each may be restarted.
@@ -44,7 +44,7 @@ pub struct Faults {
 
 /// A mission of few drones, and its faults.
 #[derive(Clone, Debug)]
-pub struct Mission {
+pub(crate) struct Mission {
     /// Number of drones, in a column, alternately left and right of the course.
     pub drones: u32,
     /// Number of steps with faults. The steps after them have none.
@@ -77,7 +77,7 @@ struct Post {
 
 /// The whole state at one moment.
 #[derive(Clone, Debug)]
-pub struct State {
+pub(crate) struct State {
     step: u32,
     processes: Vec<Process>,
     posts: Vec<(Post, Arc<Message>)>,
@@ -135,7 +135,7 @@ impl Hash for State {
 
 /// An action of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
+pub(crate) enum Event {
     /// All drones hear and act.
     Step,
     /// The message with this index is lost.

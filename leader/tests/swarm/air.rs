@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Loss, delay and doubling of messages, drawn by a keyed hash.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Air {
+pub(crate) struct Air {
     pub seed: u64,
     pub loss: f64,
     pub delay_s: f64,
@@ -33,11 +33,11 @@ impl Air {
 }
 
 /// Tick at which it is due, source, sequence number, destination.
-pub type Post = (u64, usize, u64, usize);
+pub(crate) type Post = (u64, usize, u64, usize);
 
 /// Machines, their motion, and the channel between them.
 #[derive(Clone)]
-pub struct Swarm {
+pub(crate) struct Swarm {
     pub periods: Periods,
     pub air: Air,
     pub tick: u64,
@@ -62,7 +62,7 @@ pub struct Swarm {
 
 impl Swarm {
     /// Drones in a column 40 m apart, the first ahead, all just started.
-    pub fn new(periods: Periods, air: Air, drones: usize) -> Self {
+    pub(crate) fn new(periods: Periods, air: Air, drones: usize) -> Self {
         let own = |i: usize| {
             let position = Vec2::new(-40.0 * i as f64, 7.0 * i as f64 - 3.0 * drones as f64);
             OwnState { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0) }
@@ -86,24 +86,24 @@ impl Swarm {
         }
     }
 
-    pub fn now(&self) -> SimTime {
+    pub(crate) fn now(&self) -> SimTime {
         SimTime::from_secs(self.tick as f64 * self.periods.dt_s)
     }
 
-    pub fn kill(&mut self, drone: usize) {
+    pub(crate) fn kill(&mut self, drone: usize) {
         self.drones[drone] = None;
         self.frozen[drone] = false;
         self.posts.retain(|post, _| post.3 != drone);
     }
 
-    pub fn restart(&mut self, drone: usize) {
+    pub(crate) fn restart(&mut self, drone: usize) {
         self.incarnations[drone] += 1;
         let params = params(&self.periods, self.own.len() as u32, drone as u32, self.incarnations[drone], self.now());
         self.drones[drone] = Some(Leading::new(&params));
     }
 
     /// Puts what a drone says on the air, to all who can hear it.
-    pub fn send(&mut self, from: usize, message: Message) {
+    pub(crate) fn send(&mut self, from: usize, message: Message) {
         self.sequence += 1;
         for to in (0..self.own.len()).filter(|&to| to != from) {
             let Some(delay_s) = self.air.delay_s(self.sequence, to) else { continue };
@@ -113,19 +113,19 @@ impl Swarm {
     }
 
     /// Messages under way, the next due first.
-    pub fn posts(&mut self) -> &mut BTreeMap<Post, Message> {
+    pub(crate) fn posts(&mut self) -> &mut BTreeMap<Post, Message> {
         &mut self.posts
     }
 
     /// Removes the message with this index, modulo their number.
-    pub fn take_post(&mut self, index: usize) -> Option<(Post, Message)> {
+    pub(crate) fn take_post(&mut self, index: usize) -> Option<(Post, Message)> {
         let index = index.checked_rem(self.posts.len())?;
         let post = *self.posts.keys().nth(index)?;
         self.posts.remove_entry(&post)
     }
 
     /// One tick: all drones hear the messages that are due, then all act.
-    pub fn step(&mut self) -> Result<(), Breach> {
+    pub(crate) fn step(&mut self) -> Result<(), Breach> {
         self.deliver();
         let now = self.now();
         let mut said = Vec::new();
@@ -173,14 +173,14 @@ impl Swarm {
     }
 
     /// Runs for `seconds`.
-    pub fn run(&mut self, seconds: f64) {
+    pub(crate) fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds / self.periods.dt_s).round() as u64 {
             self.step().unwrap();
         }
     }
 
     /// Runs until `wrong` returns `None`. Returns how long that took, s, or what is wrong after `limit_s`.
-    pub fn until(&mut self, limit_s: f64, wrong: impl Fn(&Self) -> Option<String>) -> Result<f64, String> {
+    pub(crate) fn until(&mut self, limit_s: f64, wrong: impl Fn(&Self) -> Option<String>) -> Result<f64, String> {
         let start = self.tick;
         loop {
             let passed_s = (self.tick - start) as f64 * self.periods.dt_s;
@@ -193,19 +193,19 @@ impl Swarm {
     }
 
     /// The drones of one side that are neither dead nor frozen.
-    pub fn side(&self, side: u8) -> Vec<(DroneId, &Leading)> {
+    pub(crate) fn side(&self, side: u8) -> Vec<(DroneId, &Leading)> {
         let of_side = |&i: &usize| self.sides[i] == side && !self.frozen[i];
         let living = |i: usize| self.drones[i].as_ref().map(|leading| (DroneId(i as u32), leading));
         (0..self.drones.len()).filter(of_side).filter_map(living).collect()
     }
 
     /// What keeps the drones of a side from being one group.
-    pub fn disunion(&self, side: u8) -> Option<String> {
+    pub(crate) fn disunion(&self, side: u8) -> Option<String> {
         disunion(&self.side(side))
     }
 
     /// The term that a living drone obeys.
-    pub fn term(&self, drone: usize) -> Option<Ballot> {
+    pub(crate) fn term(&self, drone: usize) -> Option<Ballot> {
         self.drones[drone].as_ref().map(|leading| leading.term())
     }
 }

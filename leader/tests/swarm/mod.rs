@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-pub mod air;
+pub(crate) mod air;
 
 use skein_leader::election::ElectionParams;
 use skein_leader::leading::Leading;
@@ -18,11 +18,11 @@ use skein_protocol::{Ballot, DroneId, Message, ObstacleId, PlanStamp, SimTime, V
 use std::collections::BTreeMap;
 
 /// Nominal speed, m/s.
-pub const SPEED_MPS: f64 = 10.0;
+pub(crate) const SPEED_MPS: f64 = 10.0;
 
 /// Periods and time-outs of a swarm, s.
 #[derive(Clone, Copy, Debug)]
-pub struct Periods {
+pub(crate) struct Periods {
     pub dt_s: f64,
     pub beacon_s: f64,
     pub heartbeat_s: f64,
@@ -34,7 +34,7 @@ pub struct Periods {
 }
 
 /// The defaults of a scenario.
-pub const DEFAULT: Periods = Periods {
+pub(crate) const DEFAULT: Periods = Periods {
     dt_s: 0.02,
     beacon_s: 0.1,
     heartbeat_s: 0.2,
@@ -46,7 +46,7 @@ pub const DEFAULT: Periods = Periods {
 };
 
 /// Parameters of the machine of drone `me`.
-pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTime) -> LeadingParams {
+pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTime) -> LeadingParams {
     LeadingParams {
         me: DroneId(me),
         drones,
@@ -79,13 +79,13 @@ pub fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTim
 }
 
 /// A wall across the course line at `x_m`, with a route past it on either side.
-pub fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
+pub(crate) fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
     let shape = ConvexShape::rectangle(Vec2::new(x_m, 0.0), Vec2::new(5.0, 50.0), 0.0).unwrap();
     (ObstacleId(id), shape)
 }
 
 /// A drone's tick after it has heard its messages, in the pilot's order.
-pub fn step(leading: &mut Leading, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
+pub(crate) fn step(leading: &mut Leading, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
     leading.elect(now, own, say);
     if leading.is_leader() {
         leading.refresh_members(now, own);
@@ -100,7 +100,7 @@ pub fn step(leading: &mut Leading, now: SimTime, own: &OwnState, say: &mut Vec<M
 
 /// A breach of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub enum Breach {
+pub(crate) enum Breach {
     /// Two drones know, or obey, different plans or assignments under one (ballot, epoch).
     TwoPlans { drone: DroneId, of: DroneId, stamp: PlanStamp },
     /// The stamp or term that a drone obeys went back within an incarnation.
@@ -113,7 +113,7 @@ pub enum Breach {
 
 /// Checks the invariants against what was seen so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Watch {
+pub(crate) struct Watch {
     /// Hash of each drone's part in each plan; under [`DroneId::NONE`] the plan's own.
     parts: BTreeMap<(PlanStamp, DroneId), u64>,
     /// The leader of each ballot.
@@ -124,7 +124,7 @@ pub struct Watch {
 
 impl Watch {
     /// Checks a drone.
-    pub fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
+    pub(crate) fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
         let (term, stamp) = (leading.term(), leading.stamp());
         let (from, to) = (self.obeyed.insert((drone, incarnation), (term, stamp)).unwrap_or_default(), (term, stamp));
         if from.0 > to.0 || from.1 > to.1 {
@@ -151,14 +151,14 @@ impl Watch {
     }
 }
 
-pub fn hash(bytes: &[u8]) -> u64 {
+pub(crate) fn hash(bytes: &[u8]) -> u64 {
     let mut digest = Digest::default();
     digest.bytes(bytes);
     digest.value()
 }
 
 /// What is wrong among drones that hear each other. Each must obey the highest term for its group that one of them leads.
-pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
+pub(crate) fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
     let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.is_leader()).collect();
     for (id, leading) in drones {
         let group = leading.group();
@@ -173,7 +173,7 @@ pub fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
 
 /// What is wrong among drones that hear each other and have no obstacle ahead. One must lead, and all must obey one plan for
 /// all of them.
-pub fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
+pub(crate) fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
     if let Some(discord) = discord(drones) {
         return Some(discord);
     }
