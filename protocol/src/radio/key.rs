@@ -13,7 +13,7 @@ pub(super) struct KeyedRng(u64);
 
 impl KeyedRng {
     /// For one frame at one receiver; `purpose` keeps its draws apart from each other.
-    pub fn of_frame(seed: u64, link: Link, purpose: &[u8; 4]) -> Self {
+    pub(crate) fn of_frame(seed: u64, link: Link, purpose: &[u8; 4]) -> Self {
         let mut key = [0; 20];
         key[..4].copy_from_slice(&link.source.0.to_le_bytes());
         key[4..8].copy_from_slice(&link.destination.0.to_le_bytes());
@@ -24,7 +24,7 @@ impl KeyedRng {
     }
 
     /// For two drones, in this order, and a number.
-    pub fn of_pair(seed: u64, pair: [DroneId; 2], number: i64, purpose: &[u8; 4]) -> Self {
+    pub(crate) fn of_pair(seed: u64, pair: [DroneId; 2], number: i64, purpose: &[u8; 4]) -> Self {
         let mut key = [0; 20];
         key[..4].copy_from_slice(&pair[0].0.to_le_bytes());
         key[4..8].copy_from_slice(&pair[1].0.to_le_bytes());
@@ -34,19 +34,19 @@ impl KeyedRng {
     }
 
     /// Uniform in [0, 1). The first one is the key's hash itself.
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         let value = (self.0 >> 11) as f64 / (1u64 << 53) as f64;
         self.0 = mix(self.0.wrapping_add(0x9e37_79b9_7f4a_7c15));
         value
     }
 
     /// Exponential.
-    pub fn exponential(&mut self, mean: f64) -> f64 {
+    pub(crate) fn exponential(&mut self, mean: f64) -> f64 {
         -libm::log(1.0 - self.unit()) * mean
     }
 
     /// Standard normal: Marsaglia's polar method.
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         for _ in 0..TRIES {
             let (x, y) = (2.0 * self.unit() - 1.0, 2.0 * self.unit() - 1.0);
             let square = x * x + y * y;
@@ -58,13 +58,13 @@ impl KeyedRng {
     }
 
     /// Normal, of the part that is not negative; `mean` must not be negative either.
-    pub fn normal_above_zero(&mut self, mean: f64, deviation: f64) -> f64 {
+    pub(crate) fn normal_above_zero(&mut self, mean: f64, deviation: f64) -> f64 {
         let mut draws = std::iter::repeat_with(|| mean + deviation * self.normal());
         draws.by_ref().take(TRIES).find(|&value| value >= 0.0).unwrap_or(mean)
     }
 
     /// Gamma of this shape and scale 1: Marsaglia and Tsang's method.
-    pub fn gamma(&mut self, shape: f64) -> f64 {
+    pub(crate) fn gamma(&mut self, shape: f64) -> f64 {
         if shape < 1.0 {
             return self.gamma(shape + 1.0) * libm::pow(1.0 - self.unit(), 1.0 / shape);
         }
