@@ -8,6 +8,7 @@ mod doctor;
 mod exit;
 mod input;
 mod interrupt;
+mod options;
 mod progress;
 mod replay;
 mod report;

@@ -1,8 +1,8 @@
 //! `skein replay`: flies a recorded run again from its manifest, and compares the digests.
 
-use crate::cli::{PinChoice, RuntimeChoice, WaitChoice};
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::options::{PinChoice, RuntimeChoice, WaitChoice};
 use clap::Args;
 use serde_json::json;
 use skein_protocol::record::Outcome;

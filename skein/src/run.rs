@@ -1,10 +1,11 @@
 //! `skein run`: flies one mission.
 
-use crate::cli::{RunArgs, RuntimeChoice};
+use crate::cli::RunArgs;
 use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
+use crate::options::RuntimeChoice;
 use crate::progress::MissionBar;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};

@@ -1,8 +1,8 @@
 //! `skein sweep` and `skein scene`.
 
-use crate::cli::{ArgumentError, key_value};
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::options::{ArgumentError, key_value};
 use crate::progress::RunsBar;
 use clap::Args;
 use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml};

@@ -1,0 +1,65 @@
+//! Values of options that several commands share.
+
+use clap::ValueEnum;
+use skein_bus::{PinMode, WaitMode};
+
+/// Which runtime.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RuntimeChoice {
+    /// One process for the world and one for each drone
+    #[default]
+    Processes,
+    /// Function calls in one thread
+    Inline,
+}
+
+/// Whether processes are pinned to cores.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PinChoice {
+    /// Drone i to core i modulo the number of cores
+    #[default]
+    Auto,
+    /// The operating system decides
+    Off,
+}
+
+impl From<PinChoice> for PinMode {
+    fn from(choice: PinChoice) -> Self {
+        match choice {
+            PinChoice::Auto => Self::Auto,
+            PinChoice::Off => Self::Off,
+        }
+    }
+}
+
+/// How processes wait for each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WaitChoice {
+    /// Sleep until woken
+    #[default]
+    Block,
+    /// Look again and again, and yield the core in between
+    Yield,
+}
+
+impl From<WaitChoice> for WaitMode {
+    fn from(choice: WaitChoice) -> Self {
+        match choice {
+            WaitChoice::Block => Self::Block,
+            WaitChoice::Yield => Self::Yield,
+        }
+    }
+}
+
+/// Parses `KEY.PATH=VALUE`, the value of `--set`.
+pub(crate) fn key_value(text: &str) -> Result<(String, String), ArgumentError> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err(ArgumentError("expected key.path=value")),
+    }
+}
+
+/// Why an argument is refused.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct ArgumentError(pub &'static str);
