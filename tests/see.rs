@@ -50,7 +50,7 @@ fn a_running_swarm_shows_in_the_terminal() {
     assert!(lines.iter().all(|line| line["drone"] == 3 && line["kind"] == "pose") && lines.len() == 2, "{poses:?}");
     let top = place.run(&["top", "--once"]);
     assert!(top.stdout.contains("s2-right.") && top.stdout.contains("8/8"), "{top:?}");
-    assert!(place.run(&["top"]).stderr.contains("no terminal"));
+    assert!(place.run(&["top"]).stderr.contains("not a terminal"));
     flight.finish();
 }
 
@@ -121,5 +121,5 @@ fn doctor_prints_how_many_drones_fit() {
     let limits = found["limits"].as_array().unwrap();
     let least = limits.iter().filter_map(|limit| limit["drones"].as_u64()).min();
     assert_eq!((found["drones"].as_u64(), limits.len()), (least, 6));
-    assert!(place.run(&["doctor"]).stdout.starts_with("some "));
+    assert!(place.run(&["doctor"]).stdout.starts_with("about "));
 }

@@ -12,8 +12,7 @@
 //! This crate does not print and does not watch signals: progress and interruption are callbacks. It knows no other
 //! missions than the paper's and those that are compared with them.
 //!
-//! ```no_run
-//! # // A flight takes some seconds in a build without optimisation.
+//! ```
 //! use skein_reproduce::{Flight, PAPER};
 //!
 //! // Row R3: obstacle to the right, the paper's rule. Published: 32 s from detection to pass.
