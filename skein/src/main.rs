@@ -1,4 +1,9 @@
 //! The `skein` binary: parses the command line, calls the libraries and prints.
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "the doc comments of options are their help texts, not Markdown"
+)]
 
 mod bench;
 mod check;
