@@ -42,7 +42,6 @@
 //! assert_eq!(command.acceleration, Vec2::new(-2.0, 0.0));
 //! ```
 
-#![warn(unreachable_pub, clippy::undocumented_unsafe_blocks)]
 pub mod detection;
 pub mod emergency_route;
 pub mod escape;

@@ -3,6 +3,9 @@
 use crate::Vec2;
 use serde::{Deserialize, Serialize};
 
+/// A formation counts as held while its drones move no faster than this relative to it, m/s.
+pub const HOLD_SPEED_MPS: f64 = 1.0;
+
 /// A formation that can be made for any number of drones, spaced by `spacing_m`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

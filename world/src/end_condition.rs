@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::grid::Grid;
 use crate::params::{End, WorldParams};
 use crate::stages::Stages;
-use crate::tuning::HOLD_SPEED_MPS;
+use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::Vec2;
 
 /// Whether the living drones stand in their formation.

@@ -6,11 +6,6 @@
 /// acceleration. Check it with `skein run FILE --clock wall` on a loaded machine and read the deadline misses.
 pub(crate) const COMMAND_HOLD_S: f64 = 0.2;
 
-/// Highest speed of a drone in a formation that counts as held, m/s.
-///
-/// Chosen by hand: a tenth of the paper's cruise speed. `skein reproduce` shows the mission times that follow from it.
-pub(crate) const HOLD_SPEED_MPS: f64 = 1.0;
-
 /// Altitude from which a drone without a process lands, m. Chosen by hand; no command measures it.
 pub(crate) const FLIGHT_ALTITUDE_M: f64 = 20.0;
 

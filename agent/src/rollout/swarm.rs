@@ -11,10 +11,8 @@ use skein_leader::params::{Destination, Objective};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
+use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2};
-
-/// A formation that is held moves no faster, m/s.
-const HOLD_SPEED_MPS: f64 = 1.0;
 
 /// One simulated drone.
 #[derive(Clone, Debug)]
