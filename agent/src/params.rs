@@ -11,9 +11,6 @@ use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
 use skein_protocol::{DroneId, SimTime};
 
-/// Simulated drones sense obstacles within this distance, m.
-const OBSTACLE_REACH_M: f64 = 90.0;
-
 /// Parameters of a [`crate::SwarmPilot`].
 #[derive(Clone, Debug)]
 pub struct PilotParams {
@@ -31,6 +28,8 @@ pub struct PilotParams {
     pub guidance: GuidanceParams,
     /// The safety filter.
     pub safety: SafetyParams,
+    /// Range of its obstacle sensor, m.
+    pub detection_range_m: f64,
     /// Whether it has a sensor that ranges neighbours.
     pub ranging: bool,
     /// Stopping distances.
@@ -79,7 +78,7 @@ impl PilotParams {
             safe_distance_m: self.safety.safe_distance_m,
             clearance_m: self.safety.clearance_m,
             acceleration_max_mps2: self.safety.acceleration_max_mps2,
-            detection_range_m: OBSTACLE_REACH_M,
+            detection_range_m: self.detection_range_m,
             ranging_m: RANGING_FACTOR * self.safety.safe_distance_m,
             speed_mps: self.guidance.speed_mps,
             reform_speed_max_mps: self.guidance.reform_speed_max_mps,

@@ -97,6 +97,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             reaction_time_s: drone.reaction_time_s,
             dt_s: scenario.time.dt_s,
         },
+        detection_range_m: scenario.sensors.detection_range_m,
         ranging: scenario.sensors.ranging,
         braking: Braking { drag_coefficient: drone.drag_coefficient, reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
