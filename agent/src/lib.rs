@@ -7,6 +7,8 @@
 //! - [`route_follower`] follows the routes past obstacles, and [`emergency_route`] finds one that no leader has planned;
 //! - [`queue`] keeps a headway on a shared route;
 //! - [`guidance`] brings a drone to its slot in the formation;
+//! - [`braking_filter`] is the safety rule with a proof (docs/safety.md): a crowd that follows it keeps its distances;
+//! - [`navigator`] finds the shortest path round all obstacles that a drone knows;
 //! - [`safety`] is the filter that keeps the distances to obstacles and neighbours, whatever the others do;
 //! - [`escape`] frees a drone that is stuck;
 //! - [`rollout`] simulates alternative plans with any pilot that implements [`rollout::RolloutPilot`].
@@ -42,10 +44,13 @@
 //! assert_eq!(command.acceleration, Vec2::new(-2.0, 0.0));
 //! ```
 
+pub mod braking_filter;
+pub mod braking_path;
 pub mod detection;
 pub mod emergency_route;
 pub mod escape;
 pub mod guidance;
+pub mod navigator;
 mod neighbour_table;
 mod params;
 mod pilot;
@@ -61,6 +66,7 @@ mod state_predictor;
 mod straggler;
 mod swarm_pilot;
 mod tuning;
+pub mod visibility;
 
 pub use params::PilotParams;
 pub use pilot::{Command, Heard, Pilot};

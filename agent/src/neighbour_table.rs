@@ -1,6 +1,6 @@
 //! The neighbours that a drone keeps its distance from, and its share of each evasion.
 
-use crate::safety::{Neighbour, RANGING_FACTOR};
+use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::peers::{Peers, extrapolated};
 use skein_protocol::downlink::Senses;
@@ -12,8 +12,8 @@ use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
 pub(crate) struct NeighbourParams {
     /// Least distance between two drones, m.
     pub(crate) safe_distance_m: f64,
-    /// Whether the drone has a sensor that ranges neighbours.
-    pub(crate) ranging: bool,
+    /// Neighbours within this distance are sensed, m; `None` without a sensor that ranges them.
+    pub(crate) ranging_m: Option<f64>,
     /// Share of an evasion that the rear one of two queued drones takes, 0.5 to 1.
     pub(crate) precedence_share: f64,
 }
@@ -62,8 +62,7 @@ impl NeighbourTable {
             });
         }
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
-        let ranges = self.params.ranging && !senses.broken.ranging;
-        let least_m = if ranges { RANGING_FACTOR * self.params.safe_distance_m } else { 0.0 };
+        let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         for (id, pose) in view.peers.living(view.now) {
             let position_m = extrapolated(pose, senses.now) - senses.position;
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
@@ -107,7 +106,8 @@ mod tests {
     use skein_protocol::downlink::SensedNeighbour;
     use skein_protocol::payload::{MAX_PLACES, Pose};
 
-    const PARAMS: NeighbourParams = NeighbourParams { safe_distance_m: 30.0, ranging: true, precedence_share: 0.8 };
+    const PARAMS: NeighbourParams =
+        NeighbourParams { safe_distance_m: 30.0, ranging_m: Some(60.0), precedence_share: 0.8 };
 
     fn place(rank: u16) -> QueuePlace {
         QueuePlace { remaining_m: 50.0, set: 7, route: 1, rank }

@@ -1,11 +1,12 @@
 //! Parameters of a [`crate::SwarmPilot`]: constants of the vehicle and the mission, and no knowledge of the swarm's state.
 
+use crate::braking_filter::BrakingFilterParams;
 use crate::detection::Braking;
 use crate::guidance::GuidanceParams;
 use crate::neighbour_table::NeighbourParams;
 use crate::queue::QueueParams;
 use crate::rollout::RolloutParams;
-use crate::safety::{RANGING_FACTOR, SafetyParams};
+use crate::safety::SafetyParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
@@ -22,14 +23,18 @@ pub struct PilotParams {
     pub incarnation: u32,
     /// When it starts.
     pub start: SimTime,
-    /// Length of a tick, s.
+    /// Time between two steps of the pilot, s: a tick, or a step of a look-ahead.
     pub dt_s: f64,
+    /// Length of a tick, s.
+    pub tick_s: f64,
     /// Formation flight.
     pub guidance: GuidanceParams,
     /// The safety filter.
     pub safety: SafetyParams,
     /// Range of its obstacle sensor, m.
     pub detection_range_m: f64,
+    /// Greatest speed, m/s.
+    pub speed_max_mps: f64,
     /// Whether it has a sensor that ranges neighbours.
     pub ranging: bool,
     /// Stopping distances.
@@ -79,7 +84,7 @@ impl PilotParams {
             clearance_m: self.safety.clearance_m,
             acceleration_max_mps2: self.safety.acceleration_max_mps2,
             detection_range_m: self.detection_range_m,
-            ranging_m: RANGING_FACTOR * self.safety.safe_distance_m,
+            ranging_m: self.safety.ranging_m,
             speed_mps: self.guidance.speed_mps,
             reform_speed_max_mps: self.guidance.reform_speed_max_mps,
             planner: self.planner.clone(),
@@ -94,10 +99,32 @@ impl PilotParams {
         }
     }
 
+    pub(crate) fn braking_filter(&self) -> BrakingFilterParams {
+        BrakingFilterParams {
+            safe_distance_m: self.safety.safe_distance_m,
+            clearance_m: self.safety.clearance_m,
+            acceleration_max_mps2: self.safety.acceleration_max_mps2,
+            speed_max_mps: self.speed_max_mps,
+            dt_s: self.dt_s,
+        }
+    }
+
+    /// The speed up to which the drone can stop within what it senses, if its commands take effect `lag` ticks late, m/s.
+    /// Two drones that come into ranging distance must both be able to stop.
+    pub(crate) fn speed_on_sight_mps(&self, lag: u32) -> f64 {
+        let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
+        let obstacles_mps = filter.speed_within_mps(self.detection_range_m - self.safety.clearance_m, lag);
+        if !self.ranging || self.drones < 2 {
+            return obstacles_mps;
+        }
+        let room_m = self.safety.ranging_m - self.safety.safe_distance_m - filter.margin_m();
+        obstacles_mps.min(filter.speed_within_mps(room_m / 2.0, lag))
+    }
+
     pub(crate) fn neighbours(&self) -> NeighbourParams {
         NeighbourParams {
             safe_distance_m: self.safety.safe_distance_m,
-            ranging: self.ranging,
+            ranging_m: self.ranging.then_some(self.safety.ranging_m),
             precedence_share: self.precedence_share,
         }
     }

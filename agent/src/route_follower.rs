@@ -195,6 +195,15 @@ impl RouteFollower {
         self.corridor.as_ref().map(|corridor| corridor.pull(position, self.first_gate_x_m()))
     }
 
+    /// Where the route ends (world frame, m), if a leg of it is not free; `None` if all are, or nothing lies ahead.
+    #[must_use]
+    pub fn end_if_blocked(&self, position: Vec2, is_free: impl Fn(Vec2, Vec2) -> bool) -> Option<Vec2> {
+        let corridor = self.corridor.as_ref()?;
+        let mut free = true;
+        corridor.visit_legs(position, |from, to| free = free && is_free(from, to));
+        (!free).then(|| corridor.target())
+    }
+
     fn first_gate_x_m(&self) -> f64 {
         self.legs.iter().find(|leg| leg.open).map_or(f64::INFINITY, |leg| leg.gate_x_m)
     }

@@ -9,9 +9,6 @@ use crate::program::{HalfPlane, Program};
 use skein_protocol::{DroneId, Vec2};
 use std::collections::VecDeque;
 
-/// Range of the sensor for neighbours, in safe distances.
-pub const RANGING_FACTOR: f64 = 2.0;
-
 /// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SafetyParams {
@@ -29,11 +26,13 @@ pub struct SafetyParams {
     pub reaction_time_s: f64,
     /// Time between two calls of the filter, s.
     pub dt_s: f64,
+    /// Neighbours within this distance are sensed, m.
+    pub ranging_m: f64,
 }
 
 /// Obstacles farther away than the clearance plus this are ignored, m.
 const OBSTACLE_REACH_M: f64 = 60.0;
-/// Margin on the clearance, m. It covers the length of a tick and [`TANGENT_M`].
+/// Margin on the clearance, m. It covers the length of a tick and `TANGENT_M`.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
 /// Shortfall above which a neighbour is treated as non-cooperative, m/s².
 const NON_COOPERATIVE_MPS2: f64 = 2.0;
@@ -43,7 +42,7 @@ const INTRUSION: f64 = 0.5;
 const MIN_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration that is assumed for braking before an obstacle. The rest is left for turning.
 const OBSTACLE_BRAKING: f64 = 0.7;
-/// Least margin on the safe distance, m. It covers the length of a tick and [`TANGENT_M`].
+/// Least margin on the safe distance, m. It covers the length of a tick and `TANGENT_M`.
 pub const MIN_MARGIN_M: f64 = 0.25;
 /// Below this x, √x is continued by its tangent, m: near 0 it would be arbitrarily steep, and below 0 it does not exist. A
 /// drone that is pushed against the border comes to rest this far beyond it.
@@ -236,7 +235,7 @@ impl SafetyParams {
     #[must_use]
     pub fn speed_on_sight_mps(&self) -> f64 {
         let (late_s, brake) = (self.reaction_time_s, self.acceleration_max_mps2);
-        let room_m = (RANGING_FACTOR * self.safe_distance_m - self.keep_m(late_s)).max(0.0);
+        let room_m = (self.ranging_m - self.keep_m(late_s)).max(0.0);
         (brake * late_s).hypot((brake * room_m).sqrt()) - brake * late_s
     }
 
@@ -289,7 +288,7 @@ impl SafetyParams {
     }
 }
 
-/// √(2 α x), m/s, and its slope, 1/s. Continued by its tangent below [`TANGENT_M`].
+/// √(2 α x), m/s, and its slope, 1/s. Continued by its tangent below `TANGENT_M`.
 fn root(alpha: f64, x: f64) -> (f64, f64) {
     let least = (2.0 * alpha * TANGENT_M).sqrt();
     if x < TANGENT_M {

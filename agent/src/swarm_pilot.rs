@@ -1,10 +1,12 @@
 //! The paper's pilot: it detects obstacles, obeys plans, avoids, queues and re-forms, and it plans while it leads (paper,
 //! Algorithm 1).
 
+use crate::braking_filter::{BrakingFilter, Moving, OwnMotion};
 use crate::detection::Detection;
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::Escape;
 use crate::guidance::anchor;
+use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
 use crate::pilot::{Command, Heard, Pilot};
@@ -17,7 +19,7 @@ use crate::silent_drones::SilentDrones;
 use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::Straggler;
-use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, SILENT_DRONE_RADIUS};
+use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S, SILENT_DRONE_RADIUS};
 use skein_leader::cost::Flight;
 use skein_leader::leading::Leading;
 use skein_leader::ledger::Ledger;
@@ -38,6 +40,10 @@ pub struct SwarmPilot {
     route: RouteFollower,
     queue: QueuePacer,
     safety: Safety,
+    braking_filter: BrakingFilter,
+    navigator: Navigator,
+    /// The end of the planned route, while a known obstacle blocks it (world frame, m).
+    detour_to: Option<Vec2>,
     reaction: ReactionDelay,
     predictor: StatePredictor,
     escape: Escape,
@@ -63,6 +69,9 @@ impl SwarmPilot {
             route: RouteFollower::new(params.me, params.planner.course_y_m),
             queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
+            braking_filter: BrakingFilter::new(params.braking_filter()),
+            navigator: Navigator::new(params.safety.clearance_m, params.planner.routes.planning_distance_m),
+            detour_to: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             predictor: StatePredictor::default(),
             escape: Escape::default(),
@@ -175,6 +184,10 @@ impl SwarmPilot {
 
     /// Takes the shortest route past an obstacle that is in the danger zone and that no plan covers.
     fn emergency_avoidance(&mut self, senses: &Senses<'_>) {
+        // While the formation closes, the path to the slot leads round obstacles anyway.
+        if self.leading.obeyed().is_some_and(|bundle| bundle.plan.phase() == Phase::Reform) {
+            return;
+        }
         let Some(id) = self.urgent_obstacle(senses) else { return };
         let obstacles = self.leading.obstacles();
         let Some(set) = obstacles.sets().iter().find(|set| set.contains(&id)) else { return };
@@ -211,22 +224,58 @@ impl SwarmPilot {
             return Vec2::new(-BACK_OUT_SPEED * guidance.speed_mps, 0.0);
         }
         if let Some(steering) = self.route.steering(senses.position) {
-            return steering.direction * self.queue_speed_mps(senses.now, open);
+            let direction = self.detour(senses).unwrap_or(steering.direction);
+            return direction * self.queue_speed_mps(senses.now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
         let unfollowed = self.leading.is_unfollowed(senses.now);
         if let Some((slot, velocity)) = self.straggler.slot(senses.now, unfollowed, shape, spacing_m) {
-            return self.limit_on_sight(guidance.to_slot(slot - senses.position, velocity), senses.now);
+            let wanted = self.velocity_to_slot(senses, slot, velocity);
+            return self.limit_on_sight(wanted, senses.now);
         }
         let stale = self.stale_formation.is_stale(senses.now, self.leading.obeyed(), self.leading.term());
         match (self.leading.obeyed(), self.leading.part()) {
             (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !stale => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
-                let wanted = guidance.to_slot(anchor + Vec2::from(part.slot_m) - senses.position, velocity);
+                let wanted = self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity);
                 self.limit_on_sight(wanted, senses.now)
             }
             _ => Vec2::new(guidance.speed_mps, 0.0),
         }
+    }
+
+    /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route.
+    fn detour(&mut self, senses: &Senses<'_>) -> Option<Vec2> {
+        let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
+        if self.update_map() || senses.tick.is_multiple_of(period) {
+            self.detour_to = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_free(a, b));
+        }
+        let target = self.detour_to?;
+        let next = match self.navigator.head(senses.tick, senses.position, target) {
+            Heading::Straight => target,
+            Heading::Via(corner) => corner,
+            Heading::NoPath => return None,
+        };
+        (next - senses.position).try_normalize(1e-9)
+    }
+
+    /// The velocity that takes the drone to a slot, round whatever is in the way, m/s.
+    fn velocity_to_slot(&mut self, senses: &Senses<'_>, slot: Vec2, slot_velocity: Vec2) -> Vec2 {
+        self.update_map();
+        let guidance = self.params.guidance;
+        match self.navigator.head(senses.tick, senses.position, slot) {
+            Heading::Via(corner) => {
+                let speed_mps = guidance.speed_mps.max(slot_velocity.norm()).min(guidance.reform_speed_max_mps);
+                (corner - senses.position).try_normalize(1e-9).unwrap_or_default() * speed_mps
+            }
+            Heading::Straight | Heading::NoPath => guidance.to_slot(slot - senses.position, slot_velocity),
+        }
+    }
+
+    /// Gives the navigator the obstacles that are known by now; true if there are new ones.
+    fn update_map(&mut self) -> bool {
+        let known = self.leading.obstacles();
+        self.navigator.learn(known.iter().count(), known.iter().map(|(_, known)| &known.shape))
     }
 
     /// Limits a velocity while a drone is silent that may still fly, because it may come the other way: two drones at this
@@ -254,7 +303,27 @@ impl SwarmPilot {
             .obstacles
             .iter()
             .map(|o| NearObstacle { nearest_m: Vec2::from(o.nearest_m) - senses.position, distance_m: o.distance_m });
-        self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, self.neighbours.iter())
+        let smooth =
+            self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, self.neighbours.iter());
+        self.keep_braking_path(smooth, senses)
+    }
+
+    /// The acceleration nearest to `wanted` that the safety rule allows, m/s².
+    fn keep_braking_path(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
+        let lag = (self.reaction.delay_s() / self.params.dt_s).round() as u32;
+        let own = OwnMotion {
+            tick: senses.tick + u64::from(lag),
+            position: senses.position,
+            velocity: senses.velocity,
+            speed_limit_mps: self.params.speed_on_sight_mps(lag),
+            lag,
+        };
+        let obstacles = senses.obstacles.iter().filter_map(|o| Some((&senses.shape(o)?.shape, o.distance_m)));
+        let neighbours = senses.neighbours.iter().map(|n| Moving {
+            position_m: n.position_m.into(),
+            velocity_mps: Vec2::from(n.velocity_mps) + senses.velocity,
+        });
+        self.braking_filter.filter(&own, wanted, obstacles, neighbours)
     }
 
     /// The acceleration to command now, m/s², computed for the moment at which it takes effect.

@@ -2,6 +2,10 @@
 //!
 //! Where a number was chosen by hand, the named command shows what another value does.
 
+/// Time between two looks whether a known obstacle blocks the planned route, s. Chosen by hand: short against the time in which a
+/// drone reaches an obstacle that it has just sensed.
+pub(crate) const ROUTE_CHECK_S: f64 = 0.5;
+
 /// Age up to which a beacon shows what its drone does now, s. Chosen by hand: a few beacon periods. `skein sweep
 /// experiments/delay-loss.toml`.
 pub(crate) const FRESH_BEACON_S: f64 = 0.3;

@@ -44,6 +44,9 @@ impl FormationPlanner {
             obeyed.is_some_and(|bundle| bundle.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
         if !passed && same {
             self.changed = None;
+            if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
+                return self.assign(s, Phase::Reform);
+            }
             return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| {
                 let pinned = s.members.iter().any(|m| is_alone(m, s));
                 let open = !pinned && !self.open;
@@ -163,6 +166,13 @@ fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) ->
         Some(slot) => (stands - shape[slot], Some(Pin { member, slot })),
         None => (usual, None),
     }
+}
+
+/// Whether the swarm has cruised up to its goal without any obstacle on the way, and its anchor stands beside the goal.
+fn has_stopped_short(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
+    let Destination::Goal { front_m } = s.params.destination else { return false };
+    let (anchor, velocity) = bundle.plan.anchor_at(s.now);
+    bundle.plan.phase() == Phase::Cruise && velocity == Vec2::zeros() && (anchor - front_m).norm() > 0.0
 }
 
 /// Whether a member acts on its own: it does not follow this leader, or there is no other drone.

@@ -47,6 +47,12 @@ impl Corridor {
         corridor
     }
 
+    /// Where the path ends, world frame, m.
+    #[must_use]
+    pub fn target(&self) -> Vec2 {
+        self.target
+    }
+
     /// The shortest path from a position (world frame, m, finite), measured up to the abscissa `gate_x_m`. Does not
     /// allocate. The result is finite wherever the drone is; a drone inside a wall is led out of it.
     #[must_use]
@@ -54,7 +60,7 @@ impl Corridor {
         let past_m = position.x - gate_x_m;
         let mut to_gate_m = (past_m >= 0.0).then_some(-past_m);
         let (mut direction, mut total_m, mut end) = (None, 0.0, position);
-        self.walk(position, |a, b| {
+        self.visit_legs(position, |a, b| {
             let leg_m = (b - a).norm();
             direction = direction.or(Some((b - a) / leg_m));
             if b.x >= gate_x_m && to_gate_m.is_none() {
@@ -67,8 +73,8 @@ impl Corridor {
         Steering { direction: direction.unwrap_or(Vec2::x()), to_gate_m, total_m }
     }
 
-    /// Visits the legs of the shortest path, each at least [`PASSED_M`] long in x.
-    fn walk(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
+    /// Visits the legs of the shortest path, each at least `PASSED_M` long in x.
+    pub fn visit_legs(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
         let end = Vec2::new(self.target.x.max(position.x + LOOK_AHEAD_M), self.target.y);
         let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
         let mut from = position;
@@ -87,7 +93,7 @@ impl Corridor {
         let first_x_m = self.constraints.first().map_or(x_m, |c| c.x_m.min(x_m));
         let start = Vec2::new(first_x_m - RUN_OUT_M, self.target.y);
         let mut y_m = self.target.y;
-        self.walk(start, |a, b| {
+        self.visit_legs(start, |a, b| {
             if a.x < x_m && x_m <= b.x {
                 y_m = a.y + (b.y - a.y) * (x_m - a.x) / (b.x - a.x);
             }

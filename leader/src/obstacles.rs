@@ -91,6 +91,13 @@ impl Obstacles {
         x_m >= exit_x_m || set.iter().all(|&id| self.has_passed(drone, id))
     }
 
+    /// Abscissa at which the first obstacle of a set begins, m.
+    #[must_use]
+    pub fn front_x_m(&self, set: &[ObstacleId]) -> f64 {
+        let front = set.iter().filter_map(|&id| self.get(id)).map(|known| known.shape.bounds().0.x);
+        front.fold(f64::INFINITY, f64::min)
+    }
+
     /// The exit of a set: the abscissa of its rear edge, plus `beyond_m`, m.
     #[must_use]
     pub fn exit_x_m(&self, set: &[ObstacleId], beyond_m: f64) -> f64 {

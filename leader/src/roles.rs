@@ -6,7 +6,7 @@ use crate::member::Member;
 use crate::own_state::OwnState;
 use crate::peers::extrapolated;
 use crate::tuning::{BEHIND_S, LEFT_OUT_S};
-use skein_protocol::{DroneId, GroupId, SimTime, Vec2};
+use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -146,8 +146,10 @@ fn first_if_behind(k: &Knowledge, now: SimTime, own: &OwnState) -> Option<DroneI
 
 /// Whether some of these drones still have an obstacle set to pass.
 fn has_ahead(k: &Knowledge, drones: impl Iterator<Item = Member> + Clone) -> bool {
-    k.obstacles().sets().iter().any(|set| {
-        let exit_x_m = k.obstacles().exit_x_m(set, k.params().routes.planning_distance_m);
+    let planning_m = k.params().routes.planning_distance_m;
+    let behind = |set: &[ObstacleId]| k.params().destination.is_before(k.obstacles().front_x_m(set) - planning_m);
+    k.obstacles().sets().iter().filter(|set| !behind(set)).any(|set| {
+        let exit_x_m = k.obstacles().exit_x_m(set, planning_m);
         drones.clone().any(|m| !k.obstacles().is_past(m.id, m.position.x, set, exit_x_m))
     })
 }

@@ -5,7 +5,7 @@ use crate::fault_plan::fault_plan;
 use skein_agent::PilotParams;
 use skein_agent::detection::Braking;
 use skein_agent::guidance::GuidanceParams;
-use skein_agent::safety::{RANGING_FACTOR, SafetyParams};
+use skein_agent::safety::SafetyParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
@@ -41,7 +41,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         clearance_m: scenario.avoidance.clearance_m,
         planning_distance_m: scenario.avoidance.planning_distance_m,
         detection_range_m: scenario.sensors.detection_range_m,
-        ranging_m: scenario.sensors.ranging.then_some(RANGING_FACTOR * drone.safe_distance_m),
+        ranging_m: scenario.sensors.ranging.then_some(scenario.ranging_m()),
         channel: scenario.channel(),
         locality: scenario.radio().locality(),
         failsafe: match scenario.faults.failsafe {
@@ -82,6 +82,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         incarnation,
         start,
         dt_s: scenario.time.dt_s,
+        tick_s: scenario.time.dt_s,
         guidance: GuidanceParams {
             speed_mps: drone.speed_mps,
             speed_change_mps: drone.speed_change_mps,
@@ -96,8 +97,10 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             margin: scenario.guidance.filter_margin,
             reaction_time_s: drone.reaction_time_s,
             dt_s: scenario.time.dt_s,
+            ranging_m: scenario.ranging_m(),
         },
         detection_range_m: scenario.sensors.detection_range_m,
+        speed_max_mps: drone.speed_max_mps,
         ranging: scenario.sensors.ranging,
         braking: Braking { drag_coefficient: drone.drag_coefficient, reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),

@@ -125,7 +125,7 @@ impl Default for Formation {
             shape: Some(FormationShape::NestedV),
             offsets_m: None,
             drones: 8,
-            spacing_m: 35.0,
+            spacing_m: 40.0,
             start_m: [0.0, 0.0],
             start_jitter_m: 0.0,
         }
@@ -266,13 +266,18 @@ pub struct Sensors {
     /// nominal speed (the paper's E2) plus `avoidance.clearance_m`.
     #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
     pub detection_range_m: f64,
-    /// Whether drones sense their neighbours (id, relative position and velocity) within twice the safe distance.
+    /// Whether drones sense their neighbours (id, relative position and velocity) within `sensors.ranging_m`.
     pub ranging: bool,
+    /// Greatest distance at which drones sense neighbours. Absent: enough for two drones that fly at each other at the greatest
+    /// speed of the mission to stop at the safe distance (the safe distance plus v²/a, and what they fly until they brake), and
+    /// at least twice the safe distance.
+    #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
+    pub ranging_m: Option<f64>,
 }
 
 impl Default for Sensors {
     fn default() -> Self {
-        Self { detection_range_m: 90.0, ranging: true }
+        Self { detection_range_m: 90.0, ranging: true, ranging_m: None }
     }
 }
 

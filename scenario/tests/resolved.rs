@@ -20,7 +20,7 @@ fn the_shortest_scenario_has_the_defaults_of_the_paper() {
     assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::LookAhead));
     assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
     assert!((s.stopping_distance_m() - 10.0).abs() < 1e-9);
-    assert_eq!(s.starts(), Shape::NestedV.slots(8, 35.0));
+    assert_eq!(s.starts(), Shape::NestedV.slots(8, 40.0));
     assert_eq!((s.radio(), s.channel()), (Radio { seed: 1, ..Radio::default() }, None));
     assert_eq!(s.faults.failsafe, Failsafe::Hover);
     assert!(s.shapes().unwrap().is_empty());

@@ -78,11 +78,6 @@ impl Stages {
         self.stages[number].passed
     }
 
-    /// Whether all sets are passed.
-    pub(crate) fn all_passed(&self) -> bool {
-        self.stages.iter().all(|stage| stage.passed)
-    }
-
     /// Logs the sets that are sensed for the first time, at the time when the tick opens.
     pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
@@ -177,7 +172,6 @@ mod tests {
         stages.pass(&all, SimTime(2), &mut log);
         stages.pass(&all, SimTime(3), &mut log);
         assert_eq!(event_kinds(read(&mut log)), [EventKind::Passed { stage: 0 }]);
-        assert!(!stages.all_passed());
         all[0] = Body::new(Vec2::new(700.0, 0.0), Vec2::zeros());
         all[0].kill();
         stages.pass(&all, SimTime(4), &mut log);
@@ -187,7 +181,6 @@ mod tests {
     #[test]
     fn without_obstacles_all_sets_are_passed() {
         let stages = Stages::new(&[], 40.0);
-        assert!(stages.all_passed());
         assert_eq!(stages.rear_x_m, f64::NEG_INFINITY);
     }
 }

@@ -27,7 +27,7 @@ pub struct RolloutParams {
 }
 
 impl RolloutParams {
-    /// Ticks in a step: as many as come closest to [`ROLLOUT_STEP_S`], at least one.
+    /// Ticks in a step: as many as come closest to `ROLLOUT_STEP_S`, at least one.
     #[must_use]
     pub fn step_ticks(&self) -> u64 {
         ((ROLLOUT_STEP_S / self.dt_s).round() as u64).max(1)

@@ -9,6 +9,7 @@ const PARAMS: SafetyParams = SafetyParams {
     margin: 0.02,
     reaction_time_s: 0.0,
     dt_s: DT,
+    ranging_m: 60.0,
 };
 const DT: f64 = 0.02;
 
@@ -85,7 +86,7 @@ fn a_drone_that_brakes_hard_ahead_is_not_hit_for_any_share() {
 #[test]
 fn drones_at_the_speed_on_sight_stop_for_each_other() {
     let speed = PARAMS.speed_on_sight_mps();
-    let (apart, towards) = (Vec2::new(RANGING_FACTOR * PARAMS.safe_distance_m, 0.0), Vec2::new(speed, 0.0));
+    let (apart, towards) = (Vec2::new(PARAMS.ranging_m, 0.0), Vec2::new(speed, 0.0));
     for offset in [0.0, 0.1, 8.0] {
         let least = fly_pair([Vec2::zeros(), apart + Vec2::new(0.0, offset)], [towards, -towards], [1.0, 1.0]);
         assert!(least >= PARAMS.safe_distance_m, "{least}");
@@ -123,7 +124,7 @@ fn filtered(wanted: Vec2, velocity: Vec2, neighbours: &[Neighbour]) -> Vec2 {
 fn an_old_beacon_causes_no_evasion_if_ranging_would_sense_a_near_drone() {
     let told = Neighbour { age_s: 4.0, sensed: false, ..neighbour(Vec2::new(65.0, 0.0), Vec2::zeros(), 0.5) };
     assert!(filtered(Vec2::zeros(), Vec2::zeros(), &[told]).x < -1.0, "without ranging the other may be anywhere");
-    let unsensed = Neighbour { least_m: RANGING_FACTOR * PARAMS.safe_distance_m, ..told };
+    let unsensed = Neighbour { least_m: PARAMS.ranging_m, ..told };
     assert_eq!(filtered(Vec2::zeros(), Vec2::zeros(), &[unsensed]), Vec2::zeros());
 }
 

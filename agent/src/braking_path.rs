@@ -1,0 +1,143 @@
+//! The path of a drone that brakes fully: a straight line, tick by tick as the bodies fly it.
+
+use skein_protocol::Vec2;
+
+/// How a vehicle brakes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrakingLaw {
+    /// Deceleration, m/s².
+    pub deceleration_mps2: f64,
+    /// Length of a tick, s.
+    pub dt_s: f64,
+}
+
+/// Where a drone is at the end of each tick if it brakes fully from now on. In each tick its speed falls by
+/// `deceleration · dt`, in the last one to zero; within a tick it changes linearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrakingPath {
+    start: Vec2,
+    /// Unit vector; zero at rest.
+    heading: Vec2,
+    speed_mps: f64,
+    law: BrakingLaw,
+    /// Ticks in which the speed falls by the full amount.
+    full_ticks: u32,
+    /// Length of the path, m.
+    length_m: f64,
+}
+
+impl BrakingPath {
+    /// The path from this position, m, at this velocity, m/s.
+    #[must_use]
+    pub fn new(start: Vec2, velocity: Vec2, law: BrakingLaw) -> Self {
+        let speed_mps = velocity.norm();
+        let heading = if speed_mps > 0.0 { velocity / speed_mps } else { Vec2::zeros() };
+        let full_ticks = (speed_mps / (law.deceleration_mps2 * law.dt_s)) as u32;
+        let mut path = Self { start, heading, speed_mps, law, full_ticks, length_m: 0.0 };
+        let full_s = f64::from(full_ticks) * law.dt_s;
+        let rest_mps = speed_mps - law.deceleration_mps2 * full_s;
+        path.length_m = path.along_m(full_s) + rest_mps * law.dt_s / 2.0;
+        path
+    }
+
+    fn along_m(&self, span_s: f64) -> f64 {
+        span_s * (self.speed_mps - self.law.deceleration_mps2 * span_s / 2.0)
+    }
+
+    /// Distance flown after so many ticks, m.
+    #[must_use]
+    pub fn flown_m(&self, ticks: u32) -> f64 {
+        if ticks > self.full_ticks { self.length_m } else { self.along_m(f64::from(ticks) * self.law.dt_s) }
+    }
+
+    /// Position after so many ticks, m.
+    #[must_use]
+    pub fn at(&self, ticks: u32) -> Vec2 {
+        self.start + self.heading * self.flown_m(ticks)
+    }
+
+    /// Where it begins, m.
+    #[must_use]
+    pub fn start(&self) -> Vec2 {
+        self.start
+    }
+
+    /// Where the drone hangs at the end, m.
+    #[must_use]
+    pub fn end(&self) -> Vec2 {
+        self.start + self.heading * self.length_m
+    }
+
+    /// The drone hangs after so many ticks.
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        self.full_ticks + 1
+    }
+
+    /// How its position after so many ticks changes with the velocity at the start, times `direction`: the product of the
+    /// transposed Jacobian and a vector. s times the unit of `direction`.
+    #[must_use]
+    pub fn pull_back(&self, ticks: u32, direction: Vec2) -> Vec2 {
+        let (flown_m, by_speed_s) = match ticks > self.full_ticks {
+            true => (self.length_m, (f64::from(self.full_ticks) + 0.5) * self.law.dt_s),
+            false => (self.flown_m(ticks), f64::from(ticks) * self.law.dt_s),
+        };
+        self.scaled(flown_m, by_speed_s, direction)
+    }
+
+    /// The same for the point at this share of the way to its end.
+    #[must_use]
+    pub fn pull_back_at(&self, share: f64, direction: Vec2) -> Vec2 {
+        let by_speed_s = (f64::from(self.full_ticks) + 0.5) * self.law.dt_s;
+        self.scaled(share * self.length_m, share * by_speed_s, direction)
+    }
+
+    fn scaled(&self, flown_m: f64, by_speed_s: f64, direction: Vec2) -> Vec2 {
+        if self.speed_mps <= 0.0 {
+            return direction * by_speed_s;
+        }
+        let along = self.heading * self.heading.dot(&direction);
+        along * by_speed_s + (direction - along) * (flown_m / self.speed_mps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAW: BrakingLaw = BrakingLaw { deceleration_mps2: 5.0, dt_s: 0.02 };
+
+    /// One tick of full braking, as the world's bodies do it.
+    fn brake(position: &mut Vec2, velocity: &mut Vec2) {
+        let speed = velocity.norm();
+        let next = *velocity * ((speed - LAW.deceleration_mps2 * LAW.dt_s).max(0.0) / speed.max(1e-300));
+        *position += (*velocity + next) / 2.0 * LAW.dt_s;
+        *velocity = next;
+    }
+
+    #[test]
+    fn a_braking_path_is_what_a_braking_body_flies() {
+        let (mut position, mut velocity) = (Vec2::new(3.0, -1.0), Vec2::new(7.03, 2.9));
+        let path = BrakingPath::new(position, velocity, LAW);
+        for tick in 1..100 {
+            brake(&mut position, &mut velocity);
+            assert!((path.at(tick) - position).norm() < 1e-9, "tick {tick}");
+            let rest = BrakingPath::new(position, velocity, LAW);
+            assert!((rest.end() - path.end()).norm() < 1e-9, "braking leaves the braking path as it is");
+        }
+        assert_eq!(velocity, Vec2::zeros());
+    }
+
+    #[test]
+    fn the_jacobian_is_that_of_finite_differences() {
+        let velocity = Vec2::new(7.03, 2.9);
+        let direction = Vec2::new(0.6, -0.8);
+        let path = BrakingPath::new(Vec2::zeros(), velocity, LAW);
+        for ticks in [0, 1, 30, 75, 76, 77, 200] {
+            let shifted = |step: Vec2| BrakingPath::new(Vec2::zeros(), velocity + step, LAW).at(ticks).dot(&direction);
+            let difference = |step: Vec2| (shifted(step) - shifted(-step)) / 2e-6;
+            let expected = Vec2::new(difference(Vec2::x() * 1e-6), difference(Vec2::y() * 1e-6));
+            assert!((path.pull_back(ticks, direction) - expected).norm() < 1e-6, "{ticks}");
+        }
+    }
+}
