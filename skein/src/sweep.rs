@@ -5,7 +5,7 @@ use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
 use crate::progress::RunsBar;
 use clap::Args;
-use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml};
+use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -46,6 +46,9 @@ pub(crate) struct SceneArgs {
     /// Seed of the scene
     #[arg(value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: u64,
+    /// Draw a wide scene: as hostile as a scene with a way can be
+    #[arg(long, conflicts_with_all = ["drones", "obstacles"])]
+    pub(crate) wide: bool,
     /// Least and greatest number of drones [default: 5..16]
     #[arg(long, value_name = "LEAST..MOST", value_parser = range)]
     pub(crate) drones: Option<[u32; 2]>,
@@ -71,7 +74,12 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
         drones: args.drones.unwrap_or(default.drones),
         obstacles: args.obstacles.unwrap_or(default.obstacles),
     };
-    let text = bounds.checked().and_then(|bounds| scene_toml(args.seed, bounds)).map_err(Failure::usage)?;
+    let drawn = if args.wide {
+        wide_scene_toml(args.seed)
+    } else {
+        bounds.checked().and_then(|bounds| scene_toml(args.seed, bounds))
+    };
+    let text = drawn.map_err(Failure::usage)?;
     // A closed pipe is the reader's choice.
     let _ = std::io::stdout().lock().write_all(text.as_bytes());
     Ok(Exit::Reached)

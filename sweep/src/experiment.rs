@@ -41,6 +41,8 @@ pub enum Mission {
     },
     /// A random scene, another one for each seed.
     Random,
+    /// A wide random scene, another one for each seed.
+    Wide,
 }
 
 /// A scenario key and the values that it takes.
@@ -73,7 +75,7 @@ struct Raw {
 const KEYS: [&str; 8] = ["name", "scenario", "strategies", "seeds", "runtime", "metrics", "grid", "random"];
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a scenario file, a list of them, or \"random\"")]
+#[serde(untagged, expecting = "expected a scenario file, a list of them, \"random\" or \"wide\"")]
 enum OneOrMany {
     One(String),
     Many(Vec<String>),
@@ -214,12 +216,15 @@ fn scenarios(written: OneOrMany, folder: &Path) -> Result<Vec<Mission>, Problem>
         OneOrMany::Many(names) => names,
     };
     if names.is_empty() {
-        let expected = "a scenario file or \"random\"";
+        let expected = "a scenario file, \"random\" or \"wide\"";
         return Err(Problem::EmptyList { key: "scenario".to_owned(), expected });
     }
     let mission = |name: &String| {
         if name == "random" {
             return Ok(Mission::Random);
+        }
+        if name == "wide" {
+            return Ok(Mission::Wide);
         }
         let path = tidy(&folder.join(name));
         match std::fs::read_to_string(&path) {

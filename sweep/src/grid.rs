@@ -3,6 +3,7 @@
 use crate::error::JobError;
 use crate::experiment::{Experiment, Mission};
 use crate::random_scene::{SceneBounds, random_scene};
+use crate::wide_scene::wide_scene;
 use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
 use std::path::Path;
 
@@ -100,6 +101,7 @@ impl<'a> Grid<'a> {
         overrides.push(("seed".to_owned(), seed.to_string()));
         match &self.experiment.scenarios[combination.scenario] {
             Mission::Random => Ok(random_scene(seed, self.experiment.bounds, &overrides)?),
+            Mission::Wide => Ok(wide_scene(seed, &overrides)?),
             Mission::File { path, text } => Ok(parse(path, text, &overrides)?),
         }
     }
@@ -130,6 +132,7 @@ impl<'a> Grid<'a> {
     pub fn scenario_name(&self, combination: &Combination) -> String {
         match &self.experiment.scenarios[combination.scenario] {
             Mission::Random => "random".to_owned(),
+            Mission::Wide => "wide".to_owned(),
             Mission::File { path, .. } => stem(path),
         }
     }
@@ -140,6 +143,10 @@ impl<'a> Grid<'a> {
         let (combination, seed) = self.job(number);
         let (before, path) = match &self.experiment.scenarios[combination.scenario] {
             Mission::File { path, .. } => (String::new(), path.display().to_string()),
+            Mission::Wide => {
+                let file = format!("wide-{seed}.toml");
+                (format!("skein scene --wide {seed} > {file} && "), file)
+            }
             Mission::Random => {
                 let file = format!("random-{seed}.toml");
                 (format!("skein scene {seed}{} > {file} && ", flags(self.experiment.bounds)), file)

@@ -4,7 +4,7 @@
 //! combination with each seed. A [`Sweep`] flies the runs with a pool of workers, inline or as swarms of processes, and
 //! gives a [`SweepReport`]: a [`Row`] for each run and a [`Cell`] for each combination. [`statistics`] has the intervals:
 //! Wilson's for rates, Student's for means. [`random_scene`] makes the missions of experiments with
-//! `scenario = "random"`.
+//! `scenario = "random"`, [`wide_scene_toml`] those of experiments with `scenario = "wide"`.
 //!
 //! In a folder, a sweep can be interrupted at any time, even killed, and resumed. The folder holds `experiment.json` (which
 //! experiment it belongs to) and `rows.jsonl` (one line for each finished run). Once all runs are done it also holds
@@ -53,6 +53,7 @@ pub mod statistics;
 mod store;
 mod sweep;
 mod table;
+mod wide_scene;
 mod worker_pool;
 
 pub use cells::Cell;
@@ -67,4 +68,5 @@ pub use random_scene::{SceneBounds, random_scene, scene_toml};
 pub use report::SweepReport;
 pub use row::Row;
 pub use sweep::{Progress, Sweep, SweepEnd};
+pub use wide_scene::{wide_scene, wide_scene_toml};
 pub use worker_pool::WorkerPool;

@@ -95,6 +95,7 @@ impl<'a> SweepReport<'a> {
 fn scenario(mission: &Mission) -> Value {
     match mission {
         Mission::Random => json!("random"),
+        Mission::Wide => json!("wide"),
         Mission::File { path, .. } => json!(path),
     }
 }

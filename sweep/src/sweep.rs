@@ -182,6 +182,7 @@ fn identity(grid: &Grid<'_>) -> Identity {
     for mission in &grid.experiment().scenarios {
         match mission {
             Mission::Random => fold("random"),
+            Mission::Wide => fold("wide"),
             Mission::File { text, .. } => fold(text),
         }
     }
