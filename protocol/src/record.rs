@@ -19,7 +19,7 @@ pub struct RecordHeader {
     pub tick: Tick,
     /// Time at its end: the rows' time.
     pub now: SimTime,
-    /// Number of rows, one a drone.
+    /// Number of rows, one per drone.
     pub rows: u32,
     /// Number of frames sent in this tick.
     pub frames: u32,
