@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     let mut broken = Vec::new();
     for (number, fault) in scenario.fault_plan.iter().enumerate() {
-        let mut rules = Rules { path: format!("fault.{number}"), scenario, fault, broken: &mut broken };
+        let mut rules = FaultRules { path: format!("fault.{number}"), scenario, fault, broken: &mut broken };
         rules.time();
         rules.targets();
         rules.keys_of_kind();
@@ -24,14 +24,14 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     broken
 }
 
-struct Rules<'a> {
+struct FaultRules<'a> {
     path: String,
     scenario: &'a Scenario,
     fault: &'a Fault,
     broken: &'a mut Vec<BrokenRule>,
 }
 
-impl Rules<'_> {
+impl FaultRules<'_> {
     fn expect(&mut self, holds: bool, keys: &[&str], message: impl FnOnce() -> String) {
         if !holds {
             let keys = keys.iter().map(|key| format!("{}.{key}", self.path)).collect();

@@ -21,66 +21,53 @@ pub struct ScenarioSource<'a> {
     pub stem: &'a str,
 }
 
-impl Scenario {
-    /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`. They
-    /// are applied in their order before anything is checked. A value that is not valid TOML is taken as a string.
-    ///
-    /// # Errors
-    /// [`ScenarioErrors`], each with its place. TOML syntax is checked first, then keys, types and ranges, then rules
-    /// between keys. Only the errors of the first step that fails are given.
-    pub fn parse(
-        text: &str,
-        source: ScenarioSource<'_>,
-        overrides: &[(String, String)],
-    ) -> Result<Self, ScenarioErrors> {
-        let text_of = Text::new(text, source, overrides);
-        let (table, errors) = DeTable::parse_recoverable(text);
-        if !errors.is_empty() {
-            let issue = |error: &toml::de::Error| {
-                let place = Place::File(error.span().unwrap_or(0..0));
-                text_of.issue(&place, "", &format!("TOML syntax: {}", error.message()))
-            };
-            return Err(text_of.errors(errors.iter().map(issue).collect()));
-        }
-        let data = Node::from_table(table.get_ref(), &Place::File);
-        let mut root = Node { place: Place::File(0..0), data };
-        let mut issues = Vec::new();
-        for (number, (path, value)) in overrides.iter().enumerate() {
-            if let Err(error) = root.set(path, value, number) {
-                issues.push(text_of.issue(&Place::Set(number), path, &error.to_string()));
-            }
-        }
-        text_of.finish(&root, issues)
-    }
-
-    /// As [`Scenario::parse`], from bytes that may not be UTF-8.
-    ///
-    /// # Errors
-    /// As [`Scenario::parse`]. If the bytes are not UTF-8, the only error is the place of the first invalid byte.
-    pub fn parse_bytes(
-        bytes: &[u8],
-        source: ScenarioSource<'_>,
-        overrides: &[(String, String)],
-    ) -> Result<Self, ScenarioErrors> {
-        let error = match std::str::from_utf8(bytes) {
-            Ok(text) => return Self::parse(text, source, overrides),
-            Err(error) => error,
+/// See [`Scenario::parse`].
+pub(crate) fn parse(
+    text: &str,
+    source: ScenarioSource<'_>,
+    overrides: &[(String, String)],
+) -> Result<Scenario, ScenarioErrors> {
+    let text_of = Text::new(text, source, overrides);
+    let (table, errors) = DeTable::parse_recoverable(text);
+    if !errors.is_empty() {
+        let issue = |error: &toml::de::Error| {
+            let place = Place::File(error.span().unwrap_or(0..0));
+            text_of.issue(&place, "", &format!("TOML syntax: {}", error.message()))
         };
-        let text = String::from_utf8_lossy(bytes);
-        let at = error.valid_up_to();
-        let found = bytes.get(at).copied().unwrap_or_default();
-        let message = format!("found byte 0x{found:02x}, expected UTF-8 text");
-        let text_of = Text::new(&text, source, overrides);
-        Err(text_of.errors(vec![text_of.issue(&Place::File(at..at), "", &message)]))
+        return Err(text_of.errors(errors.iter().map(issue).collect()));
     }
+    let data = Node::from_table(table.get_ref(), &Place::File);
+    let mut root = Node { place: Place::File(0..0), data };
+    let mut issues = Vec::new();
+    for (number, (path, value)) in overrides.iter().enumerate() {
+        if let Err(error) = root.set(path, value, number) {
+            issues.push(text_of.issue(&Place::Set(number), path, &error.to_string()));
+        }
+    }
+    text_of.finish(&root, issues)
+}
 
-    /// A checked scenario from the JSON that serde makes of one, such as the JSON in a run's manifest.
-    ///
-    /// # Errors
-    /// As [`Scenario::parse`]. JSON has no places, so every error is at 1:1.
-    pub fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) -> Result<Self, ScenarioErrors> {
-        Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
-    }
+/// See [`Scenario::parse_bytes`].
+pub(crate) fn parse_bytes(
+    bytes: &[u8],
+    source: ScenarioSource<'_>,
+    overrides: &[(String, String)],
+) -> Result<Scenario, ScenarioErrors> {
+    let error = match std::str::from_utf8(bytes) {
+        Ok(text) => return parse(text, source, overrides),
+        Err(error) => error,
+    };
+    let text = String::from_utf8_lossy(bytes);
+    let at = error.valid_up_to();
+    let found = bytes.get(at).copied().unwrap_or_default();
+    let message = format!("found byte 0x{found:02x}, expected UTF-8 text");
+    let text_of = Text::new(&text, source, overrides);
+    Err(text_of.errors(vec![text_of.issue(&Place::File(at..at), "", &message)]))
+}
+
+/// See [`Scenario::from_json`].
+pub(crate) fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) -> Result<Scenario, ScenarioErrors> {
+    Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
 }
 
 /// The text, and what is needed to give the place of an error in it.

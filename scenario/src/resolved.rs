@@ -1,6 +1,8 @@
-//! Values that follow from the keys of a checked scenario.
+//! What a scenario can do: it is parsed from text, and gives the values that follow from its keys.
 
+use crate::error::ScenarioErrors;
 use crate::keys::{FormationShape, Scenario};
+use crate::parse::{self, ScenarioSource};
 use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -11,6 +13,40 @@ use skein_protocol::shape::{ConvexShape, ShapeError};
 const GRAVITY_MPS2: f64 = 9.81;
 
 impl Scenario {
+    /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`. They
+    /// are applied in their order before anything is checked. A value that is not valid TOML is taken as a string.
+    ///
+    /// # Errors
+    /// [`ScenarioErrors`], each with its place. TOML syntax is checked first, then keys, types and ranges, then rules
+    /// between keys. Only the errors of the first step that fails are given.
+    pub fn parse(
+        text: &str,
+        source: ScenarioSource<'_>,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioErrors> {
+        parse::parse(text, source, overrides)
+    }
+
+    /// As [`Scenario::parse`], from bytes that may not be UTF-8.
+    ///
+    /// # Errors
+    /// As [`Scenario::parse`]. If the bytes are not UTF-8, the only error is the place of the first invalid byte.
+    pub fn parse_bytes(
+        bytes: &[u8],
+        source: ScenarioSource<'_>,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioErrors> {
+        parse::parse_bytes(bytes, source, overrides)
+    }
+
+    /// A checked scenario from the JSON that serde makes of one, such as the JSON in a run's manifest.
+    ///
+    /// # Errors
+    /// As [`Scenario::parse`]. JSON has no places, so every error is at 1:1.
+    pub fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) -> Result<Self, ScenarioErrors> {
+        parse::from_json(json, source)
+    }
+
     /// The shape of the formation.
     #[must_use]
     pub fn formation_shape(&self) -> Shape {

@@ -84,6 +84,18 @@ impl Place {
     }
 }
 
+/// A flight that is killed, as by a test that fails, leaves shared memory behind: it goes with the folder that names it.
+impl Drop for Place {
+    fn drop(&mut self) {
+        let since = Instant::now();
+        while !self.runs_in_domain().is_empty() && since.elapsed() < Duration::from_secs(5) {
+            // The run counts as alive until the kernel has ended its last process.
+            let _ = self.command(&["clean"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+            std::thread::sleep(POLL);
+        }
+    }
+}
+
 /// A command that has ended.
 #[derive(Debug)]
 pub(crate) struct Done {

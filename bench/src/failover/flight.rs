@@ -1,7 +1,7 @@
 //! Flies one mission of the failover benchmark.
 
 use super::monitor::FailoverMonitor;
-use super::row::Row;
+use super::row::FailoverRow;
 use super::setting::{ClockChoice, DT_S, Setting};
 use crate::context::Context;
 use crate::error::BenchError;
@@ -13,7 +13,7 @@ use skein_runtime::{Clock, Launch, PilotKind, RunEnd, RuntimeError, inline, supe
 use skein_scenario::Scenario;
 
 /// Flies a mission to its end, and returns its row.
-pub(super) fn fly(setting: &Setting, context: &Context<'_>) -> Result<Row, BenchError> {
+pub(super) fn fly(setting: &Setting, context: &Context<'_>) -> Result<FailoverRow, BenchError> {
     let scenario = setting.scenario()?;
     let (runtime, clock) = match setting.clock {
         ClockChoice::Lockstep => ("inline", Clock::Lockstep),
@@ -32,7 +32,7 @@ pub(super) fn fly(setting: &Setting, context: &Context<'_>) -> Result<Row, Bench
     }
     let (recorder, counts) = monitor.finish();
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-    Ok(Row::new(setting, &counts, &recorder.finish(&completion).0))
+    Ok(FailoverRow::new(setting, &counts, &recorder.finish(&completion).0))
 }
 
 fn fly_processes(

@@ -6,7 +6,7 @@ mod monitor;
 mod row;
 mod setting;
 
-pub use row::Row;
+pub use row::FailoverRow;
 pub use setting::ClockChoice;
 
 use crate::context::Context;
@@ -60,14 +60,14 @@ pub struct FailoverReport {
     /// Seed of everything random.
     pub seed: u64,
     /// One row for each clock, delay and loss.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FailoverRow>,
 }
 
 impl FailoverReport {
     /// Whether an invariant was broken in any mission.
     #[must_use]
     pub fn is_unsafe(&self) -> bool {
-        self.rows.iter().any(Row::is_unsafe)
+        self.rows.iter().any(FailoverRow::is_unsafe)
     }
 
     /// The rows as a text table.

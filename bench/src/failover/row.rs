@@ -7,7 +7,7 @@ use skein_report::Summary;
 
 /// The results of one mission. Times in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct FailoverRow {
     /// `lockstep` or `realtime`.
     clock: &'static str,
     /// Share of frames that are lost.
@@ -52,7 +52,7 @@ pub struct Row {
     digest: Option<String>,
 }
 
-impl Row {
+impl FailoverRow {
     /// Evaluates what was observed during a flight.
     pub(super) fn new(setting: &Setting, counts: &FailoverCounts, summary: &Summary) -> Self {
         let (times, on_time) = (ascending(&counts.failover_s), ascending(&counts.on_time_s));
@@ -136,9 +136,9 @@ fn quantile(ascending: &[f64], share: f64) -> Option<f64> {
 }
 
 /// The rows as a text table.
-pub(super) fn table(rows: &[Row]) -> String {
+pub(super) fn table(rows: &[FailoverRow]) -> String {
     let lines: Vec<[String; 15]> =
-        std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(Row::cells)).collect();
+        std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(FailoverRow::cells)).collect();
     let width = |i: usize| lines.iter().map(|line| line[i].len()).max().unwrap_or(0);
     let padded = |line: &[String; 15]| {
         let fields = line.iter().enumerate().map(|(i, field)| format!("{field:<width$}", width = width(i)));

@@ -12,7 +12,7 @@ mod workload;
 pub use baseline::BaselinePeer;
 pub use case::Case;
 pub use measurement::Measurement;
-pub use report::{Ratio, Row, RuntimeReport};
+pub use report::{CaseRow, Ratio, RuntimeReport};
 
 use crate::context::Context;
 use crate::error::BenchError;

@@ -16,14 +16,14 @@ pub struct RuntimeReport {
     /// Rounds; each measured every case once.
     pub rounds: u32,
     /// One row for each size and case.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CaseRow>,
     /// Ratios of two cases.
     pub ratios: Vec<Ratio>,
 }
 
 /// The results of one case and size over all rounds.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct CaseRow {
     /// Size of the swarm.
     pub drones: u32,
     /// The case.
@@ -85,7 +85,7 @@ impl RuntimeReport {
     pub(super) fn add(&mut self, drones: u32, cases: &[Case], measured: &[Vec<Measurement>]) {
         for (&case, rounds) in cases.iter().zip(measured) {
             let speeds = || rounds.iter().map(ticks_per_s);
-            self.rows.push(Row {
+            self.rows.push(CaseRow {
                 drones,
                 case,
                 median: Measurement::median(rounds),
@@ -134,7 +134,7 @@ impl RuntimeReport {
         let cases = [Case::Baseline, Case::BlockBeacon, Case::Inline, Case::Block, Case::Yield, Case::Packed];
         let series = cases.map(|case| {
             let of_case = self.rows.iter().filter(|row| row.case == case);
-            let point = |row: &Row| {
+            let point = |row: &CaseRow| {
                 let us = row.median.cpu_us_per_step?;
                 Some(Point { x: f64::from(row.drones).log2(), mean: us, low: us, high: us })
             };
@@ -157,7 +157,7 @@ const HEADS: [&str; 17] = [
 const UNITS: [&str; 15] =
     ["1/s", "1/s", "", "µs", "µs", "µs", "/step", "/step", "µs/step", "µs/step", "µs/step", "MiB", "MiB", "s", "s"];
 
-impl Row {
+impl CaseRow {
     fn line(&self, out: &mut String) {
         let (m, case) = (&self.median, self.case.name());
         let values = [
