@@ -1,0 +1,15 @@
+//! The theorem of `docs/safety.md`, in crowds of any size and state. `examples/crowd_search.rs` searches for longer.
+
+mod crowd;
+
+use crowd::{WISHES, fly};
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn no_crowd_breaks_a_distance(seed in any::<u64>(), drones in 2usize..60, density in 0.7f64..4.0, wish in 0usize..5) {
+        let (least_m, _) = fly(seed, drones, density, 250, WISHES[wish], 0);
+        prop_assert!(least_m >= -1e-6, "{least_m} m with {:?}", WISHES[wish]);
+    }
+}

@@ -1,0 +1,214 @@
+//! Crowds of drones that all fly by the safety rule of `skein_agent::braking_filter`, whatever they wish for.
+#![allow(clippy::unwrap_used, dead_code)]
+
+use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
+use skein_agent::braking_path::{BrakingLaw, BrakingPath};
+use skein_leader::geometry::nearest;
+use skein_protocol::Vec2;
+use skein_protocol::shape::ConvexShape;
+use std::collections::VecDeque;
+
+fn law(params: &BrakingFilterParams) -> BrakingLaw {
+    BrakingLaw { deceleration_mps2: params.acceleration_max_mps2, dt_s: params.dt_s }
+}
+
+/// Full braking, m/s².
+fn braking(params: &BrakingFilterParams, velocity: Vec2) -> Vec2 {
+    let (speed, step) = (velocity.norm(), params.acceleration_max_mps2 * params.dt_s);
+    if speed > step { velocity * (-params.acceleration_max_mps2 / speed) } else { -velocity / params.dt_s }
+}
+
+/// A crowd whose drones all fly by the rule.
+#[derive(Clone, Debug)]
+pub(crate) struct Crowd {
+    params: BrakingFilterParams,
+    tick: u64,
+    bodies: Vec<(Vec2, Vec2)>,
+    /// Ticks that a command takes until it has effect.
+    lag: u32,
+    /// Commands on their way, by drone, the oldest first.
+    pending: Vec<VecDeque<Vec2>>,
+    obstacles: Vec<ConvexShape>,
+}
+
+/// What the drones of a crowd wish for. Each wish tries to break the rule.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Wish {
+    /// All drones fly to one point.
+    Gather,
+    /// Each drone flies beyond the place of the drone opposite.
+    Swap,
+    /// Each drone flies straight at the nearest other one.
+    Chase,
+    /// Half of the drones circle the middle to the left, half to the right.
+    Rotate,
+    /// Full acceleration in a direction that changes at random.
+    Erratic,
+}
+
+/// A linear congruential generator (Knuth, MMIX): the same crowd for a seed everywhere.
+pub(crate) struct Keyed(pub u64);
+
+impl Keyed {
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1u64 << 53) as f64
+    }
+
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn disc(&mut self, radius: f64) -> Vec2 {
+        let (angle, r) = (self.within(0.0, std::f64::consts::TAU), radius * self.unit().sqrt());
+        Vec2::new(angle.cos(), angle.sin()) * r
+    }
+}
+
+fn shape_distance_m(shape: &ConvexShape, point: Vec2) -> f64 {
+    let core: Vec<Vec2> = shape.vertices().collect();
+    (nearest(&core, point) - point).norm() - shape.radius_m
+}
+
+impl Crowd {
+    /// As many drones as fit, up to `drones`, in random states whose braking paths keep all distances.
+    fn random(seed: u64, drones: usize, density: f64, lag: u32) -> Self {
+        let mut key = Keyed(seed);
+        key.unit();
+        let safe_distance_m = key.within(1.0, 40.0);
+        let params = BrakingFilterParams {
+            safe_distance_m,
+            clearance_m: key.within(0.5, 20.0),
+            acceleration_max_mps2: key.within(1.0, 10.0),
+            speed_max_mps: key.within(2.0, 25.0),
+            dt_s: [0.005, 0.01, 0.02, 0.05, 0.1][(key.unit() * 5.0) as usize],
+        };
+        let side_m = (drones as f64).sqrt() * safe_distance_m * density;
+        let obstacles = (0..(key.unit() * 4.0) as usize)
+            .map(|_| {
+                let centre = Vec2::new(key.within(-side_m, side_m), key.within(-side_m, side_m));
+                let half = Vec2::new(key.within(1.0, 30.0), key.within(1.0, 30.0));
+                if key.unit() < 0.5 {
+                    ConvexShape::circle(centre, half.x).unwrap()
+                } else {
+                    ConvexShape::rectangle(centre, half, key.within(0.0, 3.0)).unwrap()
+                }
+            })
+            .collect();
+        let tick = (key.unit() * 1e4) as u64;
+        let mut crowd = Self { params, tick, bodies: Vec::new(), lag, pending: Vec::new(), obstacles };
+        for _ in 0..drones * 20 {
+            let position = Vec2::new(key.within(-side_m, side_m), key.within(-side_m, side_m));
+            let body = (position, key.disc(params.speed_max_mps));
+            if crowd.bodies.len() < drones && crowd.admits(body) {
+                crowd.bodies.push(body);
+                // At first every drone brakes.
+                let (mut velocity, mut pending) = (body.1, VecDeque::new());
+                for _ in 0..lag {
+                    let braking = braking(&params, velocity);
+                    velocity += braking * params.dt_s;
+                    pending.push_back(braking);
+                }
+                crowd.pending.push(pending);
+            }
+        }
+        crowd
+    }
+
+    fn admits(&self, (position, velocity): (Vec2, Vec2)) -> bool {
+        let law = law(&self.params);
+        let path = BrakingPath::new(position, velocity, law);
+        let keep_m = self.params.safe_distance_m + self.params.margin_m();
+        let clear_m = self.params.clearance_m + 0.01;
+        let clear = |shape: &ConvexShape| {
+            let along = path.end() - path.start();
+            (0..=100).all(|k| {
+                shape_distance_m(shape, path.start() + along * (f64::from(k) / 100.0)) >= clear_m + along.norm() / 100.0
+            })
+        };
+        let apart = |other: &(Vec2, Vec2)| {
+            let theirs = BrakingPath::new(other.0, other.1, law);
+            (0..=path.ticks().max(theirs.ticks())).all(|k| (path.at(k) - theirs.at(k)).norm() >= keep_m)
+        };
+        self.obstacles.iter().all(clear) && self.bodies.iter().all(apart)
+    }
+
+    fn wish(&self, i: usize, wish: Wish, key: &mut Keyed) -> Vec2 {
+        let (position, velocity) = self.bodies[i];
+        let towards = |target: Vec2| (target - position) * 2.0 - velocity;
+        match wish {
+            Wish::Gather => towards(Vec2::zeros()),
+            Wish::Swap => towards(-self.bodies[self.bodies.len() - 1 - i].0 * 1.5),
+            Wish::Chase => {
+                let others = self.bodies.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, body)| body.0);
+                let nearest = others.min_by(|a, b| (a - position).norm().total_cmp(&(b - position).norm()));
+                towards(nearest.unwrap_or_default()) * 10.0
+            }
+            Wish::Rotate => {
+                let turn = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
+                Vec2::new(-position.y, position.x) * turn - velocity
+            }
+            Wish::Erratic => key.disc(1.0).normalize() * 100.0,
+        }
+    }
+
+    fn fly(&self, (position, velocity): (Vec2, Vec2), acceleration: Vec2) -> (Vec2, Vec2) {
+        let next = velocity + acceleration * self.params.dt_s;
+        (position + (velocity + next) * (self.params.dt_s / 2.0), next)
+    }
+
+    /// One tick of all drones, each by what it senses at the tick's start.
+    fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, key: &mut Keyed) {
+        let before = self.bodies.clone();
+        for (i, filter) in filters.iter_mut().enumerate() {
+            let lag_s = f64::from(self.lag) * self.params.dt_s;
+            let (mut position, mut velocity) = before[i];
+            for command in &self.pending[i] {
+                (position, velocity) = self.fly((position, velocity), *command);
+            }
+            let tick = self.tick + u64::from(self.lag);
+            let own = OwnMotion { tick, position, velocity, speed_limit_mps: f64::INFINITY, lag: self.lag };
+            let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
+            let neighbours = before.iter().enumerate().filter(|(j, _)| *j != i);
+            let neighbours =
+                neighbours.map(|(_, b)| Moving { position_m: b.0 + b.1 * lag_s - position, velocity_mps: b.1 });
+            let wanted = self.wish(i, wish, key);
+            let acceleration = filter.filter(&own, wanted, obstacles, neighbours);
+            assert!(acceleration.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
+            self.pending[i].push_back(acceleration);
+            let command = self.pending[i].pop_front().unwrap();
+            self.bodies[i] = self.fly(before[i], command);
+            assert!(self.bodies[i].1.norm() <= self.params.speed_max_mps + 1e-6);
+        }
+        self.tick += 1;
+    }
+
+    /// The least of all distances minus what is to be kept, m.
+    fn least_m(&self) -> f64 {
+        let mut least_m = f64::INFINITY;
+        for (i, (position, _)) in self.bodies.iter().enumerate() {
+            for (other, _) in &self.bodies[i + 1..] {
+                least_m = least_m.min((position - other).norm() - self.params.safe_distance_m);
+            }
+            for shape in &self.obstacles {
+                least_m = least_m.min(shape_distance_m(shape, *position) - self.params.clearance_m);
+            }
+        }
+        least_m
+    }
+}
+
+pub(crate) const WISHES: [Wish; 5] = [Wish::Gather, Wish::Swap, Wish::Chase, Wish::Rotate, Wish::Erratic];
+
+/// Flies a crowd; the least distance beyond what is to be kept, m, and drone-ticks.
+pub(crate) fn fly(seed: u64, drones: usize, density: f64, ticks: usize, wish: Wish, lag: u32) -> (f64, usize) {
+    let mut crowd = Crowd::random(seed, drones, density, lag);
+    let mut key = Keyed(seed ^ 0xabcdef);
+    let mut filters = vec![BrakingFilter::new(crowd.params); crowd.bodies.len()];
+    let mut least_m = crowd.least_m();
+    for _ in 0..ticks {
+        crowd.step(&mut filters, wish, &mut key);
+        least_m = least_m.min(crowd.least_m());
+    }
+    (least_m, ticks * crowd.bodies.len())
+}
