@@ -124,7 +124,7 @@ impl SwarmPilot {
     /// Continues a look-ahead. If members or obstacles have changed, it ends at once with the best plan so far, and the
     /// leader plans for the change in the next tick.
     fn look_ahead(&mut self, now: SimTime, tick: u64, mut rollout: Box<Rollout<Self>>) {
-        let chosen = if rollout.is_current(self.leading.members(), self.leading.obstacles().iter().count()) {
+        let chosen = if rollout.is_current(self.leading.members(), self.leading.obstacles().count()) {
             rollout.advance(tick)
         } else {
             Some(rollout.choose())
@@ -275,7 +275,7 @@ impl SwarmPilot {
     /// Gives the navigator the obstacles that are known by now; true if there are new ones.
     fn update_map(&mut self) -> bool {
         let known = self.leading.obstacles();
-        self.navigator.learn(known.iter().count(), known.iter().map(|(_, known)| &known.shape))
+        self.navigator.learn(known.count(), known.iter().map(|(_, known)| &known.shape))
     }
 
     /// Limits a velocity while a drone is silent that may still fly, because it may come the other way: two drones at this

@@ -74,6 +74,12 @@ impl Obstacles {
         self.known.get(&id)
     }
 
+    /// Number of known obstacles.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.known.len()
+    }
+
     /// All known obstacles, by id.
     pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> {
         self.known.iter().map(|(&id, known)| (id, known))
