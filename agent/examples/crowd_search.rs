@@ -1,8 +1,9 @@
-//! Searches for a crowd that breaks a distance although all its drones follow the safety rule of `docs/safety.md`:
-//! `cargo run --release -p skein-agent --example crowd_search -- DRONE_TICKS`. Without a number it flies three million
-//! drone-ticks. Fails if a crowd breaks a distance whose commands take effect at once. Late commands are outside the
-//! theorem: what becomes of them is printed.
-#![allow(clippy::disallowed_macros, reason = "a command that prints")]
+//! Searches for a crowd that violates a distance although all its drones follow the safety rule of `docs/safety.md`:
+//! `cargo run --release -p skein-agent --example crowd_search -- DRONE_TICKS`. The default of `DRONE_TICKS` is three million.
+//!
+//! The command fails if a distance is violated in a crowd whose commands take effect at once. Late commands are outside the
+//! theorem. For them the command only prints the result.
+#![allow(clippy::disallowed_macros, reason = "this command prints its results")]
 
 #[path = "../tests/crowd/mod.rs"]
 mod crowd;
@@ -10,21 +11,23 @@ mod crowd;
 use crowd::{Keyed, WISHES, fly};
 use std::process::ExitCode;
 
-/// Flies so many drone-ticks of random crowds. Returns the number of crowds that broke a distance.
+/// Flies random crowds until `drone_ticks` drone-ticks are reached. `lag`: delay of commands, ticks. Returns the number of
+/// crowds that violated a distance.
 fn search(lag: u32, drone_ticks: usize) -> usize {
     let (mut flown, mut least, mut crowds, mut broken) = (0, f64::INFINITY, 0, 0);
     while flown < drone_ticks {
         crowds += 1;
         let seed = crowds + 1_000_000 * u64::from(lag);
-        let mut key = Keyed(seed);
-        let drones = 2 + (key.unit() * key.unit() * 198.0) as usize;
-        let (density, wish) = (key.within(0.7, 4.0), WISHES[(seed % 5) as usize]);
+        let mut random = Keyed(seed);
+        let drones = 2 + (random.unit() * random.unit() * 198.0) as usize;
+        let (density, wish) = (random.within(0.7, 4.0), WISHES[(seed % 5) as usize]);
         let (least_m, ticks) = fly(seed, drones, density, 400, wish, lag);
         broken += usize::from(least_m < -1e-6);
         (flown, least) = (flown + ticks, least.min(least_m));
     }
     println!(
-        "{lag:2} ticks late: {flown} drone-ticks in {crowds} crowds, {broken} broken, at least {least:.4} m beyond the distance to keep"
+        "{lag:2} ticks late: {flown} drone-ticks in {crowds} crowds, {broken} broken, \
+         at least {least:.4} m beyond the distance to keep"
     );
     broken
 }

@@ -1,14 +1,14 @@
-//! The safety rule: no command may move the drone's braking path towards a neighbour's by more than its share of the room
-//! between the two, nor into an obstacle. `docs/safety.md` states and proves it.
+//! The safety rule: no command may move the drone's braking path towards a neighbour's braking path by more than the drone's
+//! share of the room between the two, nor into an obstacle. `docs/safety.md` states and proves the rule.
 //!
 //! Let B be the path of a drone that brakes fully from now on. Two drones are safe if their braking paths keep the safe
 //! distance at every time. A command changes the drone's braking path from B to B'. With n(t) the unit vector from the
-//! neighbour's braking path to B at time t, and D(t) their distance, a command is allowed if for all t
-//! n(t) · (B'(t) − B(t)) ≥ −s (D(t) − d). If both keep to this with s = ½, the new braking paths are at least d apart.
-//! Full braking leaves B as it is, and is therefore always allowed.
+//! neighbour's braking path to B at time t, D(t) their distance, and d the distance to keep, a command is allowed if for all t
+//! n(t) · (B'(t) − B(t)) ≥ −s (D(t) − d). If both drones obey this with s = ½, their new braking paths are at least d apart.
+//! Full braking leaves B unchanged and is therefore always allowed.
 //!
-//! Braking paths are compared at ticks whose number is a multiple of a stride, the same ticks for all drones, so that the
-//! invariant is exact there; [`BrakingFilterParams::margin_m`] bounds what can happen between them.
+//! Braking paths are compared at ticks whose number is a multiple of a stride. These ticks are the same for all drones, so the
+//! invariant is exact there. [`BrakingFilterParams::margin_m`] covers the loss of distance between the compared ticks.
 
 use crate::braking_path::{BrakingLaw, BrakingPath};
 use crate::program::{HalfPlane, Program};
@@ -22,7 +22,7 @@ pub struct BrakingFilterParams {
     pub safe_distance_m: f64,
     /// Least distance of a drone's centre to an obstacle, m.
     pub clearance_m: f64,
-    /// Greatest acceleration, and deceleration of a drone that brakes fully, m/s².
+    /// Greatest acceleration, m/s². It is also the deceleration of a drone that brakes fully.
     pub acceleration_max_mps2: f64,
     /// Greatest speed of any drone, m/s.
     pub speed_max_mps: f64,
@@ -39,44 +39,44 @@ pub struct Moving {
     pub velocity_mps: Vec2,
 }
 
-/// What the rule is applied to.
+/// The drone's own state, to which the rule is applied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnMotion {
     /// Number of the tick in which the command takes effect.
     pub tick: u64,
-    /// Position, world frame, m.
+    /// Position when the command takes effect, world frame, m.
     pub position: Vec2,
-    /// Velocity, world frame, m/s.
+    /// Velocity when the command takes effect, world frame, m/s.
     pub velocity: Vec2,
-    /// The speed up to which the drone can stop within what it senses, m/s.
+    /// Greatest speed from which the drone can stop within its sensing range, m/s.
     pub speed_limit_mps: f64,
-    /// Ticks that a command takes until it has effect.
+    /// Delay from a command to its effect, ticks.
     pub lag: u32,
 }
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
-/// Greatest margin for what happens between the compared ticks, as a share of the safe distance.
+/// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
-/// Obstacles are kept so much farther away than the clearance, m: what is rounded must not count.
+/// Added to the clearance, m, so that rounding errors do not break it.
 const CLEARANCE_ROUNDING_M: f64 = 1e-3;
-/// Rounds of adding half-planes, before the command is moved towards full braking.
+/// Rounds in which half-planes are added. After them the command is moved towards full braking.
 const ROUNDS: usize = 8;
-/// Halvings of the interval between full braking and the command that was found.
+/// Number of halvings of the interval between full braking and the command that was found.
 const HALVINGS: usize = 10;
-/// A condition that is missed by less is met, m.
+/// Tolerance of a condition, m (of the speed limit: m/s). A condition that is missed by at most this counts as met.
 const MET_M: f64 = 1e-9;
 
 impl BrakingFilterParams {
-    /// Added to the safe distance for what happens between the compared ticks, m.
+    /// Margin on the safe distance for the loss of distance between the compared ticks, m.
     #[must_use]
     pub fn margin_m(&self) -> f64 {
         MARGIN_SHARE * self.safe_distance_m
     }
 
-    /// Every how many ticks two braking paths are compared. Between two compared times, h apart, the distance of two
-    /// paths is by at most h²/8 · (v²/D + 2a) less than at the nearer one, with v the relative speed, at most twice the
-    /// greatest speed.
+    /// Number of ticks between two comparisons of braking paths. Let h be the time between two comparisons. Between them, the
+    /// distance of two paths falls by at most h²/8 · (v²/D + 2a) below the smaller of the two compared distances. v is the
+    /// relative speed, at most twice the greatest speed.
     fn stride(&self) -> u32 {
         let relative_mps = 2.0 * self.speed_max_mps;
         let bend = relative_mps * relative_mps / self.safe_distance_m + 2.0 * self.acceleration_max_mps2;
@@ -87,7 +87,8 @@ impl BrakingFilterParams {
         BrakingLaw { deceleration_mps2: self.acceleration_max_mps2, dt_s: self.dt_s }
     }
 
-    /// The speed from which a drone stops within `room_m`, if it first flies on for a tick and `lag` more, m/s.
+    /// Greatest speed from which a drone stops within `room_m`, m/s. The drone flies on at this speed for `lag` + 2 ticks before
+    /// it brakes.
     #[must_use]
     pub fn speed_within_mps(&self, room_m: f64, lag: u32) -> f64 {
         let late_s = f64::from(lag + 2) * self.dt_s;
@@ -95,7 +96,8 @@ impl BrakingFilterParams {
         (brake * late_s).hypot((2.0 * brake * room_m.max(0.0)).sqrt()) - brake * late_s
     }
 
-    /// Distance that a drone flies until it hangs, at most, if it may accelerate for one more tick, m.
+    /// Upper bound on the distance that a drone flies until it stops, if it may accelerate for one more tick, m.
+    /// `speed_squared`: square of its speed, m²/s².
     fn reach_m(&self, speed_squared: f64) -> f64 {
         let step_mps = self.acceleration_max_mps2 * self.dt_s;
         let speed_mps = speed_squared.sqrt() + step_mps;
@@ -106,51 +108,53 @@ impl BrakingFilterParams {
 /// Two braking paths at one compared tick.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
+    /// Ticks from now.
     ticks: u32,
-    /// From the neighbour's path to this drone's, unit vector.
+    /// Unit vector from the neighbour's path to this drone's path.
     normal: Vec2,
-    /// This drone's position on its own braking path, relative to now, m.
+    /// Position on this drone's braking path, relative to its present position, m.
     own_m: Vec2,
-    /// How far the path may move towards the other, m.
+    /// How far this drone's path may move towards the neighbour's path, m.
     room_m: f64,
 }
 
-/// The filter and its memory. One per drone.
+/// The filter and its work buffers. One per drone.
 #[derive(Clone, Debug)]
 pub struct BrakingFilter {
     params: BrakingFilterParams,
     stride: u32,
     samples: Vec<Sample>,
-    /// Where the samples of each near neighbour end.
+    /// For each near neighbour, the end index of its samples in `samples`.
     ends: Vec<usize>,
     planes: Vec<HalfPlane>,
     program: Program,
 }
 
-/// A command, and the braking path that it leaves.
+/// A command, and the braking path after its tick.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     acceleration: Vec2,
-    /// From the end of this tick on; relative to the drone's position now.
+    /// Braking path from the end of this tick on, relative to the drone's present position.
     path: BrakingPath,
 }
 
 impl BrakingFilter {
-    /// A filter with these constants.
+    /// Creates a filter with these constants.
     #[must_use]
     pub fn new(params: BrakingFilterParams) -> Self {
         let stride = params.stride();
         Self { params, stride, samples: Vec::new(), ends: Vec::new(), planes: Vec::new(), program: Program::default() }
     }
 
-    /// Its constants.
+    /// The constants of the filter.
     #[must_use]
     pub fn params(&self) -> &BrakingFilterParams {
         &self.params
     }
 
-    /// The allowed acceleration nearest to `wanted` that is found, m/s²: `wanted` itself if it is allowed, full braking at
-    /// worst. `obstacles` in the world frame.
+    /// Returns the allowed acceleration nearest to `wanted` that the search finds, world frame, m/s². The norm of `wanted` is
+    /// first limited to the greatest acceleration. The result is `wanted` itself if it is allowed, and full braking in the worst
+    /// case. `obstacles`: each shape in the world frame, and its distance from the drone's centre, m.
     pub fn filter<'a>(
         &mut self,
         own: &OwnMotion,
@@ -184,7 +188,7 @@ impl BrakingFilter {
         Candidate { acceleration, path: BrakingPath::new(start, velocity, self.params.law()) }
     }
 
-    /// Full braking, m/s².
+    /// Acceleration of full braking, m/s². It stops the drone exactly in the last tick.
     fn braking(&self, velocity: Vec2) -> Vec2 {
         let (speed, step) = (velocity.norm(), self.params.acceleration_max_mps2 * self.params.dt_s);
         if speed > step {
@@ -194,7 +198,7 @@ impl BrakingFilter {
         }
     }
 
-    /// Compares the braking paths of neighbours that any command could bring too close.
+    /// Samples the braking paths of this drone and of each neighbour that some command could bring too close.
     fn compare(&mut self, own: &OwnMotion, neighbours: impl Iterator<Item = Moving>) {
         let params = self.params;
         self.samples.clear();
@@ -211,25 +215,25 @@ impl BrakingFilter {
             if distance2 > apart_m * apart_m {
                 continue;
             }
-            // Full braking is a projection, and projections bring nothing farther apart: the distance of two braking
-            // paths changes by at most the relative speed times the time until both hang.
+            // Full braking is a projection, and projections do not increase distances. So the distance of two braking
+            // paths changes by at most the relative speed times the time until both drones are at rest.
             let stop_s = own_speed2.max(speed2).sqrt() / limit + 2.0 * params.dt_s;
             let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.velocity).norm() * stop_s;
             if SHARE * room_m >= 2.0 * limit * params.dt_s * stop_s {
                 continue;
             }
-            let theirs = BrakingPath::new(other.position_m, other.velocity_mps, params.law());
-            self.sample(own.tick, &path, &theirs, keep_m);
+            let other_path = BrakingPath::new(other.position_m, other.velocity_mps, params.law());
+            self.sample(own.tick, &path, &other_path, keep_m);
         }
     }
 
-    fn sample(&mut self, tick: u64, own: &BrakingPath, theirs: &BrakingPath, keep_m: f64) {
+    fn sample(&mut self, tick: u64, own: &BrakingPath, other_path: &BrakingPath, keep_m: f64) {
         let stride = u64::from(self.stride);
-        // A command may prolong the own path by a tick.
-        let last = own.ticks().max(theirs.ticks()) + 2;
+        // A command can lengthen this drone's path by one tick.
+        let last = own.ticks().max(other_path.ticks()) + 2;
         let mut ticks = 1;
         loop {
-            let (here, there) = (own.at(ticks), theirs.at(ticks));
+            let (here, there) = (own.at(ticks), other_path.at(ticks));
             let (offset, distance_m) = (here - there, (here - there).norm());
             let normal = if distance_m > 1e-9 { offset / distance_m } else { Vec2::x() };
             let room_m = SHARE * (distance_m - keep_m).max(0.0);
@@ -243,11 +247,11 @@ impl BrakingFilter {
         self.ends.push(self.samples.len());
     }
 
-    /// Adds a half-plane for each condition that the candidate breaks.
+    /// Adds a half-plane for each condition that the candidate violates.
     fn cut<'a>(&mut self, own: &OwnMotion, candidate: &Candidate, obstacles: impl Iterator<Item = &'a ConvexShape>) {
         let dt_s = self.params.dt_s;
         let mut plane = |normal: Vec2, slope: Vec2, missing_m: f64| {
-            // To first order the condition grows by `slope` · change of the acceleration.
+            // The gradient is the first-order change of the condition with the acceleration.
             let gradient = (slope + normal * (dt_s / 2.0)) * dt_s;
             let steepness = gradient.norm();
             if steepness > 1e-12 {
@@ -280,7 +284,7 @@ impl BrakingFilter {
         }
     }
 
-    /// The command nearest to `found` between it and full braking that is allowed, as far as halving finds it.
+    /// Searches between full braking and `found` by bisection. Returns the allowed command nearest to `found` that it meets.
     fn towards_braking<'a>(
         &mut self,
         own: &OwnMotion,
@@ -308,21 +312,24 @@ impl BrakingFilter {
     }
 }
 
-/// A braking path that comes too close to an obstacle.
+/// The point at which a braking path comes too close to an obstacle.
 struct Hit {
-    /// Away from the obstacle.
+    /// Unit vector away from the obstacle.
     normal: Vec2,
-    /// At which share of the path.
+    /// Share of the path's length at this point, 0 to 1.
     share: f64,
+    /// By how much the distance to keep is missed, m.
     missing_m: f64,
 }
 
 impl BrakingFilterParams {
+    /// Speed limit after this tick, m/s. It is never lower than the speed that full braking reaches.
     fn speed_limit_mps(&self, own: &OwnMotion) -> f64 {
         let braked = own.velocity.norm() - self.acceleration_max_mps2 * self.dt_s;
         own.speed_limit_mps.min(self.speed_max_mps).max(braked)
     }
 
+    /// The violation of the distance to `shape` by the candidate's braking path, if there is one.
     fn hit(&self, own: &OwnMotion, candidate: &Candidate, shape: &ConvexShape) -> Option<Hit> {
         let (from, to) = (own.position + candidate.path.start(), own.position + candidate.path.end());
         let nearest = segment_to_core(shape, from, to);
@@ -332,28 +339,30 @@ impl BrakingFilterParams {
             return None;
         }
         let braked = BrakingPath::new(own.position, own.velocity, self.law());
-        // Who is too close already may come no closer than by braking.
+        // A drone that is already too close may come no closer than full braking brings it.
         let braked_m = segment_to_core(shape, braked.start(), braked.end()).distance_m - shape.radius_m;
         let missing_m = keep_m.min(braked_m) - distance_m;
         (missing_m > MET_M).then_some(Hit { normal: nearest.normal, share: nearest.share, missing_m })
     }
 }
 
-/// A segment's point that is nearest to the core of a shape.
+/// The point of a segment that is nearest to the core of a shape.
 struct Nearest {
+    /// Distance to the core, m; negative inside.
     distance_m: f64,
-    /// From the core to the segment.
+    /// Unit vector from the core to the segment.
     normal: Vec2,
-    /// Where on the segment, 0 to 1.
+    /// Position on the segment, 0 at its start to 1 at its end.
     share: f64,
 }
 
-/// Distance of a segment to the polygon of a shape's vertices, without the rounding; negative if it enters it. m.
+/// Distance between a segment and the core of a shape, m. Negative if the segment enters the core.
 pub(crate) fn core_distance_m(shape: &ConvexShape, from: Vec2, to: Vec2) -> f64 {
     segment_to_core(shape, from, to).distance_m
 }
 
-/// The core of a shape is the polygon of its vertices, without the rounding.
+/// Finds the segment's point nearest to the core of a shape. The core is the polygon of the shape's vertices, without the
+/// rounding radius.
 fn segment_to_core(shape: &ConvexShape, from: Vec2, to: Vec2) -> Nearest {
     let along = to - from;
     let length2 = along.norm_squared();
@@ -390,7 +399,7 @@ fn segment_to_core(shape: &ConvexShape, from: Vec2, to: Vec2) -> Nearest {
         }
     }
     match crossing {
-        // Vertices are counter-clockwise: the outer normal is to the right of an edge. Depth counts as negative distance.
+        // Vertices are counter-clockwise, so the outer normal is to the right of an edge. A depth is a negative distance.
         Some((t, normal)) if !inside => {
             let depth_m = -normal.dot(&(along * (1.0 - t)));
             Nearest { distance_m: -depth_m.max(0.0), normal, share: 1.0 }

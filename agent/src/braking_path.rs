@@ -1,4 +1,4 @@
-//! The path of a drone that brakes fully: a straight line, tick by tick as the bodies fly it.
+//! The path of a drone that brakes fully: a straight line, computed tick by tick like the motion of the simulated bodies.
 
 use skein_protocol::Vec2;
 
@@ -11,23 +11,24 @@ pub struct BrakingLaw {
     pub dt_s: f64,
 }
 
-/// Where a drone is at the end of each tick if it brakes fully from now on. In each tick its speed falls by
-/// `deceleration · dt`, in the last one to zero; within a tick it changes linearly.
+/// Positions of a drone at the end of each tick if it brakes fully from now on. In each tick its speed falls by
+/// `deceleration · dt`; in the last tick it falls to zero. Within a tick the speed changes linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingPath {
     start: Vec2,
-    /// Unit vector; zero at rest.
+    /// Unit vector of the velocity; zero at rest.
     heading: Vec2,
     speed_mps: f64,
     law: BrakingLaw,
-    /// Ticks in which the speed falls by the full amount.
+    /// Number of ticks in which the speed falls by the full amount.
     full_ticks: u32,
     /// Length of the path, m.
     length_m: f64,
 }
 
 impl BrakingPath {
-    /// The path from this position, m, at this velocity, m/s.
+    /// The braking path from position `start`, m, with initial velocity `velocity`, m/s. The frame of `start` is the frame of
+    /// all positions of the path.
     #[must_use]
     pub fn new(start: Vec2, velocity: Vec2, law: BrakingLaw) -> Self {
         let speed_mps = velocity.norm();
@@ -40,42 +41,43 @@ impl BrakingPath {
         path
     }
 
+    /// Distance flown in the first `span_s` of full deceleration, m.
     fn along_m(&self, span_s: f64) -> f64 {
         span_s * (self.speed_mps - self.law.deceleration_mps2 * span_s / 2.0)
     }
 
-    /// Distance flown after so many ticks, m.
+    /// Distance flown after `ticks` ticks, m.
     #[must_use]
     pub fn flown_m(&self, ticks: u32) -> f64 {
         if ticks > self.full_ticks { self.length_m } else { self.along_m(f64::from(ticks) * self.law.dt_s) }
     }
 
-    /// Position after so many ticks, m.
+    /// Position after `ticks` ticks, m.
     #[must_use]
     pub fn at(&self, ticks: u32) -> Vec2 {
         self.start + self.heading * self.flown_m(ticks)
     }
 
-    /// Where it begins, m.
+    /// Position at the start of the path, m.
     #[must_use]
     pub fn start(&self) -> Vec2 {
         self.start
     }
 
-    /// Where the drone hangs at the end, m.
+    /// Position at which the drone comes to rest, m.
     #[must_use]
     pub fn end(&self) -> Vec2 {
         self.start + self.heading * self.length_m
     }
 
-    /// The drone hangs after so many ticks.
+    /// Number of ticks after which the drone is at rest.
     #[must_use]
     pub fn ticks(&self) -> u32 {
         self.full_ticks + 1
     }
 
-    /// How its position after so many ticks changes with the velocity at the start, times `direction`: the product of the
-    /// transposed Jacobian and a vector. s times the unit of `direction`.
+    /// Product of a transposed Jacobian and `direction`. The Jacobian is the derivative of the position after `ticks` ticks with
+    /// respect to the initial velocity. Unit: s times the unit of `direction`.
     #[must_use]
     pub fn pull_back(&self, ticks: u32, direction: Vec2) -> Vec2 {
         let (flown_m, by_speed_s) = match ticks > self.full_ticks {
@@ -85,7 +87,7 @@ impl BrakingPath {
         self.scaled(flown_m, by_speed_s, direction)
     }
 
-    /// The same for the point at this share of the way to its end.
+    /// Like [`Self::pull_back`], for the point at `share` (0 to 1) of the path's length.
     #[must_use]
     pub fn pull_back_at(&self, share: f64, direction: Vec2) -> Vec2 {
         let by_speed_s = (f64::from(self.full_ticks) + 0.5) * self.law.dt_s;
@@ -107,7 +109,7 @@ mod tests {
 
     const LAW: BrakingLaw = BrakingLaw { deceleration_mps2: 5.0, dt_s: 0.02 };
 
-    /// One tick of full braking, as the world's bodies do it.
+    /// One tick of full braking, computed like the motion of the world's bodies.
     fn brake(position: &mut Vec2, velocity: &mut Vec2) {
         let speed = velocity.norm();
         let next = *velocity * ((speed - LAW.deceleration_mps2 * LAW.dt_s).max(0.0) / speed.max(1e-300));
@@ -116,20 +118,20 @@ mod tests {
     }
 
     #[test]
-    fn a_braking_path_is_what_a_braking_body_flies() {
+    fn the_braking_path_equals_the_flight_of_a_braking_body() {
         let (mut position, mut velocity) = (Vec2::new(3.0, -1.0), Vec2::new(7.03, 2.9));
         let path = BrakingPath::new(position, velocity, LAW);
         for tick in 1..100 {
             brake(&mut position, &mut velocity);
             assert!((path.at(tick) - position).norm() < 1e-9, "tick {tick}");
             let rest = BrakingPath::new(position, velocity, LAW);
-            assert!((rest.end() - path.end()).norm() < 1e-9, "braking leaves the braking path as it is");
+            assert!((rest.end() - path.end()).norm() < 1e-9, "full braking changed the end of the braking path");
         }
         assert_eq!(velocity, Vec2::zeros());
     }
 
     #[test]
-    fn the_jacobian_is_that_of_finite_differences() {
+    fn the_jacobian_equals_finite_differences() {
         let velocity = Vec2::new(7.03, 2.9);
         let direction = Vec2::new(0.6, -0.8);
         let path = BrakingPath::new(Vec2::zeros(), velocity, LAW);
@@ -137,7 +139,7 @@ mod tests {
             let shifted = |step: Vec2| BrakingPath::new(Vec2::zeros(), velocity + step, LAW).at(ticks).dot(&direction);
             let difference = |step: Vec2| (shifted(step) - shifted(-step)) / 2e-6;
             let expected = Vec2::new(difference(Vec2::x() * 1e-6), difference(Vec2::y() * 1e-6));
-            assert!((path.pull_back(ticks, direction) - expected).norm() < 1e-6, "{ticks}");
+            assert!((path.pull_back(ticks, direction) - expected).norm() < 1e-6, "after {ticks} ticks");
         }
     }
 }

@@ -1,20 +1,20 @@
-//! Escape of a drone that is stuck: it wants to move and cannot, so it backs off and then tries the sides.
+//! Escape of a stuck drone. A drone is stuck if it wants to move and cannot. It first backs off and then tries the sides.
 
 use skein_protocol::{SimTime, Vec2};
 
-/// A drone is still below this speed, m/s.
+/// Speed below which a drone counts as still, m/s.
 const STILL_MPS: f64 = 0.3;
-/// A still drone is stuck if it wants to fly faster than this, m/s.
+/// A still drone counts as stuck if it wants to fly faster than this, m/s.
 const EAGER_MPS: f64 = 3.0;
 /// Duration of the first attempt, s.
 const FIRST_S: f64 = 6.0;
-/// By how much each attempt is longer than the one before, s.
+/// Increase of the duration from each attempt to the next, s.
 const LONGER_S: f64 = 2.0;
 /// Longest duration of an attempt, s.
 const LONGEST_S: f64 = 16.0;
-/// After this time without being stuck the attempts are forgotten, s.
+/// The attempts are forgotten this long after the end of the last one, s.
 const FREE_S: f64 = 20.0;
-/// Directions of the attempts, relative to the blocked direction, rad.
+/// Directions of the attempts, relative to the blocked direction, rad, in the order in which they are tried.
 const TURNS: [f64; 5] = [
     std::f64::consts::PI,
     std::f64::consts::FRAC_PI_2,
@@ -23,7 +23,7 @@ const TURNS: [f64; 5] = [
     -std::f64::consts::FRAC_PI_4 * 3.0,
 ];
 
-/// The attempts of a drone to escape.
+/// Escape attempts of one drone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Escape {
     still_since: Option<SimTime>,
@@ -33,8 +33,8 @@ pub struct Escape {
 }
 
 impl Escape {
-    /// The velocity to fly instead of `wanted`, m/s. It is `wanted` unless the drone has been stuck for `patience_s`; then it
-    /// is a velocity of `speed_mps` in another direction, for some seconds.
+    /// Returns the velocity to fly, world frame, m/s. This is `wanted` unless the drone has been stuck for `patience_s`. Then
+    /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `velocity` and `wanted`: world frame, m/s.
     pub fn steer(&mut self, now: SimTime, velocity: Vec2, wanted: Vec2, patience_s: f64, speed_mps: f64) -> Vec2 {
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
@@ -66,7 +66,7 @@ mod tests {
     const WANTED: Vec2 = Vec2::new(10.0, 0.0);
 
     #[test]
-    fn a_drone_that_moves_or_wants_to_rest_does_not_escape() {
+    fn a_drone_that_moves_or_wants_to_stay_does_not_escape() {
         let mut escape = Escape::default();
         for second in 0..100 {
             let now = SimTime::from_secs(f64::from(second));

@@ -1,51 +1,54 @@
-//! The drone's own path round all obstacles that it knows of, to wherever it is to be: a slot, or the end of its way past
-//! an obstacle set.
+//! The drone's own path around all obstacles that it knows of. The path leads to the drone's target: a slot, or the end of its
+//! route past an obstacle set.
 
 use crate::visibility::VisibilityMap;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 
-/// A corner of a path is passed when it is nearer than this, m.
+/// A corner of a path counts as passed when the drone is nearer to it than this, m.
 const PASSED_M: f64 = 1.0;
-/// A target that moved by more than this makes the path be searched anew, m.
+/// If the target moves by more than this, a new path is searched, m.
 const MOVED_M: f64 = 10.0;
-/// Added to the clearance where a path leads through a gap that is hardly open, m: what the braking filter's rounding needs.
+/// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
+/// rounding errors.
 const TIGHT_M: f64 = 0.02;
-/// A search that found no path is repeated after so many ticks.
+/// A search that found no path is repeated after this many ticks.
 const RETRY_TICKS: u64 = 50;
 
-/// How to get to a target.
+/// Direction of flight towards a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heading {
-    /// Straight on: nothing known is in the way.
+    /// Straight to the target: no known obstacle is in the way.
     Straight,
-    /// To this point first, world frame, m.
+    /// First to this point, world frame, m.
     Via(Vec2),
     /// No path is known.
     NoPath,
 }
 
-/// A path that is being flown.
+/// The path that the drone is flying.
 #[derive(Clone, Debug)]
 struct Path {
     target: Vec2,
-    /// Corners still ahead, the next one last.
+    /// Corners still ahead in reverse order: the next corner is last, the target is first.
     corners: Vec<Vec2>,
 }
 
-/// What the drone knows of the ground, and the path it flies.
+/// The obstacles that the drone knows, and the path that it flies.
 #[derive(Clone, Debug)]
 pub struct Navigator {
-    /// With the distance that paths are planned with.
+    /// Map with the planning distance.
     wide: VisibilityMap,
-    /// With the least distance that the braking filter keeps.
+    /// Map with the least distance that the braking filter keeps.
     tight: VisibilityMap,
     path: Option<Path>,
+    /// After a search without a result: the tick from which the next search is allowed.
     retry_at: u64,
 }
 
 impl Navigator {
-    /// Nothing known. Paths keep `planning_m` from obstacles where they can, `clearance_m` everywhere.
+    /// Creates a navigator that knows no obstacle. Paths keep `planning_m` from obstacles if such a path exists, and otherwise
+    /// `clearance_m`.
     #[must_use]
     pub fn new(clearance_m: f64, planning_m: f64) -> Self {
         Self {
@@ -56,7 +59,7 @@ impl Navigator {
         }
     }
 
-    /// Takes over the known obstacles, if their number changed; true if it did.
+    /// Replaces the known obstacles by `shapes` (world frame) if `count`, their number, has changed. Returns whether it has.
     pub fn learn<'a>(&mut self, count: usize, shapes: impl Iterator<Item = &'a ConvexShape>) -> bool {
         if count == self.tight.len() {
             return false;
@@ -71,13 +74,13 @@ impl Navigator {
         true
     }
 
-    /// Whether a straight flight keeps clear of all known obstacles.
+    /// Whether a straight flight keeps the clearance from all known obstacles. World frame, m.
     #[must_use]
     pub fn is_free(&self, from: Vec2, to: Vec2) -> bool {
         self.tight.is_free(from, to)
     }
 
-    /// The next step of the shortest path to a target.
+    /// Returns the next step of the shortest path from `from` to `to`, world frame, m. `tick`: number of the present tick.
     pub fn head(&mut self, tick: u64, from: Vec2, to: Vec2) -> Heading {
         if self.is_free(from, to) {
             self.path = None;
@@ -99,7 +102,8 @@ impl Navigator {
         self.follow(from, to).map_or(Heading::NoPath, Heading::Via)
     }
 
-    /// The next corner of the path that is flown; `None` if it no longer leads to the target.
+    /// The next corner of the present path. `None` if the path no longer leads to the target, or the way to the next corner is
+    /// blocked.
     fn follow(&mut self, from: Vec2, to: Vec2) -> Option<Vec2> {
         let path = self.path.as_mut()?;
         if (path.target - to).norm() > MOVED_M {
@@ -122,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drone_gets_out_of_a_dead_end() {
+    fn a_drone_leaves_a_dead_end() {
         let wall =
             |x: f64, y: f64, hx: f64, hy: f64| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(hx, hy), 0.0).unwrap();
         let walls = [wall(300.0, 70.0, 150.0, 10.0), wall(300.0, -70.0, 150.0, 10.0), wall(440.0, 0.0, 10.0, 80.0)];
@@ -147,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn without_obstacles_it_flies_straight() {
+    fn without_obstacles_a_drone_flies_straight() {
         assert_eq!(Navigator::new(15.0, 20.0).head(0, Vec2::zeros(), Vec2::x()), Heading::Straight);
     }
 }

@@ -1,8 +1,8 @@
-//! The small quadratic program behind the safety filter. It finds the acceleration nearest to the wanted one that satisfies
-//! every half-plane and the acceleration limit. If none exists, it finds one that violates them least, tier by tier.
+//! The small quadratic program that the safety filters solve. It finds the acceleration nearest to the wanted one that satisfies
+//! every half-plane and the acceleration limit. If none exists, it finds one with the least violation, tier by tier.
 //!
-//! The method is incremental, as in two-dimensional linear programming. Half-planes are added one by one; if one cuts off the
-//! optimum so far, the new optimum lies on its border. Once its memory has grown, it allocates nothing.
+//! The method is incremental, as in two-dimensional linear programming. Half-planes are added one by one; if one excludes the
+//! present optimum, the new optimum lies on its border. Once the work buffers have grown, the solver allocates nothing.
 
 use skein_protocol::Vec2;
 use std::ops::Range;
@@ -10,35 +10,36 @@ use std::ops::Range;
 /// The half-plane `normal · a ≥ bound`; `normal` has length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfPlane {
-    /// Unit normal, pointing inside.
+    /// Unit normal that points into the half-plane.
     pub normal: Vec2,
     /// Least component along the normal, m/s².
     pub bound: f64,
 }
 
 impl HalfPlane {
+    /// By how much `a` violates the half-plane, m/s²; negative inside.
     fn violation(&self, a: Vec2) -> f64 {
         self.bound - self.normal.dot(&a)
     }
 }
 
-/// Below this, two borders are parallel.
+/// Two borders count as parallel if the sine of the angle between them, or the difference of their normals, is at most this.
 const PARALLEL: f64 = 1e-9;
-/// Violation that is tolerated, m/s², so that two nearly equal borders do not contradict each other.
+/// Tolerated violation, m/s². It prevents contradictions between two nearly equal borders.
 const TOLERANCE_MPS2: f64 = 1e-9;
 
-/// Slack beyond the least possible violation, m/s². Without it the solution would go to the limit in a direction that hardly
-/// matters.
+/// Slack beyond the least possible violation, m/s². Without it the solution would go to the acceleration limit in a direction
+/// that hardly reduces the violation.
 const SLACK_MPS2: f64 = 0.1;
 
-/// The memory of [`Program::solve`], reused from call to call.
+/// Solver with work buffers that are reused from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
     relaxed: Vec<HalfPlane>,
     projected: Vec<HalfPlane>,
 }
 
-/// What to find: the point nearest to a given one, or the farthest in a direction.
+/// Goal of an optimisation: the point nearest to a given point, or the farthest point in a direction.
 #[derive(Clone, Copy)]
 enum Goal {
     Nearest(Vec2),
@@ -46,9 +47,9 @@ enum Goal {
 }
 
 impl Program {
-    /// The acceleration nearest to `wanted` within `limit` that satisfies all `planes`, m/s². If none exists, earlier tiers
-    /// have priority over later ones, and within a tier the largest violation is minimised. `tiers`: the indices at which
-    /// the first two of the three tiers end.
+    /// Returns the acceleration nearest to `wanted`, with a norm of at most `limit`, that satisfies all `planes`, m/s². If none
+    /// exists, earlier tiers have priority over later tiers, and within a tier the largest violation is minimised. `tiers`: end
+    /// indices in `planes` of the first two of the three tiers.
     pub fn solve(&mut self, planes: &[HalfPlane], tiers: [usize; 2], limit: f64, wanted: Vec2) -> Vec2 {
         let goal = Goal::Nearest(wanted);
         if let Ok(a) = optimum(planes, limit, goal) {
@@ -71,8 +72,9 @@ impl Program {
         optimum(&self.relaxed, limit, goal).unwrap_or_else(|(_, a)| a)
     }
 
-    /// Minimises the largest violation within the tier, from plane `failed` on. Each plane that is violated by more than
-    /// those before it is satisfied as far as those allow. The planes before the tier stay satisfied.
+    /// Minimises the largest violation within the tier, starting at plane `failed` from point `start`. If a plane is violated
+    /// by more than the earlier planes of the tier, its violation is reduced as far as those planes allow. The planes before the
+    /// tier stay satisfied.
     fn least_violation(&mut self, tier: Range<usize>, limit: f64, (failed, start): (usize, Vec2)) -> Vec2 {
         let (mut best, mut worst) = (start, 0.0);
         for i in failed.max(tier.start)..tier.end {
@@ -83,7 +85,7 @@ impl Program {
             self.projected.clear();
             self.projected.extend_from_slice(&self.relaxed[..tier.start]);
             for earlier in &self.relaxed[tier.start..i] {
-                // The points at which `earlier` is violated no more than `plane`.
+                // Half-plane of the points at which `earlier` is violated by at most as much as `plane`.
                 let difference = earlier.normal - plane.normal;
                 let length = difference.norm();
                 if length > PARALLEL {
@@ -100,8 +102,8 @@ impl Program {
     }
 }
 
-/// The optimum within the disc and all planes. If there is none: the first plane that leaves no point, and the optimum
-/// before it.
+/// The optimum within the disc of radius `limit` and all planes. If no point is feasible, the error holds the index of the
+/// first plane that leaves no point, and the optimum without that plane and all later ones.
 fn optimum(planes: &[HalfPlane], limit: f64, goal: Goal) -> Result<Vec2, (usize, Vec2)> {
     let mut best = match goal {
         Goal::Nearest(point) if point.norm() > limit => point * (limit / point.norm()),
@@ -116,7 +118,7 @@ fn optimum(planes: &[HalfPlane], limit: f64, goal: Goal) -> Result<Vec2, (usize,
     Ok(best)
 }
 
-/// The optimum on the border of plane `i`, within the disc and the planes before it.
+/// The optimum on the border of plane `i`, within the disc and the planes before `i`. `None` if no point is feasible.
 fn on_border(planes: &[HalfPlane], i: usize, limit: f64, goal: Goal) -> Option<Vec2> {
     let HalfPlane { normal, bound } = planes[i];
     let along = Vec2::new(normal.y, -normal.x);
@@ -128,15 +130,15 @@ fn on_border(planes: &[HalfPlane], i: usize, limit: f64, goal: Goal) -> Option<V
     let (mut low, mut high) = (-half_chord.sqrt(), half_chord.sqrt());
     for plane in &planes[..i] {
         let slope = plane.normal.dot(&along);
-        let missing = plane.violation(foot);
+        let violation = plane.violation(foot);
         if slope.abs() <= PARALLEL {
-            if missing > TOLERANCE_MPS2 {
+            if violation > TOLERANCE_MPS2 {
                 return None;
             }
         } else if slope > 0.0 {
-            low = low.max(missing / slope);
+            low = low.max(violation / slope);
         } else {
-            high = high.min(missing / slope);
+            high = high.min(violation / slope);
         }
         if low > high {
             return None;
@@ -163,7 +165,7 @@ mod tests {
         planes.iter().map(|p| p.violation(a)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The points of a fine polar grid in the disc.
+    /// Points of a fine polar grid in the disc of radius `limit`.
     fn grid(limit: f64) -> impl Iterator<Item = Vec2> {
         (0..=80).flat_map(move |r| {
             (0..180).map(move |k| {
@@ -188,13 +190,14 @@ mod tests {
                 prop_assert!((a - wanted).norm() <= nearest.fold(f64::INFINITY, f64::min) + 1e-9);
             } else {
                 let least = grid(limit).map(|p| worst(&planes, p)).fold(f64::INFINITY, f64::min);
-                prop_assert!(worst(&planes, a) <= least + SLACK_MPS2 + 1e-6, "{} against {least}", worst(&planes, a));
+                let violation = worst(&planes, a);
+                prop_assert!(violation <= least + SLACK_MPS2 + 1e-6, "violation {violation}, least on the grid {least}");
             }
         }
     }
 
     #[test]
-    fn a_first_tier_is_satisfied_although_a_later_one_contradicts_it() {
+    fn the_first_tier_is_satisfied_even_if_a_later_tier_contradicts_it() {
         let planes = [plane(0.0, 1.0), plane(std::f64::consts::PI, 1.0)];
         let a = Program::default().solve(&planes, [1; 2], 5.0, Vec2::zeros());
         assert!(planes[0].violation(a) <= 1e-9, "{a}");

@@ -1,8 +1,8 @@
-//! The safety filter keeps a drone's distance from obstacles and neighbours. It uses the drone's own senses and depends on no
-//! leader.
+//! The safety filter keeps a drone's distance from obstacles and neighbours. It uses only the drone's own sensors and received
+//! beacons, and depends on no leader.
 //!
 //! For each obstacle and neighbour the filter forms a barrier h = √(2 α x) + ẋ and keeps it from falling faster than γ h (a
-//! control barrier function on the braking distance). x is the distance beyond the one to keep, and α is the assumed
+//! control barrier function on the braking distance). x is the distance beyond the distance to keep, and α is the assumed
 //! deceleration. Each barrier bounds the acceleration along the line of sight: a half-plane for [`Program`].
 
 use crate::program::{HalfPlane, Program};
@@ -26,23 +26,24 @@ pub struct SafetyParams {
     pub reaction_time_s: f64,
     /// Time between two calls of the filter, s.
     pub dt_s: f64,
-    /// Neighbours within this distance are sensed, m.
+    /// Ranging distance, m. Neighbours within it are sensed.
     pub ranging_m: f64,
 }
 
-/// Obstacles farther away than the clearance plus this are ignored, m.
+/// Obstacles farther away than the clearance plus this distance are ignored, m.
 const OBSTACLE_REACH_M: f64 = 60.0;
-/// Margin on the clearance, m. It covers the length of a tick and `TANGENT_M`.
+/// Margin on the clearance, m. It covers what happens within a tick, and `TANGENT_M`.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
 /// Shortfall above which a neighbour is treated as non-cooperative, m/s².
 const NON_COOPERATIVE_MPS2: f64 = 2.0;
-/// A neighbour that has come this deep into the margin, as a share of it, is avoided with priority.
+/// Share of the margin that a neighbour may enter before it is avoided with priority.
 const INTRUSION: f64 = 0.5;
 /// Lower bound on the speed limit behind another drone, m/s. Below it the limit would be arbitrarily steep.
 const MIN_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration that is assumed for braking before an obstacle. The rest is left for turning.
 const OBSTACLE_BRAKING: f64 = 0.7;
-/// Least margin on the safe distance, m. It covers the length of a tick and `TANGENT_M`.
+/// Least margin on the safe distance, m. It covers what happens within a tick, and the small distance by which a
+/// drone that is pushed may pass the border.
 pub const MIN_MARGIN_M: f64 = 0.25;
 /// Below this x, √x is continued by its tangent, m: near 0 it would be arbitrarily steep, and below 0 it does not exist. A
 /// drone that is pushed against the border comes to rest this far beyond it.
@@ -60,7 +61,7 @@ pub struct NearObstacle {
 /// A neighbour, sensed or known from its beacon.
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbour {
-    /// The drone.
+    /// Id of the neighbour.
     pub id: DroneId,
     /// Its position relative to the drone, m.
     pub position_m: Vec2,
@@ -68,39 +69,40 @@ pub struct Neighbour {
     pub velocity_mps: Vec2,
     /// Age of its beacon when the command takes effect, s; 0 if sensed.
     pub age_s: f64,
-    /// Whether it is sensed, and not only known by beacon.
+    /// Whether it is sensed. If not, it is known only from its beacon.
     pub sensed: bool,
-    /// Lower bound on its distance, m: nearer it would be sensed.
+    /// Lower bound on its distance, m. A neighbour nearer than this would be sensed.
     pub least_m: f64,
     /// This drone's share of an evasion, 0 to 1.
     pub share: f64,
 }
 
-/// What was expected of a sensed neighbour in an earlier tick.
+/// The behaviour that was expected of a sensed neighbour in an earlier tick.
 #[derive(Clone, Copy, Debug)]
 struct Expectation {
     id: DroneId,
-    /// Its velocity then, m/s.
+    /// Its velocity in that tick, world frame, m/s.
     velocity: Vec2,
     /// Unit vector from it to this drone.
     normal: Vec2,
-    /// Its share of the acceleration away from this drone, m/s².
+    /// The share of the acceleration away from this drone that was due from it, m/s².
     due: f64,
 }
 
-/// The filter and what it remembers of the ticks before.
+/// The filter and its memory of earlier ticks.
 #[derive(Clone, Debug)]
 pub struct Safety {
     params: SafetyParams,
     planes: Vec<HalfPlane>,
     program: Program,
-    /// What was expected of the neighbours, the newest last: one entry per tick, until its commands have taken effect.
+    /// Expectations of the neighbours, the newest last. One entry per tick, kept until the commands of that tick have taken
+    /// effect.
     expected: VecDeque<Vec<Expectation>>,
     assessed: Vec<Assessed>,
 }
 
 impl Safety {
-    /// A filter with these constants, and no memory yet.
+    /// Creates a filter with these constants and an empty memory.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
         Self {
@@ -112,7 +114,7 @@ impl Safety {
         }
     }
 
-    /// Its present constants.
+    /// The present constants of the filter.
     #[must_use]
     pub fn params(&self) -> &SafetyParams {
         &self.params
@@ -123,8 +125,9 @@ impl Safety {
         self.params.reaction_time_s = reaction_time_s;
     }
 
-    /// The safe acceleration nearest to `wanted`, world frame, m/s². If no acceleration keeps every distance, obstacles have
-    /// priority, then neighbours that cannot evade.
+    /// Returns the safe acceleration nearest to `wanted`, world frame, m/s². `velocity`: the drone's own, world frame, m/s. If
+    /// no acceleration keeps every distance, obstacles come first, then neighbours with priority (for example those that cannot
+    /// evade), then all other neighbours.
     pub fn filter(
         &mut self,
         wanted: Vec2,
@@ -168,16 +171,16 @@ impl Safety {
     /// drone chased from behind does not fly into what is ahead.
     fn assess(&self, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Assessed {
         let params = &self.params;
-        let of = |known: Option<&Vec<Expectation>>| -> Option<Expectation> {
+        let find = |known: Option<&Vec<Expectation>>| -> Option<Expectation> {
             known.filter(|_| neighbour.sensed)?.iter().find(|expected| expected.id == neighbour.id).copied()
         };
         let due = self.expected.len().checked_sub(lag + 1).and_then(|i| self.expected.get(i));
-        let theirs = velocity + neighbour.velocity_mps;
-        let change = |expected: Expectation| (theirs - expected.velocity) / params.dt_s;
-        let braking = of(self.expected.back()).map_or_else(Vec2::zeros, change);
-        let missing = of(due).map_or(0.0, |expected| expected.missing(braking));
+        let other_velocity = velocity + neighbour.velocity_mps;
+        let change = |expected: Expectation| (other_velocity - expected.velocity) / params.dt_s;
+        let braking = find(self.expected.back()).map_or_else(Vec2::zeros, change);
+        let missing = find(due).map_or(0.0, |expected| expected.missing(braking));
         let barrier = params.neighbour_barrier(&neighbour);
-        let chased = barrier.normal.dot(&(velocity + theirs)) > 0.0;
+        let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
         let intruded_m = params.keep_m(0.0) - INTRUSION * params.margin_m();
         let first = (neighbour.share >= 1.0 && !chased)
             || (neighbour.share > 0.5 && missing > NON_COOPERATIVE_MPS2)
@@ -193,17 +196,18 @@ struct Assessed {
     barrier: Barrier,
     /// Its acceleration as sensed, m/s².
     braking: Vec2,
-    /// By how much it fell short of its share, m/s².
+    /// Shortfall of its acceleration against its share, m/s².
     missing: f64,
-    /// Whether it has priority over others.
+    /// Whether it has priority over other neighbours.
     first: bool,
 }
 
 impl Expectation {
-    /// By how much the neighbour fell short of its share, m/s². `done`: its sensed acceleration in the tick in which its
-    /// share was due, m/s². This drone makes up for the shortfall, whether the other is dead, brakes, or cannot evade.
-    fn missing(&self, done: Vec2) -> f64 {
-        (self.due + done.dot(&self.normal)).max(0.0)
+    /// Shortfall of the neighbour's acceleration against its share, m/s². `sensed`: its sensed acceleration in the tick in
+    /// which its share was due, m/s². This drone makes up for the shortfall, whether the neighbour is dead, brakes, or cannot
+    /// evade.
+    fn missing(&self, sensed: Vec2) -> f64 {
+        (self.due + sensed.dot(&self.normal)).max(0.0)
     }
 }
 
@@ -212,26 +216,27 @@ impl Expectation {
 struct Barrier {
     /// Unit vector from the neighbour to this drone.
     normal: Vec2,
-    /// Largest acceleration of the two towards each other, m/s². If negative, they have to accelerate apart.
+    /// Largest allowed acceleration of the two drones towards each other, m/s². If negative, they have to accelerate apart.
     slack: f64,
-    /// This drone's share of it.
+    /// This drone's share of `slack`.
     share: f64,
-    /// Distance beyond the one to keep, m.
+    /// Distance beyond the distance to keep, m.
     beyond_m: f64,
 }
 
 impl SafetyParams {
+    /// Margin on the safe distance, m.
     fn margin_m(&self) -> f64 {
         (self.safe_distance_m * self.margin).max(MIN_MARGIN_M)
     }
 
-    /// Distance to keep from a drone whose state is known `late_s` too late, m.
+    /// Distance to keep from a drone whose state is known with a delay of `late_s`, m.
     fn keep_m(&self, late_s: f64) -> f64 {
         self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
     }
 
-    /// The highest speed at which two drones that fly at each other can both stop, if they know of each other only from
-    /// ranging distance on, m/s.
+    /// The highest speed at which two drones that fly at each other can both stop in time, m/s. They sense each other only
+    /// within the ranging distance.
     #[must_use]
     pub fn speed_on_sight_mps(&self) -> f64 {
         let (late_s, brake) = (self.reaction_time_s, self.acceleration_max_mps2);
@@ -255,7 +260,7 @@ impl SafetyParams {
         let distance = neighbour.position_m.norm().max(1e-6);
         let normal = -neighbour.position_m / distance;
         let velocity = -neighbour.velocity_mps;
-        // The knowledge is old and the reaction is late: meanwhile the other may have turned.
+        // The state is old and the reaction is late. Meanwhile the neighbour may have turned.
         let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
         let alpha = self.acceleration_max_mps2;
         let unsensed_m = neighbour.least_m - self.keep_m(self.reaction_time_s);
@@ -264,31 +269,32 @@ impl SafetyParams {
         let speed = normal.dot(&velocity);
         let turning = (velocity.norm_squared() - speed * speed) / distance;
         let slack = self.gain_per_s * (root + speed) + turning + slope * speed;
-        // Remaining room is halved; an evasion is divided by precedence.
+        // The two drones share remaining room equally. They share an evasion by precedence.
         let share = if slack < 0.0 { neighbour.share } else { neighbour.share.min(0.5) };
         Barrier { normal, slack, share, beyond_m }
     }
 
-    /// Behind a drone that flies away, this drone keeps enough room to stop if the other brakes: v ≤ √(u² + 2 a x), where v
-    /// and u are the speeds of this drone and of the other along the line between them. `braking`: the other's sensed
-    /// acceleration, m/s².
+    /// Half-plane that keeps this drone far enough behind a drone that flies away, so that it can stop if the other brakes:
+    /// v ≤ √(u² + 2 a x). v and u are the speeds of this drone and of the other along the line between them. `braking`: the
+    /// other's sensed acceleration, m/s². `None` if one of the two does not fly in that direction.
     fn following_plane(&self, other: &Neighbour, barrier: &Barrier, own: Vec2, braking: Vec2) -> Option<HalfPlane> {
-        let (normal, theirs) = (barrier.normal, own + other.velocity_mps);
-        let (approach, flight) = (-own.dot(&normal), -theirs.dot(&normal));
-        if flight <= 0.0 || approach <= 0.0 {
+        let (normal, other_velocity) = (barrier.normal, own + other.velocity_mps);
+        let (own_speed, other_speed) = (-own.dot(&normal), -other_velocity.dot(&normal));
+        if other_speed <= 0.0 || own_speed <= 0.0 {
             return None;
         }
         let stop = self.acceleration_max_mps2;
-        let limit = (flight * flight + 2.0 * stop * barrier.beyond_m).max(MIN_LIMIT_MPS * MIN_LIMIT_MPS).sqrt();
+        let limit =
+            (other_speed * other_speed + 2.0 * stop * barrier.beyond_m).max(MIN_LIMIT_MPS * MIN_LIMIT_MPS).sqrt();
         let apart = -other.velocity_mps;
         let turn = (apart - normal * apart.dot(&normal)) / other.position_m.norm().max(1e-6);
-        let slowing = flight * (-braking.dot(&normal) - theirs.dot(&turn)) + stop * apart.dot(&normal);
-        let bound = -self.gain_per_s * (limit - approach) - own.dot(&turn) - slowing / limit;
+        let slowing = other_speed * (-braking.dot(&normal) - other_velocity.dot(&turn)) + stop * apart.dot(&normal);
+        let bound = -self.gain_per_s * (limit - own_speed) - own.dot(&turn) - slowing / limit;
         Some(HalfPlane { normal, bound })
     }
 }
 
-/// √(2 α x), m/s, and its slope, 1/s. Continued by its tangent below `TANGENT_M`.
+/// √(2 α x), m/s, and its slope, 1/s. Below `TANGENT_M` the root is continued by its tangent.
 fn root(alpha: f64, x: f64) -> (f64, f64) {
     let least = (2.0 * alpha * TANGENT_M).sqrt();
     if x < TANGENT_M {

@@ -1,5 +1,5 @@
-//! The shortest path round known obstacles: A* over the tangents of inflated outlines, a visibility graph made as it is
-//! searched.
+//! Shortest paths around known obstacles: A* search on a visibility graph. Its nodes are the corners of inflated outlines, and
+//! its edges are tangents. Edges are generated during the search.
 
 use crate::braking_filter::core_distance_m;
 use skein_leader::geometry::inflate;
@@ -8,13 +8,14 @@ use skein_protocol::shape::ConvexShape;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Nodes expanded in one search at most; beyond, there is no path.
+/// Most nodes that one search expands. A search that reaches this limit ends with the shortest path found so far, if any.
 const MAX_EXPANSIONS: usize = 4000;
-/// A path may come so much nearer to an obstacle than its outline is inflated, m: what is rounded must not count.
+/// Tolerance on the distance to an obstacle, m, so that rounding errors do not block a path.
 const ROUNDING_M: f64 = 1e-6;
-/// A start or an end nearer to an obstacle than the distance to keep may come so much nearer still, m.
+/// If the start or the end of a path is nearer to an obstacle than the distance to keep, the path may come nearer to that
+/// obstacle by this, m.
 const PRESSED_M: f64 = 1e-3;
-/// The least distance to an obstacle that any path keeps, m.
+/// The least distance to an obstacle that any searched path keeps, m.
 const LEAST_M: f64 = 0.01;
 
 /// A known obstacle, inflated.
@@ -22,23 +23,23 @@ const LEAST_M: f64 = 0.01;
 struct Outline {
     shape: ConvexShape,
     centre: Vec2,
-    /// Half the diagonal of the box around the shape, m.
+    /// Half the diagonal of the shape's bounding box, m.
     extent_m: f64,
     /// Corners of the inflated outline, counter-clockwise.
     corners: Vec<Vec2>,
 }
 
-/// A map of obstacles for paths that keep one distance from all of them.
+/// A map of obstacles. All paths on it keep the same distance from all obstacles.
 #[derive(Clone, Debug, Default)]
 pub struct VisibilityMap {
     keep_m: f64,
     outlines: Vec<Outline>,
 }
 
-/// A node: a corner of an outline.
+/// A node of the graph: index of an outline, and index of a corner of that outline.
 type Corner = (usize, usize);
 
-/// A distance that can be ordered.
+/// A length with a total order, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Length(f64);
 
@@ -57,13 +58,13 @@ impl Ord for Length {
 }
 
 impl VisibilityMap {
-    /// A map without obstacles, for paths whose distance to each is at least `keep_m`.
+    /// Creates an empty map, for paths that keep at least `keep_m` from each obstacle.
     #[must_use]
     pub fn new(keep_m: f64) -> Self {
         Self { keep_m, outlines: Vec::new() }
     }
 
-    /// Adds an obstacle.
+    /// Adds an obstacle, world frame.
     pub fn add(&mut self, shape: &ConvexShape) {
         let (low, high) = shape.bounds();
         let core: Vec<Vec2> = shape.vertices().collect();
@@ -75,7 +76,7 @@ impl VisibilityMap {
         });
     }
 
-    /// Forgets all obstacles.
+    /// Removes all obstacles.
     pub fn clear(&mut self) {
         self.outlines.clear();
     }
@@ -86,26 +87,28 @@ impl VisibilityMap {
         self.outlines.len()
     }
 
-    /// Whether it holds no obstacle.
+    /// Whether the map holds no obstacle.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.outlines.is_empty()
     }
 
-    /// Whether a straight flight keeps the distance from all obstacles, but for those that an end of it is nearer to.
+    /// Whether the straight flight between two points keeps the distance from all obstacles. If one of the two points is nearer
+    /// to an obstacle than that, the flight may come as near to this obstacle as that point. World frame, m.
     #[must_use]
     pub fn is_free(&self, from: Vec2, to: Vec2) -> bool {
         let keep = |outline: &Outline| self.keep_m.min(outline.distance_m(from, from)).min(outline.distance_m(to, to));
         self.outlines.iter().all(|outline| outline.is_free(from, to, self.keep_m, || keep(outline)))
     }
 
-    /// The corners of the shortest path, the end last, and its length, m; `None` if there is no path.
+    /// Returns the corners of the shortest path, with `to` as the last one, and the path's length. `None` if no path was found.
+    /// World frame, m.
     #[must_use]
     pub fn path(&self, from: Vec2, to: Vec2) -> Option<(Vec<Vec2>, f64)> {
         if self.is_free(from, to) {
             return Some((vec![to], (to - from).norm()));
         }
-        // An end that is nearer to an obstacle than a path should be is left, or reached, all the same.
+        // A path may leave its start, or reach its end, even if that point is nearer to an obstacle than the distance to keep.
         let keeps: Vec<f64> = self
             .outlines
             .iter()
@@ -156,7 +159,8 @@ impl VisibilityMap {
         self.outlines[outline].corners[corner]
     }
 
-    /// Corners at which a straight flight from `point` can touch an outline; from a corner also the two beside it.
+    /// Corners at which a straight flight from `point` can touch an outline as a tangent. If `point` is the corner `at`, its own
+    /// outline contributes only the two adjacent corners.
     fn tangents(&self, point: Vec2, at: Option<Corner>) -> Vec<Corner> {
         let mut found = Vec::new();
         for (i, outline) in self.outlines.iter().enumerate() {
@@ -180,6 +184,7 @@ impl VisibilityMap {
         found
     }
 
+    /// The corners from the start of the search to `last`, followed by `to`.
     fn walk_back(&self, best: &BTreeMap<Corner, (f64, Option<Corner>)>, last: Corner, to: Vec2) -> Vec<Vec2> {
         let mut corners = vec![to];
         let mut at = Some(last);
@@ -193,12 +198,14 @@ impl VisibilityMap {
 }
 
 impl Outline {
+    /// Distance between a segment and the shape, m; negative if the segment enters it.
     fn distance_m(&self, from: Vec2, to: Vec2) -> f64 {
         core_distance_m(&self.shape, from, to) - self.shape.radius_m
     }
 
-    /// Whether a segment is at least `keep_m` away, or what `else_m` says where it is not.
-    fn is_free(&self, from: Vec2, to: Vec2, keep_m: f64, else_m: impl Fn() -> f64) -> bool {
+    /// Whether a segment is at least `keep_m`, or at least `fallback_m()`, away from the shape. `fallback_m` is evaluated only if
+    /// the segment is nearer than `keep_m`.
+    fn is_free(&self, from: Vec2, to: Vec2, keep_m: f64, fallback_m: impl Fn() -> f64) -> bool {
         let along = to - from;
         let length2 = along.norm_squared();
         let share = if length2 > 0.0 { ((self.centre - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
@@ -207,7 +214,7 @@ impl Outline {
             return true;
         }
         let distance_m = self.distance_m(from, to);
-        distance_m >= keep_m - ROUNDING_M || distance_m >= else_m() - ROUNDING_M
+        distance_m >= keep_m - ROUNDING_M || distance_m >= fallback_m() - ROUNDING_M
     }
 }
 
@@ -227,16 +234,16 @@ mod tests {
     }
 
     #[test]
-    fn round_a_disc_the_path_is_two_tangents_and_an_arc() {
+    fn the_path_around_a_disc_is_two_tangents_and_an_arc() {
         let map = map(5.0, &[ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()]);
         let (_, length_m) = map.path(Vec2::zeros(), Vec2::new(100.0, 0.0)).unwrap();
         let tangent_m = (50.0f64 * 50.0 - 225.0).sqrt();
         let exact_m = 2.0 * tangent_m + 15.0 * 2.0 * (15.0f64 / 50.0).asin();
-        assert!((length_m - exact_m).abs() < 0.05, "{length_m} against {exact_m}");
+        assert!((length_m - exact_m).abs() < 0.05, "length {length_m} m, expected {exact_m} m");
     }
 
     #[test]
-    fn a_dead_end_is_left_backwards() {
+    fn the_path_out_of_a_dead_end_leads_backwards() {
         let walls = [
             rectangle(300.0, 70.0, 150.0, 10.0),
             rectangle(300.0, -70.0, 150.0, 10.0),
@@ -247,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_open_from_twice_the_distance_on() {
+    fn a_gap_is_passable_from_twice_the_distance_on() {
         let gap = |width_m: f64| {
             [rectangle(100.0, 60.0 + width_m / 2.0, 5.0, 60.0), rectangle(100.0, -60.0 - width_m / 2.0, 5.0, 60.0)]
         };
@@ -257,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_no_way_there_is_no_path() {
+    fn a_closed_ring_of_walls_leaves_no_path() {
         let ring = [
             rectangle(0.0, 50.0, 60.0, 5.0),
             rectangle(0.0, -50.0, 60.0, 5.0),
@@ -267,7 +274,7 @@ mod tests {
         assert_eq!(map(5.0, &ring).path(Vec2::zeros(), Vec2::new(200.0, 0.0)), None);
     }
 
-    /// The shortest path over a graph of all corners, by brute force.
+    /// Length of the shortest path over the graph of all corners, m, by Dijkstra's algorithm without tangent selection.
     fn brute_force(map: &VisibilityMap, from: Vec2, to: Vec2) -> Option<f64> {
         let mut nodes = vec![from, to];
         let free = |p: &Vec2| map.outlines.iter().all(|o| o.distance_m(*p, *p) >= map.keep_m - ROUNDING_M);
@@ -294,13 +301,13 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn tangents_are_enough(discs in prop::collection::vec((0.0..200.0f64, -60.0..60.0f64, 2.0..20.0f64), 1..5)) {
+        fn tangents_are_sufficient(discs in prop::collection::vec((0.0..200.0f64, -60.0..60.0f64, 2.0..20.0f64), 1..5)) {
             let (from, to) = (Vec2::new(-60.0, 0.0), Vec2::new(260.0, 0.0));
             let shapes: Vec<_> = discs.iter().map(|&(x, y, r)| ConvexShape::circle(Vec2::new(x, y), r).unwrap()).collect();
             let map = map(4.0, &shapes);
             let found = map.path(from, to).map(|(_, length_m)| length_m);
             match (found, brute_force(&map, from, to)) {
-                (Some(found), Some(least)) => prop_assert!((found - least).abs() < 1e-6, "{found} against {least}"),
+                (Some(found), Some(least)) => prop_assert!((found - least).abs() < 1e-6, "found {found} m, least {least} m"),
                 (found, least) => prop_assert_eq!(found, least),
             }
         }

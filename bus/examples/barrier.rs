@@ -1,4 +1,5 @@
-//! Ticks per second of the bare barrier: `cargo run --example barrier -- [DRONES] [TICKS] [block|yield] [auto|off]`.
+//! Measures the ticks per second of the barrier alone:
+//! `cargo run --example barrier -- [DRONES] [TICKS] [block|yield] [auto|off]`.
 
 use skein_bus::{
     Control, ControlSpec, DroneEndpoint, Patience, PinMode, TickOutcome, TickSignal, WaitMode, allowed_cores,
@@ -21,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (drones, ticks) = (number(0, 8)?, number(1, 5000)? as u64);
     let cores = if pin == PinMode::Auto { allowed_cores()? } else { 1 };
     let world = Control::create(ControlSpec { drones, cores, per_process: 1, wait })?;
-    let mut flock = (0..drones).map(|id| start(&world, id, pin)).collect::<Result<Vec<_>, _>>()?;
+    let mut children = (0..drones).map(|id| start(&world, id, pin)).collect::<Result<Vec<_>, _>>()?;
     while (0..drones).any(|id| world.ready(id).is_none()) {
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -35,14 +36,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let span = start.elapsed().as_secs_f64();
     world.close();
     println!("{drones} drones, {wait:?}, pin {pin:?}: {:.0} ticks/s", ticks as f64 / span);
-    for drone in &mut flock {
-        drone.wait()?;
+    for child in &mut children {
+        child.wait()?;
     }
     Ok(())
 }
 
 fn start(world: &Control, id: usize, pin: PinMode) -> Result<Child, Box<dyn Error>> {
-    let fd = world.fd().ok_or("the maker of a segment has its descriptor")?;
+    let fd = world.fd().ok_or("the control segment has no file descriptor")?;
     let pin = if pin == PinMode::Auto { "auto" } else { "off" };
     let args = [fd.to_string(), id.to_string(), "-".to_owned(), pin.to_owned(), "drone".to_owned()];
     Ok(Command::new(std::env::current_exe()?).args(args).spawn()?)
@@ -51,11 +52,11 @@ fn start(world: &Control, id: usize, pin: PinMode) -> Result<Child, Box<dyn Erro
 fn drone(fd: i32, id: usize, pin: PinMode) -> Result<(), Box<dyn Error>> {
     let control = Arc::new(Control::attach(fd)?);
     pin_to_core(control.core_of(id), pin)?;
-    let mut end = DroneEndpoint::new(control, id)?;
-    end.announce(1);
+    let mut endpoint = DroneEndpoint::new(control, id)?;
+    endpoint.announce(1);
     let parent = std::os::unix::process::parent_id();
-    while let TickSignal::Tick(k) = end.wait_tick(|| std::os::unix::process::parent_id() == parent) {
-        end.finish(k, &Slot::default());
+    while let TickSignal::Tick(k) = endpoint.wait_tick(|| std::os::unix::process::parent_id() == parent) {
+        endpoint.finish(k, &Slot::default());
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! The barrier, with threads in the place of processes: each maps the segment for itself.
-#![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
+//! Tests of the barrier. Threads stand in for processes; each thread maps the control segment itself.
+#![allow(clippy::unwrap_used)] // the lint exempts test functions, but not their helpers
 
 use skein_bus::{BusError, Control, ControlSpec, DroneEndpoint, Patience, TickOutcome, TickSignal, WaitMode};
 use skein_protocol::slot::Slot;
@@ -24,15 +24,15 @@ fn slot(drone: usize, tick: u64) -> Slot {
     Slot { heard_hash: tick * 1000 + drone as u64, step_ns: tick as u32, ..Slot::default() }
 }
 
-/// Answers every tick until the mission is over; the ticks it saw.
+/// Starts a thread that answers every tick until the mission ends. The thread returns the ticks it saw.
 fn drone(launcher: &Control, drone: usize) -> JoinHandle<Vec<u64>> {
-    let mut end = end_of(launcher, drone);
+    let mut endpoint = end_of(launcher, drone);
     thread::spawn(move || {
         let mut seen = Vec::new();
-        end.announce(1);
-        while let TickSignal::Tick(k) = end.wait_tick(|| true) {
-            end.stats_mut().heard += 1;
-            assert!(end.finish(k, &slot(drone, k)));
+        endpoint.announce(1);
+        while let TickSignal::Tick(k) = endpoint.wait_tick(|| true) {
+            endpoint.stats_mut().heard += 1;
+            assert!(endpoint.finish(k, &slot(drone, k)));
             seen.push(k);
         }
         seen
@@ -42,7 +42,7 @@ fn drone(launcher: &Control, drone: usize) -> JoinHandle<Vec<u64>> {
 fn lockstep(drones: usize, cores: usize, ticks: u64, wait: WaitMode) {
     let launcher = segment(drones, cores, wait);
     let world = Control::attach(launcher.fd().unwrap()).unwrap();
-    let flock: Vec<_> = (0..drones).map(|i| drone(&launcher, i)).collect();
+    let threads: Vec<_> = (0..drones).map(|i| drone(&launcher, i)).collect();
     let mut answers = vec![TickOutcome::Pending; drones];
     for k in 0..ticks {
         world.open_tick(k).unwrap();
@@ -51,8 +51,8 @@ fn lockstep(drones: usize, cores: usize, ticks: u64, wait: WaitMode) {
         assert!((0..drones).all(|i| world.slot(i) == slot(i, k)), "tick {k}");
     }
     world.close();
-    for (i, drone) in flock.into_iter().enumerate() {
-        assert!(drone.join().unwrap().into_iter().eq(0..ticks), "drone {i} saw each tick once");
+    for (i, drone) in threads.into_iter().enumerate() {
+        assert!(drone.join().unwrap().into_iter().eq(0..ticks), "drone {i} did not see each tick exactly once");
         assert_eq!(launcher.stats(i).heard, ticks);
     }
 }
@@ -66,14 +66,14 @@ fn lockstep_loses_no_wake_up() {
 }
 
 #[test]
-fn lockstep_by_yielding() {
+fn lockstep_works_with_yielding_waits() {
     lockstep(4, 2, 1000, WaitMode::Yield);
 }
 
 #[test]
-fn a_death_wakes_the_world() {
+fn marking_a_drone_dead_wakes_the_world() {
     let world = Arc::new(segment(2, 1, WaitMode::Block));
-    let flier = drone(&world, 1);
+    let survivor = drone(&world, 1);
     world.open_tick(0).unwrap();
     let supervisor = Control::attach(world.fd().unwrap()).unwrap();
     let watcher = thread::spawn(move || {
@@ -83,14 +83,14 @@ fn a_death_wakes_the_world() {
     let mut answers = [TickOutcome::Pending; 2];
     let start = Instant::now();
     world.wait_done(0, LONG, &mut answers).unwrap();
-    assert!(start.elapsed() < Duration::from_secs(2), "the mark did not wake the world");
+    assert!(start.elapsed() < Duration::from_secs(2), "marking the drone dead did not wake the world");
     assert_eq!(answers, [TickOutcome::Dead, TickOutcome::Done]);
     watcher.join().unwrap();
 
-    // A new process answers from tick 5 on, and the tick before goes on without it.
+    // A new process answers from tick 5 on. Earlier ticks run without it.
     world.revive(0, 5);
     assert_eq!(world.ready(0), None);
-    let again = drone(&world, 0);
+    let restarted = drone(&world, 0);
     for k in 3..7 {
         world.open_tick(k).unwrap();
         answers[0] = if k < 5 { TickOutcome::Absent } else { TickOutcome::Pending };
@@ -98,17 +98,17 @@ fn a_death_wakes_the_world() {
         assert_eq!(answers, [if k < 5 { TickOutcome::Absent } else { TickOutcome::Done }, TickOutcome::Done]);
     }
     world.close();
-    assert_eq!(again.join().unwrap(), [5, 6]);
-    assert_eq!(flier.join().unwrap(), [0, 3, 4, 5, 6]);
+    assert_eq!(restarted.join().unwrap(), [5, 6]);
+    assert_eq!(survivor.join().unwrap(), [0, 3, 4, 5, 6]);
 }
 
 #[test]
-fn who_answered_before_it_died_has_answered() {
+fn an_answer_given_before_death_counts() {
     let world = segment(1, 1, WaitMode::Block);
-    let mut end = end_of(&world, 0);
+    let mut endpoint = end_of(&world, 0);
     world.open_tick(0).unwrap();
-    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(0));
-    assert!(end.finish(0, &slot(0, 0)));
+    assert_eq!(endpoint.wait_tick(|| true), TickSignal::Tick(0));
+    assert!(endpoint.finish(0, &slot(0, 0)));
     world.mark_dead(0);
     let mut answers = [TickOutcome::Pending];
     world.wait_done(0, LONG, &mut answers).unwrap();
@@ -119,7 +119,7 @@ fn who_answered_before_it_died_has_answered() {
 }
 
 #[test]
-fn the_late_and_the_hung() {
+fn a_slow_drone_is_late_after_a_deadline_and_hung_after_a_time_limit() {
     let world = segment(2, 1, WaitMode::Block);
     let prompt = drone(&world, 1);
     let mut slow = end_of(&world, 0);
@@ -131,7 +131,8 @@ fn the_late_and_the_hung() {
     assert_eq!(answers, [TickOutcome::Late, TickOutcome::Done]);
     assert!(start.elapsed() >= Duration::from_millis(300));
 
-    // It answers tick 0 while tick 2 is open: that is no answer to tick 2, and the next it sees is the newest.
+    // The slow drone answers tick 0 while tick 2 is open. This does not count as an answer to tick 2. The next tick
+    // that the drone sees is the newest one.
     world.open_tick(1).unwrap();
     world.open_tick(2).unwrap();
     assert!(slow.finish(0, &slot(0, 0)));
@@ -149,31 +150,31 @@ fn the_late_and_the_hung() {
 #[test]
 fn a_frozen_drone_neither_reads_nor_answers_an_old_tick() {
     let world = segment(1, 1, WaitMode::Block);
-    let mut end = end_of(&world, 0);
+    let mut endpoint = end_of(&world, 0);
     world.open_tick(4).unwrap();
-    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(4));
+    assert_eq!(endpoint.wait_tick(|| true), TickSignal::Tick(4));
     world.freeze(0);
-    assert!(!end.finish(4, &slot(0, 4)), "frozen in the middle of its step");
+    assert!(!endpoint.finish(4, &slot(0, 4)), "the drone was frozen during its step");
     assert_eq!(world.slot(0), Slot::default());
     world.open_tick(5).unwrap();
-    assert_eq!(end.wait_tick(|| false), TickSignal::Orphaned, "tick 5 is not for it");
+    assert_eq!(endpoint.wait_tick(|| false), TickSignal::Orphaned, "a frozen drone does not see tick 5");
     world.set_resume_from(0, 6);
-    assert_eq!(end.wait_tick(|| false), TickSignal::Orphaned, "still not");
+    assert_eq!(endpoint.wait_tick(|| false), TickSignal::Orphaned, "the drone resumes only from tick 6 on");
     world.open_tick(6).unwrap();
-    assert_eq!(end.wait_tick(|| true), TickSignal::Tick(6));
-    assert!(end.finish(6, &slot(0, 6)));
-    assert!(!end.finish(5, &slot(0, 5)), "only the tick it was given");
+    assert_eq!(endpoint.wait_tick(|| true), TickSignal::Tick(6));
+    assert!(endpoint.finish(6, &slot(0, 6)));
+    assert!(!endpoint.finish(5, &slot(0, 5)), "a drone can answer only the tick that it was given");
 }
 
 #[test]
-fn nobody_waits_for_ever_for_a_vanished_peer() {
+fn waiting_ends_when_the_peer_is_gone() {
     let launcher = segment(1, 1, WaitMode::Block);
-    let mut asked = 0;
+    let mut calls = 0;
     let signal = end_of(&launcher, 0).wait_tick(|| {
-        asked += 1;
-        asked < 3
+        calls += 1;
+        calls < 3
     });
-    assert_eq!((signal, asked), (TickSignal::Orphaned, 3));
+    assert_eq!((signal, calls), (TickSignal::Orphaned, 3));
     assert!(!launcher.wait_go(|| false));
     launcher.give_go();
     assert!(launcher.wait_go(|| false));
@@ -183,7 +184,7 @@ fn nobody_waits_for_ever_for_a_vanished_peer() {
 }
 
 #[test]
-fn what_is_no_control_segment_is_refused() {
+fn invalid_segments_and_arguments_are_refused() {
     let mut other = tempfile::tempfile().unwrap();
     let error = Control::attach(other.as_raw_fd()).unwrap_err();
     assert!(matches!(&error, BusError::Control(why) if why.contains("holds 0 bytes")), "{error}");

@@ -1,5 +1,5 @@
-//! Runs side by side, and what dead ones leave behind.
-#![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
+//! Tests of runs that exist side by side, and of the clean-up after dead runs.
+#![allow(clippy::unwrap_used)] // the lint exempts test functions, but not their helpers
 
 use skein_bus::domain::{clean_in, living_in};
 use skein_bus::{BusError, Cleaned, Domain, Services};
@@ -21,7 +21,7 @@ fn shared_files(prefix: &str) -> Vec<PathBuf> {
     entries.filter(|path| path.file_name().unwrap().to_str().unwrap().starts_with(prefix)).collect()
 }
 
-/// The part of a launcher that will be killed: not a test of its own.
+/// Not a test by itself: the role of a launcher that the parent test kills.
 #[test]
 fn child_launcher() {
     let Some(root) = std::env::var_os(CHILD_ROOT) else { return };
@@ -31,6 +31,7 @@ fn child_launcher() {
     thread::sleep(Duration::from_secs(60));
 }
 
+/// Starts a launcher in a child process and kills it. Returns the folder of its run.
 fn killed_run(root: &Path) -> PathBuf {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "child_launcher"])
@@ -43,8 +44,8 @@ fn killed_run(root: &Path) -> PathBuf {
         thread::sleep(Duration::from_millis(5));
         up()
     });
-    let run = run.expect("the child made its run within 20 s");
-    assert_eq!(clean_in(root).unwrap(), Cleaned::default(), "a living run is left alone");
+    let run = run.expect("the child did not create its run within 20 s");
+    assert_eq!(clean_in(root).unwrap(), Cleaned::default(), "cleaning touched a living run");
     child.kill().unwrap();
     child.wait().unwrap();
     run
@@ -59,11 +60,11 @@ fn a_killed_run_is_cleaned_and_a_living_one_is_not() {
 
     let alive = Domain::create_in(root.path(), "alive").unwrap();
     let _services = Services::create(&alive, 2, 1, "launcher").unwrap();
-    let foreign = [root.path().join("notes.txt"), root.path().join("1_2_3")];
-    fs::write(&foreign[0], "mine").unwrap();
-    fs::create_dir(&foreign[1]).unwrap();
-    let stranger = PathBuf::from(format!("/dev/shm/{}x", &prefix[..prefix.len() - 1]));
-    fs::write(&stranger, "not of that run").unwrap();
+    let unrelated = [root.path().join("notes.txt"), root.path().join("1_2_3")];
+    fs::write(&unrelated[0], "mine").unwrap();
+    fs::create_dir(&unrelated[1]).unwrap();
+    let other_run_file = PathBuf::from(format!("/dev/shm/{}x", &prefix[..prefix.len() - 1]));
+    fs::write(&other_run_file, "belongs to another run").unwrap();
     let before = shared_files(alive.prefix());
 
     let cleaned = clean_in(root.path()).unwrap();
@@ -71,11 +72,11 @@ fn a_killed_run_is_cleaned_and_a_living_one_is_not() {
     assert!(cleaned.files > 0);
     assert_eq!(shared_files(&prefix), [] as [PathBuf; 0]);
     assert!(!dead.exists());
-    assert!(alive.path().exists() && foreign.iter().all(|path| path.exists()) && stranger.exists());
+    assert!(alive.path().exists() && unrelated.iter().all(|path| path.exists()) && other_run_file.exists());
     assert_eq!(shared_files(alive.prefix()), before);
     assert_eq!(clean_in(root.path()).unwrap(), Cleaned::default());
     assert_eq!(living_in(root.path()).unwrap(), [alive.path()]);
-    fs::remove_file(stranger).unwrap();
+    fs::remove_file(other_run_file).unwrap();
 }
 
 #[test]
@@ -98,7 +99,7 @@ fn an_ended_run_leaves_nothing() {
     let joined = Domain::join(domain.path()).unwrap();
     assert_eq!(joined.prefix(), prefix);
     drop(joined);
-    assert!(domain.path().exists(), "who joined does not remove");
+    assert!(domain.path().exists(), "a process that joined a run must not remove it");
     drop(services);
     assert!(!shared_files(&prefix).is_empty(), "iceoryx2 leaves its management file");
     let path = domain.path().to_owned();
@@ -108,7 +109,7 @@ fn an_ended_run_leaves_nothing() {
 }
 
 #[test]
-fn runs_may_start_and_clean_at_once() {
+fn runs_can_start_and_clean_at_the_same_time() {
     let root = root();
     thread::scope(|scope| {
         for _ in 0..8 {
@@ -125,7 +126,7 @@ fn runs_may_start_and_clean_at_once() {
 }
 
 #[test]
-fn folders_of_others_and_open_ones_are_refused() {
+fn folders_of_other_users_and_accessible_folders_are_refused() {
     let root = root();
     let refused = |path: &Path, why: &str| {
         let error = Domain::create_in(path, "run").unwrap_err();
@@ -154,7 +155,7 @@ fn folders_of_others_and_open_ones_are_refused() {
 }
 
 #[test]
-fn the_last_run_takes_the_root_with_it_and_others_make_it_anew() {
+fn the_last_run_removes_the_root_and_later_runs_create_it_again() {
     let parent = root();
     let root = parent.path().join("runs");
     let fly = || {
@@ -167,7 +168,7 @@ fn the_last_run_takes_the_root_with_it_and_others_make_it_anew() {
         }
     };
     std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(fly))));
-    assert!(!root.exists(), "nobody is left, the root is");
+    assert!(!root.exists(), "no run is left, but the root still exists");
     assert_eq!(clean_in(&root).unwrap().runs, 0);
     assert!(!root.exists());
     assert!(clean_in(&parent.path().join("no/such")).is_err());

@@ -1,5 +1,5 @@
-//! Downlink, uplink and record between nodes, and what becomes of them when a process dies.
-#![allow(clippy::unwrap_used)] // the lint knows only functions marked as tests, not their helpers
+//! Tests of downlink, uplink and record between nodes, including the death of a process.
+#![allow(clippy::unwrap_used)] // the lint exempts test functions, but not their helpers
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use skein_bus::{BusError, Domain, RecordPolicy, Services, UplinkHeader, clean_dead_nodes, raise_file_limit, shards};
@@ -32,7 +32,7 @@ fn frame(kind: u16) -> Frame {
     Frame { kind, version: 1, len: 8, payload: [kind as u8; FRAME_PAYLOAD] }
 }
 
-/// Starts this test binary as another process that plays one of the `child_…` roles in the run.
+/// Starts this test binary as a child process that executes one of the `child_…` roles in the run.
 fn child(role: &str, domain: &Domain) -> Child {
     Command::new(std::env::current_exe().unwrap())
         .args(["--exact", role, "--nocapture"])
@@ -43,11 +43,15 @@ fn child(role: &str, domain: &Domain) -> Child {
         .unwrap()
 }
 
-/// Reads the child's output up to a line that begins with `word`, and returns that line.
+/// Reads the child's output up to its next `test result` line. Returns the first line that contains `word`.
 fn hear(child: &mut Child, word: &str) -> String {
     let lines = BufReader::new(child.stdout.as_mut().unwrap()).lines();
-    let heard: Vec<_> = lines.map(|line| line.unwrap()).take_while(|line| !line.contains("test result")).collect();
-    heard.iter().find(|line| line.contains(word)).unwrap_or_else(|| panic!("no `{word}` in {heard:?}")).clone()
+    let lines_read: Vec<_> = lines.map(|line| line.unwrap()).take_while(|line| !line.contains("test result")).collect();
+    lines_read
+        .iter()
+        .find(|line| line.contains(word))
+        .unwrap_or_else(|| panic!("no `{word}` in {lines_read:?}"))
+        .clone()
 }
 
 fn wait_for_line() {
@@ -64,7 +68,7 @@ fn a_downlink_is_written_and_read_in_place() {
     assert!(drone.receive().unwrap().is_none());
     let mut down = Downlink::default();
     for tick in 0..6 {
-        // Grows far beyond what the first segment has room for.
+        // The message grows far beyond the size of the first segment.
         down.drones.resize(3usize.pow(2 * tick as u32 + 1), SensesHeader { incarnation: 9, ..SensesHeader::default() });
         down.seal(tick, SimTime(7));
         assert_eq!(world.send(tick, down.byte_len(), |bytes| down.write_to(bytes)).unwrap(), 1);
@@ -76,7 +80,7 @@ fn a_downlink_is_written_and_read_in_place() {
 }
 
 #[test]
-fn a_slow_drone_loses_the_oldest_downlinks_and_holds_up_nobody() {
+fn a_slow_drone_loses_the_oldest_downlinks_and_delays_no_other_process() {
     let run = run();
     let services = Services::create(&run.domain, 2, 1, "launcher").unwrap();
     let world = services.downlink_publisher().unwrap();
@@ -95,12 +99,12 @@ fn a_slow_drone_loses_the_oldest_downlinks_and_holds_up_nobody() {
     assert!(error.to_string().contains("drop the samples"), "{error}");
     drop((held, second));
     assert_eq!(slow.receive_tick(98).unwrap().unwrap().tick(), 98);
-    assert!(slow.receive_tick(98).unwrap().is_none(), "only newer ones are left");
+    assert!(slow.receive_tick(98).unwrap().is_none(), "only newer samples are left");
     assert_eq!(slow.receive_tick(100).unwrap().unwrap().tick(), 100);
 }
 
 #[test]
-fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
+fn uplinks_arrive_in_order_and_a_full_uplink_is_an_error() {
     let run = run();
     let services = Services::create(&run.domain, 34, 1, "launcher").unwrap();
     assert_eq!(shards(34), 2);
@@ -110,7 +114,7 @@ fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
     for tick in 0..8 {
         for (source, port) in &drones {
             let header = UplinkHeader { tick, source: *source, incarnation: 1 };
-            // More than a segment has room for at first.
+            // More frames than the first segment has room for.
             port.send(header, 10 * tick as usize + 1, |frames| frames.fill(frame(*source as u16))).unwrap();
         }
     }
@@ -135,7 +139,7 @@ fn uplinks_arrive_in_order_and_a_full_one_is_an_error() {
     assert!(error.to_string().contains("in this swarm?"), "{error}");
 }
 
-/// Records of a single drone's run that wait for the recorder.
+/// Capacity of the record buffer in a run of one drone, in records.
 const RECORDS: u64 = 512;
 
 #[test]
@@ -143,8 +147,8 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
     let run = run();
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let alive = Arc::new(AtomicBool::new(true));
-    let asked = Arc::clone(&alive);
-    let policy = RecordPolicy::Wait(Box::new(move || asked.load(Ordering::Relaxed)));
+    let recorder_alive = Arc::clone(&alive);
+    let policy = RecordPolicy::Wait(Box::new(move || recorder_alive.load(Ordering::Relaxed)));
     let world = services.record_publisher(policy).unwrap();
     let domain = run.domain.path().to_owned();
     let (done, wait_done) = channel();
@@ -186,7 +190,7 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
 }
 
 #[test]
-fn by_the_wall_clock_a_full_recorder_drops_and_says_so() {
+fn in_wall_clock_mode_a_full_record_buffer_drops_records_and_counts_them() {
     let run = run();
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.record_publisher(RecordPolicy::Drop).unwrap();
@@ -200,7 +204,7 @@ fn by_the_wall_clock_a_full_recorder_drops_and_says_so() {
 }
 
 #[test]
-fn observers_come_and_go_and_lose_the_oldest() {
+fn observers_can_join_and_leave_and_lose_the_oldest_samples() {
     let run = run();
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.watch_publisher().unwrap();
@@ -211,7 +215,11 @@ fn observers_come_and_go_and_lose_the_oldest() {
         for tick in 0..100 {
             assert_eq!(world.send(round * 100 + tick, 8, |bytes| bytes.fill(1)).unwrap(), 1);
         }
-        assert_eq!(observer.receive().unwrap().unwrap().tick(), round * 100 + 36, "64 of 100 are left");
+        assert_eq!(
+            observer.receive().unwrap().unwrap().tick(),
+            round * 100 + 36,
+            "the newest 64 of 100 samples should be left"
+        );
     }
     assert!(!world.watched());
     assert_eq!(world.send(0, 8, |bytes| bytes.fill(1)).unwrap(), 0);
@@ -230,7 +238,7 @@ fn two_runs_do_not_hear_each_other() {
     assert!(again.to_string().contains("belongs to a running swarm"), "{again}");
 }
 
-/// A drone that sends once, holds a sample, and will be killed: not a test of its own.
+/// Not a test by itself: the role of a drone that sends once, holds a sample, and is then killed.
 #[test]
 fn child_drone() {
     let Some(path) = std::env::var_os(CHILD_RUN) else { return };
@@ -248,7 +256,7 @@ fn child_drone() {
 }
 
 #[test]
-fn killed_drones_keep_their_places_until_they_are_cleaned() {
+fn killed_drones_occupy_their_ports_until_they_are_cleaned() {
     let run = run();
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.downlink_publisher().unwrap();
@@ -261,12 +269,12 @@ fn killed_drones_keep_their_places_until_they_are_cleaned() {
         hear(&mut drone, "held");
         drone.kill().unwrap();
         drone.wait().unwrap();
-        let last_words = uplink.receive().unwrap().unwrap();
-        assert_eq!((last_words.header().source, last_words.frames()), (0, &[frame(5)][..]));
+        let last_sample = uplink.receive().unwrap().unwrap();
+        assert_eq!((last_sample.header().source, last_sample.frames()), (0, &[frame(5)][..]));
     }
     let mut refused = child("child_drone", &run.domain);
-    let said = hear(&mut refused, "refused");
-    assert!(said.contains("skein/downlink") && said.contains("clean dead nodes"), "{said}");
+    let output = hear(&mut refused, "refused");
+    assert!(output.contains("skein/downlink") && output.contains("clean dead nodes"), "{output}");
     refused.wait().unwrap();
 
     let dead = clean_dead_nodes(&run.domain).unwrap();
@@ -280,7 +288,7 @@ fn killed_drones_keep_their_places_until_they_are_cleaned() {
     drone.wait().unwrap();
 }
 
-/// A world with too few descriptors: not a test of its own.
+/// Not a test by itself: the role of a world with too few file descriptors.
 #[test]
 fn child_world() {
     let Some(path) = std::env::var_os(CHILD_RUN) else { return };
@@ -296,7 +304,7 @@ fn child_world() {
 }
 
 #[test]
-fn at_the_descriptor_limit_nothing_is_lost_in_silence() {
+fn at_the_file_descriptor_limit_every_loss_is_reported_as_an_error() {
     raise_file_limit().unwrap();
     let run = run();
     let services = Services::create(&run.domain, 40, 1, "launcher").unwrap();
@@ -304,8 +312,8 @@ fn at_the_descriptor_limit_nothing_is_lost_in_silence() {
     hear(&mut world, "joined");
     let drones: Vec<_> = (0..30).map(|_| services.downlink_subscriber().unwrap()).collect();
     world.stdin.as_mut().unwrap().write_all(b"\n").unwrap();
-    let said = hear(&mut world, "errors");
-    assert_eq!(said.matches("ulimit -n").count(), 2, "{said}");
+    let output = hear(&mut world, "errors");
+    assert_eq!(output.matches("ulimit -n").count(), 2, "{output}");
     world.wait().unwrap();
     drop(drones);
 }

@@ -1,6 +1,6 @@
-//! Leadership in simulated time, over a lossy and slow channel: healthy leaders stay, dead leaders are replaced, and
+//! Tests of leadership in simulated time, over a lossy and slow channel. Healthy leaders stay, dead leaders are replaced, and
 //! separated groups become one.
-#![allow(clippy::unwrap_used, clippy::disallowed_macros, reason = "helpers of tests, which print what they found")]
+#![allow(clippy::unwrap_used, clippy::disallowed_macros, reason = "test helpers, which print their results")]
 
 mod swarm;
 
@@ -9,9 +9,9 @@ use std::collections::BTreeSet;
 use swarm::air::{Air, Swarm};
 use swarm::{DEFAULT, Periods};
 
-/// Terms that began after the swarm had settled.
-fn false_elections(air: Air, settle_s: f64, seconds: f64) -> Vec<(Ballot, DroneId)> {
-    let mut swarm = Swarm::new(DEFAULT, air, 8);
+/// Terms that began after the swarm had settled, with their leaders. The swarm settles for `settle_s`, then flies for `seconds`.
+fn false_elections(channel: Air, settle_s: f64, seconds: f64) -> Vec<(Ballot, DroneId)> {
+    let mut swarm = Swarm::new(DEFAULT, channel, 8);
     swarm.run(settle_s);
     let settled: BTreeSet<Ballot> = swarm.watch.as_ref().unwrap().leaders.keys().copied().collect();
     swarm.run(seconds);
@@ -21,20 +21,20 @@ fn false_elections(air: Air, settle_s: f64, seconds: f64) -> Vec<(Ballot, DroneI
 
 #[test]
 fn no_false_election_in_an_hour_at_10_percent_loss_and_100_ms() {
-    let air = Air { seed: 1, loss: 0.1, delay_s: 0.1, jitter_s: 0.05 };
-    assert_eq!(false_elections(air, 5.0, 3600.0), []);
+    let channel = Air { seed: 1, loss: 0.1, delay_s: 0.1, jitter_s: 0.05 };
+    assert_eq!(false_elections(channel, 5.0, 3600.0), []);
 }
 
 #[test]
 fn no_false_election_in_ten_minutes_at_50_percent_loss_and_1_s() {
     for seed in 0..4 {
-        let air = Air { seed, loss: 0.5, delay_s: 1.0, jitter_s: 0.0 };
-        assert_eq!(false_elections(air, 20.0, 600.0), [], "seed {seed}");
+        let channel = Air { seed, loss: 0.5, delay_s: 1.0, jitter_s: 0.0 };
+        assert_eq!(false_elections(channel, 20.0, 600.0), [], "seed {seed}");
     }
 }
 
 #[test]
-fn each_side_of_a_partition_has_a_leader_and_healing_makes_them_one_within_a_second() {
+fn each_side_of_a_partition_has_a_leader_and_the_sides_merge_within_a_second_after_healing() {
     for seed in 0..20 {
         let mut swarm = Swarm::new(DEFAULT, Air { seed, ..Air::default() }, 8);
         swarm.run(3.0 + 0.1 * seed as f64);
@@ -44,21 +44,22 @@ fn each_side_of_a_partition_has_a_leader_and_healing_makes_them_one_within_a_sec
         }
         swarm.run(8.0);
         swarm.sides = vec![0; 8];
-        let leads = |s: &Swarm| {
+        let violation = |s: &Swarm| {
             let leaders: Vec<_> = s.side(0).iter().filter(|(_, l)| l.is_leader()).map(|(id, _)| *id).collect();
             let terms: BTreeSet<_> = (0..8).map(|i| s.term(i)).collect();
-            (leaders.len() != 1 || terms.len() != 1).then(|| format!("{leaders:?} lead, {terms:?} are obeyed"))
+            (leaders.len() != 1 || terms.len() != 1).then(|| format!("leaders {leaders:?}, obeyed terms {terms:?}"))
         };
-        swarm.until(1.0, leads).unwrap();
+        swarm.until(1.0, violation).unwrap();
         swarm.until(1.0, |s| s.disunion(0)).unwrap();
     }
 }
 
-/// Time from the leader's death until all others follow another leader, s, for 40 moments of death; ascending.
-fn failovers(periods: Periods, air: Air) -> Vec<f64> {
+/// Times from the leader's death until all others follow another leader, s, in ascending order. The leader dies at 40 different
+/// moments.
+fn failovers(periods: Periods, channel: Air) -> Vec<f64> {
     let mut times: Vec<f64> = (0..40)
         .map(|i| {
-            let mut swarm = Swarm::new(periods, Air { seed: i, ..air }, 8);
+            let mut swarm = Swarm::new(periods, Air { seed: i, ..channel }, 8);
             swarm.run(6.0 + periods.dt_s * i as f64);
             let old = swarm.term(7).unwrap();
             swarm.kill(old.claimant.index());
@@ -103,13 +104,13 @@ fn a_leader_that_falls_behind_transfers_its_leadership_once_and_without_a_gap() 
         for _ in 0..(120.0 / DEFAULT.dt_s) as u64 {
             swarm.step().unwrap();
             let leaders = swarm.side(0).iter().filter(|(_, l)| l.is_leader()).count();
-            assert!(leaders >= 1, "nobody leads in {:?}", swarm.now());
+            assert!(leaders >= 1, "no drone leads at {:?}", swarm.now());
             handed_over_s = handed_over_s.or((swarm.term(0) != Some(old)).then(|| swarm.now().secs()));
         }
         assert_eq!(swarm.disunion(0), None);
         let terms: Vec<_> = swarm.watch.unwrap().leaders.into_keys().filter(|&term| term > old).collect();
         assert_eq!(terms.iter().map(|term| term.claimant).collect::<Vec<_>>(), [DroneId(1)], "loss {loss}");
-        // Last after 280 m at 6 m/s, and 3 s of patience.
+        // The leader is last after it has lost 280 m at 6 m/s. It then waits for 3 s.
         assert!(handed_over_s.is_some_and(|t| (51.0..56.0).contains(&t)), "{handed_over_s:?}");
     }
 }
@@ -121,20 +122,21 @@ fn a_leader_with_a_broken_sensor_transfers_its_leadership_at_once_and_without_a_
         swarm.run(3.0);
         let old = swarm.term(0).unwrap();
         assert_eq!(old.claimant, DroneId(0));
-        let leads = |s: &Swarm| s.side(0).iter().filter(|(_, l)| l.is_leader()).count();
+        let leader_count = |s: &Swarm| s.side(0).iter().filter(|(_, l)| l.is_leader()).count();
         let led_by = |s: &Swarm, heir: u32| {
-            assert!(leads(s) >= 1, "nobody leads in {:?}", s.now());
+            assert!(leader_count(s) >= 1, "no drone leads at {:?}", s.now());
             let terms: BTreeSet<_> = (0..8).map(|i| s.term(i).unwrap()).collect();
             (terms.len() != 1 || terms.iter().any(|t| t.claimant != DroneId(heir))).then(|| format!("{terms:?}"))
         };
         swarm.drones[0].as_mut().unwrap().set_impaired(true);
         swarm.until(limit_s, |s| led_by(s, 1)).unwrap();
-        // Until its next beacon nobody knows that the second is broken as well: of those who are sound the first leads.
+        // Within 1 s the other drones learn from its beacon that drone 2 is impaired as well. Then drone 3 is the first sound
+        // drone.
         swarm.drones[2].as_mut().unwrap().set_impaired(true);
         swarm.run(1.0);
         swarm.drones[1].as_mut().unwrap().set_impaired(true);
         swarm.until(limit_s, |s| led_by(s, 3)).unwrap();
-        // Nobody takes it back, nor is anybody asked who is no better.
+        // No drone takes the leadership back, and an impaired leader does not transfer it to another impaired drone.
         let terms = swarm.watch.as_ref().unwrap().leaders.len();
         (4..8).for_each(|i| swarm.drones[i].as_mut().unwrap().set_impaired(true));
         swarm.run(1.0);
@@ -146,43 +148,44 @@ fn a_leader_with_a_broken_sensor_transfers_its_leadership_at_once_and_without_a_
 }
 
 #[test]
-fn a_dead_leader_is_followed_by_a_healthy_drone() {
+fn a_dead_leader_is_replaced_by_a_healthy_drone() {
     let mut swarm = Swarm::new(DEFAULT, Air { seed: 4, ..Air::default() }, 8);
     swarm.run(3.0);
     (1..3).for_each(|i| swarm.drones[i].as_mut().unwrap().set_impaired(true));
     swarm.run(1.0);
     swarm.kill(0);
     let heir = |s: &Swarm| Some(s.term(7)?.claimant).filter(|&id| id != DroneId(3)).map(|id| id.to_string());
-    // It waits for nobody, although two are closer.
+    // Drone 3 does not wait for drones 1 and 2, although both precede it.
     swarm.until(1.1, heir).unwrap();
     swarm.run(3.0);
     assert_eq!((heir(&swarm), swarm.disunion(0)), (None, None));
     let leaders: Vec<_> = swarm.watch.unwrap().leaders.into_values().collect();
-    assert_eq!(leaders, [DroneId(0), DroneId(3)], "nobody else claimed");
+    assert_eq!(leaders, [DroneId(0), DroneId(3)], "another drone claimed the leadership");
 }
 
-/// What is wrong where drones do not all hear each other. Each must lead, or follow a leader that it hears itself.
+/// Checks drones that do not all hear each other. Each must lead, or follow a leader that it hears directly. Returns the first
+/// violation.
 fn unled(swarm: &Swarm) -> Option<String> {
     for (id, leading) in swarm.side(0) {
         let term = leading.term();
         let leader = swarm.drones[term.claimant.index()].as_ref();
         let leads = leader.is_some_and(|l| l.is_leader() && l.term() == term);
         if !leads || id.index().abs_diff(term.claimant.index()) > swarm.reach {
-            return Some(format!("{id} obeys {term:?}"));
+            return Some(format!("{id} obeys {term:?}, but no leader that it hears has this term"));
         }
     }
     None
 }
 
 #[test]
-fn along_a_chain_each_drone_follows_a_leader_it_hears_and_no_leader_is_replaced() {
+fn in_a_chain_each_drone_follows_a_leader_that_it_hears_and_no_leader_is_replaced() {
     for (drones, reach, loss, seed) in
         [(3, 1, 0.0, 1), (4, 1, 0.0, 2), (5, 1, 0.3, 3), (8, 1, 0.0, 4), (8, 2, 0.3, 5), (8, 3, 0.0, 6)]
     {
-        let name = format!("{drones} drones that hear {reach}, loss {loss}");
+        let name = format!("{drones} drones, reach {reach}, loss {loss}");
         let mut swarm = Swarm::new(DEFAULT, Air { seed, loss, ..Air::default() }, drones);
         swarm.reach = reach;
-        // The first is in the middle: so that ballots and places do not agree.
+        // The drone with the first index is placed in the middle, so that the order of ballots differs from the order of places.
         swarm.own.rotate_right(drones / 2);
         assert!(unled(&swarm).is_some());
         swarm.run(30.0);
@@ -192,7 +195,7 @@ fn along_a_chain_each_drone_follows_a_leader_it_hears_and_no_leader_is_replaced(
         assert_eq!((unled(&swarm), swarm.watch.as_ref().unwrap().leaders.len()), (None, settled), "{name}");
         let leaders: Vec<_> = swarm.side(0).iter().filter(|(_, l)| l.is_leader()).map(|(id, _)| id.index()).collect();
         assert!(leaders.windows(2).all(|pair| pair[0].abs_diff(pair[1]) > reach), "{name}: {leaders:?}");
-        println!("{name}: {leaders:?} lead");
+        println!("{name}: leaders {leaders:?}");
         swarm.reach = usize::MAX;
         swarm.until(3.0, |s| s.disunion(0)).unwrap();
     }

@@ -1,8 +1,8 @@
-//! The digest of a run: equal runs have equal digests, in both runtimes.
+//! The digest of a run. Two equal runs have the same digest, whichever of the two runtimes executed them.
 
 use xxhash_rust::xxh3::Xxh3;
 
-/// A running 64-bit hash (XXH3). Floats are folded by their bits.
+/// An incremental 64-bit hash (XXH3) over the data added so far.
 #[derive(Clone)]
 pub struct Digest(Xxh3);
 
@@ -13,36 +13,37 @@ impl Default for Digest {
 }
 
 impl Digest {
-    /// A hash of a sequence of words, from 0 on: cheap for a few.
+    /// Extends the hash of a sequence of words by one word. The hash of the empty sequence is 0. This is cheaper than a
+    /// [`Digest`] for short sequences.
     #[must_use]
     #[inline]
     pub fn chain(hash: u64, word: u64) -> u64 {
         xxhash_rust::xxh3::xxh3_64_with_seed(&word.to_le_bytes(), hash)
     }
 
-    /// Folds bytes in.
+    /// Adds bytes.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.0.update(bytes);
         self
     }
 
-    /// Folds an integer in.
+    /// Adds an integer, as eight little-endian bytes.
     pub fn word(&mut self, word: u64) -> &mut Self {
         self.bytes(&word.to_le_bytes())
     }
 
-    /// Folds a float in, by its bits.
+    /// Adds a float by its bit pattern, so that 0.0 and −0.0 differ.
     pub fn float(&mut self, value: f64) -> &mut Self {
         self.word(value.to_bits())
     }
 
-    /// The hash so far.
+    /// The hash of everything added so far.
     #[must_use]
     pub fn value(&self) -> u64 {
         self.0.digest()
     }
 
-    /// Back to the start.
+    /// Returns to the initial state, in which no data has been added.
     pub fn reset(&mut self) {
         self.0.reset();
     }

@@ -1,7 +1,13 @@
-//! What the world tells the drones in a tick: senses and the air, in one sample.
+//! The data that the world sends to all drones in a tick: what their sensors report, and the frames on the radio channel.
 //!
-//! Laid out as a [`DownlinkHeader`], then a [`SensesHeader`] for each drone, then the flat slices those point into, then the
-//! shapes of the obstacles somebody senses, then every frame sent in the tick before, and where each was sent.
+//! All of it is in one sample, in this order:
+//!
+//! 1. a [`DownlinkHeader`];
+//! 2. one [`SensesHeader`] per drone;
+//! 3. the [`SensedObstacle`]s, then the [`SensedNeighbour`]s, of all drones; each [`SensesHeader`] gives a range of each;
+//! 4. one [`SensedShape`] per obstacle that at least one drone senses;
+//! 5. one [`AirFrame`] per frame that was sent in the previous tick;
+//! 6. the index of the frames by the place of sending: its [`FrameCell`]s, then the order of the frames.
 
 use crate::Vec2;
 use crate::drop_reason::DropReason;
@@ -15,15 +21,15 @@ use crate::wire::BrokenSensors;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
 
-/// The sample's head.
+/// The header of the sample.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DownlinkHeader {
-    /// The tick that these senses open.
+    /// The tick that begins with this sample.
     pub tick: Tick,
-    /// Its time.
+    /// Simulated time at which the tick begins.
     pub now: SimTime,
-    /// Number of [`SensesHeader`]s: one for each drone, dead or alive.
+    /// Number of [`SensesHeader`]s: one per drone, dead or alive.
     pub drones: u32,
     /// Number of [`SensedObstacle`]s.
     pub obstacles: u32,
@@ -33,77 +39,78 @@ pub struct DownlinkHeader {
     pub shapes: u32,
     /// Number of [`AirFrame`]s.
     pub frames: u32,
-    /// Number of [`FrameCell`]s; 0 if the frames are not sorted.
+    /// Number of [`FrameCell`]s; 0 if the frames are not indexed by place.
     pub cells: u32,
-    /// By what they are sorted.
+    /// The topics whose frames are indexed by place, and the size of the cells.
     pub locality: Locality,
-    /// Number of places in the order of frames.
+    /// Number of entries in the order of the frames ([`FrameIndex::order`]).
     pub ordered: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
-/// One drone's senses: its own state, and where its entries stand in the flat slices.
+/// One drone's sensor data: its own state, and the ranges of its entries among the obstacles and neighbours of all drones.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensesHeader {
-    /// Own position, world frame, m.
+    /// The drone's position as its sensors report it, world frame, m.
     pub position_m: [f64; 2],
-    /// Own velocity, m/s.
+    /// The drone's velocity as its sensors report it, world frame, m/s.
     pub velocity_mps: [f64; 2],
-    /// First of its obstacles.
+    /// Index of the drone's first [`SensedObstacle`].
     pub obstacle_first: u32,
-    /// Number of its obstacles.
+    /// Number of the drone's [`SensedObstacle`]s.
     pub obstacle_count: u32,
-    /// First of its neighbours.
+    /// Index of the drone's first [`SensedNeighbour`].
     pub neighbour_first: u32,
-    /// Number of its neighbours.
+    /// Number of the drone's [`SensedNeighbour`]s.
     pub neighbour_count: u32,
-    /// 1 if it flies, 0 if it is dead.
+    /// 1 if the drone is alive, 0 if it is dead.
     pub alive: u32,
-    /// Incarnation of its process.
+    /// Incarnation of the drone's process.
     pub incarnation: u32,
-    /// Its radio.
+    /// Faults of the drone's radio.
     pub link_faults: LinkFaults,
-    /// Added to its reaction time, s.
+    /// Time that faults add to the drone's reaction time, s.
     pub extra_reaction_s: f64,
-    /// Which of its sensors report nothing: [`BrokenSensors`].
+    /// The sensors that report nothing, as flags: [`BrokenSensors::to_wire`].
     pub broken: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
 impl SensesHeader {
-    /// Why its radio cannot hear a frame at all, if it cannot.
+    /// Why faults of the two radios prevent this drone from hearing a frame; `None` if they do not. Loss and range are not
+    /// considered here.
     #[must_use]
     pub fn drop_reason(&self, frame: &AirFrame) -> Option<DropReason> {
         self.link_faults.drop_reason(frame.link_faults)
     }
 }
 
-/// An obstacle with a point in a drone's detection range.
+/// An obstacle that is at least partly in a drone's detection range.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensedObstacle {
-    /// Nearest point of its surface, world frame, m.
+    /// Point of the obstacle's surface that is nearest to the drone, world frame, m.
     pub nearest_m: [f64; 2],
-    /// Distance to it, m; negative inside.
+    /// Distance from the drone to that point, m; negative if the drone is inside the obstacle.
     pub distance_m: f64,
-    /// Its place among the [`SensedShape`]s.
+    /// Index of the obstacle's outline among the [`SensedShape`]s.
     pub shape: u32,
     /// Always 0.
     pub reserved: u32,
 }
 
-/// A neighbour in ranging distance.
+/// Another drone within ranging distance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensedNeighbour {
-    /// Its position less one's own, m.
+    /// Its position relative to the sensing drone, axes of the world frame, m.
     pub position_m: [f64; 2],
-    /// Its velocity less one's own, m/s.
+    /// Its velocity relative to the sensing drone, axes of the world frame, m/s.
     pub velocity_mps: [f64; 2],
-    /// Who it is.
+    /// The neighbour's id.
     pub drone: DroneId,
     /// Always 0.
     pub reserved: u32,
@@ -113,43 +120,43 @@ pub struct SensedNeighbour {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SensedShape {
-    /// The outline, world frame.
+    /// The outline, world frame, m.
     pub shape: ConvexShape,
-    /// The world's number for the obstacle.
+    /// The obstacle's id.
     pub id: ObstacleId,
     /// Always 0.
     pub reserved: u32,
 }
 
-/// A downlink as the world builds it, tick after tick in the same memory.
+/// A downlink as the world builds it. The world reuses its memory from tick to tick.
 #[derive(Clone, Debug, Default)]
 pub struct Downlink {
-    /// Tick, time; the counts are set by [`Downlink::seal`].
+    /// The header. [`Downlink::seal`] sets it.
     pub head: DownlinkHeader,
-    /// One for each drone.
+    /// One entry per drone, in the order of the ids.
     pub drones: Vec<SensesHeader>,
-    /// Flat, in drone order.
+    /// The obstacles that each drone senses, in the order of the drones.
     pub obstacles: Vec<SensedObstacle>,
-    /// Flat, in drone order.
+    /// The neighbours that each drone senses, in the order of the drones.
     pub neighbours: Vec<SensedNeighbour>,
-    /// Those that somebody senses.
+    /// Outlines of the obstacles that at least one drone senses.
     pub shapes: Vec<SensedShape>,
-    /// Every frame sent in the tick before, by source and sequence.
+    /// All frames that were sent in the previous tick, ordered by source and sequence number.
     pub frames: Vec<AirFrame>,
-    /// Where they were sent.
+    /// Index of the frames by the place of sending.
     pub index: FrameIndex,
 }
 
-/// Why a sample is not a downlink.
+/// A sample is not a downlink: it is too short for the counts in its header, or not aligned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the downlink of {bytes} bytes does not hold what its head announces")]
 pub struct DownlinkError {
-    /// Size of the sample.
+    /// Size of the sample, bytes.
     pub bytes: usize,
 }
 
 impl Downlink {
-    /// Sets the head's counts.
+    /// Sets the header: the tick, its time `now`, and the counts of all parts.
     pub fn seal(&mut self, tick: Tick, now: SimTime) {
         self.head = DownlinkHeader {
             tick,
@@ -166,7 +173,7 @@ impl Downlink {
         };
     }
 
-    /// Borrowed, for readers in the same process.
+    /// A view of this downlink, for readers in the same process.
     #[must_use]
     pub fn view(&self) -> DownlinkView<'_> {
         DownlinkView {
@@ -180,13 +187,16 @@ impl Downlink {
         }
     }
 
-    /// Bytes that [`Downlink::write_to`] needs.
+    /// Size of the sample that [`Downlink::write_to`] writes, bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
         self.parts().iter().map(|part| part.len()).sum()
     }
 
-    /// Writes the sample; `out` must be at least [`Downlink::byte_len`] long.
+    /// Writes the sample to the beginning of `out`.
+    ///
+    /// # Panics
+    /// If `out` is shorter than [`Downlink::byte_len`].
     pub fn write_to(&self, out: &mut [u8]) {
         let mut at = 0;
         for part in self.parts() {
@@ -209,30 +219,30 @@ impl Downlink {
     }
 }
 
-/// A downlink as a drone reads it, in place.
+/// A downlink as a drone reads it: all parts are borrowed from the sample.
 #[derive(Clone, Copy, Debug)]
 pub struct DownlinkView<'a> {
-    /// Tick, time and counts.
+    /// The header.
     pub head: &'a DownlinkHeader,
-    /// One for each drone.
+    /// One entry per drone, in the order of the ids.
     pub drones: &'a [SensesHeader],
-    /// Flat.
+    /// The obstacles that each drone senses, in the order of the drones.
     pub obstacles: &'a [SensedObstacle],
-    /// Flat.
+    /// The neighbours that each drone senses, in the order of the drones.
     pub neighbours: &'a [SensedNeighbour],
-    /// Those that somebody senses.
+    /// Outlines of the obstacles that at least one drone senses.
     pub shapes: &'a [SensedShape],
-    /// Every frame sent in the tick before, by source and sequence.
+    /// All frames that were sent in the previous tick, ordered by source and sequence number.
     pub frames: &'a [AirFrame],
-    /// Where they were sent.
+    /// Index of the frames by the place of sending.
     pub nearby: NearbyFrames<'a>,
 }
 
 impl<'a> DownlinkView<'a> {
-    /// Reads a sample in place. `bytes` must be 8-aligned.
+    /// Reads a sample without copying it. `bytes` must be 8-byte aligned. Bytes after the sample are ignored.
     ///
     /// # Errors
-    /// [`DownlinkError`] if the sample is too short for its head, or not aligned.
+    /// [`DownlinkError`] if the sample is shorter than the counts in its header require, or not aligned.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DownlinkError> {
         let error = DownlinkError { bytes: bytes.len() };
         let (head, mut rest) = bytes.split_at_checked(size_of::<DownlinkHeader>()).ok_or(error)?;
@@ -252,7 +262,7 @@ impl<'a> DownlinkView<'a> {
         })
     }
 
-    /// What one drone senses; `None` for a drone that is not in the swarm.
+    /// What one drone senses; `None` if the sample has no such drone. A range that exceeds the sample counts as empty.
     #[must_use]
     pub fn senses(&self, drone: DroneId) -> Option<Senses<'a>> {
         let head = self.drones.get(drone.index())?;
@@ -270,30 +280,31 @@ impl<'a> DownlinkView<'a> {
     }
 }
 
-/// What one drone senses in one tick.
+/// What one drone senses in one tick, and when.
 #[derive(Clone, Copy, Debug)]
 pub struct Senses<'a> {
-    /// Time of the tick.
+    /// Simulated time at which the tick begins.
     pub now: SimTime,
-    /// The tick.
+    /// Number of the tick.
     pub tick: Tick,
-    /// Own position, m.
+    /// The drone's position as its sensors report it, world frame, m.
     pub position: Vec2,
-    /// Own velocity, m/s.
+    /// The drone's velocity as its sensors report it, world frame, m/s.
     pub velocity: Vec2,
-    /// Added to its reaction time, s.
+    /// Time that faults add to the drone's reaction time, s.
     pub extra_reaction_s: f64,
-    /// Which of its sensors report nothing.
+    /// The sensors that report nothing.
     pub broken: BrokenSensors,
-    /// Obstacles with a point in detection range.
+    /// Obstacles that are at least partly in detection range.
     pub obstacles: &'a [SensedObstacle],
-    /// Neighbours in ranging distance.
+    /// Drones within ranging distance.
     pub neighbours: &'a [SensedNeighbour],
     shapes: &'a [SensedShape],
 }
 
 impl<'a> Senses<'a> {
-    /// Senses made by hand: for tests, and for simulating ahead.
+    /// Makes the senses of a drone without faults at the given tick, time, position (m) and velocity (m/s), world frame. Tests
+    /// and look-ahead simulations use this.
     #[must_use]
     pub fn new(
         (tick, now): (Tick, SimTime),
@@ -315,7 +326,8 @@ impl<'a> Senses<'a> {
         }
     }
 
-    /// The same senses as they will be at another time and place: for looking ahead.
+    /// These senses with another time, position (m), velocity (m/s), obstacles and neighbours. Predictions of the near future
+    /// use this; the outlines and the sensor faults stay the same.
     #[must_use]
     pub fn at<'b>(
         &self,
@@ -330,7 +342,7 @@ impl<'a> Senses<'a> {
         Senses { now, position, velocity, obstacles, neighbours, ..*self }
     }
 
-    /// The outline of a sensed obstacle; `None` if the entry points nowhere.
+    /// The outline of a sensed obstacle; `None` if its index is out of range.
     #[must_use]
     pub fn shape(&self, obstacle: &SensedObstacle) -> Option<&'a SensedShape> {
         self.shapes.get(obstacle.shape as usize)
@@ -352,7 +364,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sample_is_read_in_place() {
+    fn a_written_sample_is_read_back() {
         let mut down = Downlink::default();
         down.drones.push(SensesHeader { neighbour_count: 1, position_m: [1.0, 2.0], ..SensesHeader::default() });
         down.neighbours.push(SensedNeighbour { drone: DroneId(5), ..SensedNeighbour::default() });
@@ -368,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_sample_is_refused() {
+    fn a_sample_that_is_too_short_is_refused() {
         let mut down = Downlink::default();
         down.drones.push(SensesHeader::default());
         down.seal(0, SimTime::ZERO);

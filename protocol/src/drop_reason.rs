@@ -1,28 +1,28 @@
-//! Why a radio did not hear a frame.
+//! The reasons why a radio does not receive a frame.
 
 use serde::{Deserialize, Serialize};
 
 /// Number of [`DropReason`]s.
 pub const DROP_REASONS: usize = 7;
 
-/// Why a frame was not heard.
+/// Why a frame was not received.
 #[repr(usize)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DropReason {
-    /// Lost independently of other frames.
+    /// The channel lost the frame, independently of other frames.
     Loss = 0,
-    /// Lost in a burst.
+    /// The frame was lost in a burst of losses.
     Burst = 1,
-    /// Out of range.
+    /// The receiver was out of range.
     Range = 2,
-    /// Source and receiver are on different sides of a partition.
+    /// Sender and receiver are on different sides of a partition.
     Partition = 3,
-    /// The receiver is deaf, or the sender mute.
+    /// A fault has made the receiver deaf or the sender mute.
     Deaf = 4,
-    /// It could not be decoded.
+    /// The frame could not be decoded.
     Malformed = 5,
-    /// It would have waited too long for the channel.
+    /// The frame was never transmitted, because it would have waited too long for the shared channel.
     Queue = 6,
 }
 

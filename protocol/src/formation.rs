@@ -1,35 +1,41 @@
-//! Target shapes: the slots of a formation of any number of drones, relative to its front slot (the anchor).
+//! Target shapes. Each shape gives the slots of a formation for any number of drones.
+//!
+//! Slots are in metres, relative to the front slot (the anchor): x along the flight direction, y to its left.
 
 use crate::Vec2;
 use serde::{Deserialize, Serialize};
 
-/// A formation counts as held while its drones move no faster than this relative to it, m/s.
+/// Maximum speed of a drone relative to its formation while the formation counts as held, m/s.
 pub const HOLD_SPEED_MPS: f64 = 1.0;
 
-/// A formation that can be made for any number of drones, spaced by `spacing_m`.
+/// The shape of a formation. It has slots for any number of drones, except for [`Shape::Offsets`]. `spacing_m` below is the
+/// argument of [`Shape::slots`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// The paper's: chevrons of five (tip, two on each arm), each nested 2·spacing/√2 behind the one before.
+    /// The paper's formation: chevrons of five drones, one at the tip and two on each arm. Each chevron is
+    /// `2 · spacing_m / √2` behind the one before.
     NestedV,
-    /// One chevron, 90° at its tip.
+    /// One chevron with an angle of 90° at its tip.
     V,
-    /// Abreast, across the flight direction.
+    /// All drones side by side, perpendicular to the flight direction.
     Line,
-    /// One behind the other.
+    /// All drones one behind the other.
     Column,
-    /// Rows as wide as the formation is deep.
+    /// A square grid: about as many rows as there are drones in a row.
     Grid,
-    /// On a circle, `spacing_m` between neighbours; a lone drone at its front.
+    /// A circle with `spacing_m` between neighbours. A single drone is at the anchor.
     Circle,
-    /// A filled triangle, tip ahead: rows of 1, 2, 3, …, `spacing_m` between all neighbours, filled from the middle.
+    /// A filled triangle with its tip in front: rows of 1, 2, 3, … drones with `spacing_m` between all neighbours. Each row is
+    /// filled from its middle outwards.
     Wedge,
-    /// Offsets from the anchor, m.
+    /// An explicit list of slots: offsets from the anchor, m. The spacing has no effect.
     Offsets(Vec<[f64; 2]>),
 }
 
 impl Shape {
-    /// The slots of `count` drones, front slot first. With [`Shape::Offsets`], the first `count` of them.
+    /// The slots of `count` drones with the spacing `spacing_m` (m), front slot first: offsets from the anchor, m.
+    /// [`Shape::Offsets`] gives its first `count` entries, or fewer if it has fewer.
     #[must_use]
     pub fn slots(&self, count: usize, spacing_m: f64) -> Vec<Vec2> {
         let step = spacing_m * std::f64::consts::FRAC_1_SQRT_2;
@@ -51,13 +57,13 @@ impl Shape {
     }
 }
 
-/// Tip, then left and right in turn along the arms.
+/// Slot number `i` of a chevron: the tip first, then left and right in turn along the arms.
 fn chevron_slot(i: usize, step: f64) -> Vec2 {
     let along = i.div_ceil(2) as f64;
     Vec2::new(0.0 - along, side(i)) * step
 }
 
-/// 0, 1, −1, 2, −2, …
+/// Lateral place number `i`, in steps, left positive: 0, 1, −1, 2, −2, …
 fn side(i: usize) -> f64 {
     let distance = i.div_ceil(2) as f64;
     if i % 2 == 1 { distance } else { 0.0 - distance }
@@ -75,7 +81,7 @@ fn circle(count: usize, spacing_m: f64) -> Vec<Vec2> {
 fn wedge(count: usize, spacing_m: f64) -> Vec<Vec2> {
     let depth = 3.0f64.sqrt() / 2.0;
     let row = |row: usize| {
-        // An even number of slots has none in the middle.
+        // A row with an even number of slots has no slot on the axis, so it is shifted by half a step.
         let half = if row % 2 == 1 { 0.5 } else { 0.0 };
         (0..=row).map(move |i| Vec2::new(0.0 - depth * row as f64, side(i) - half) * spacing_m)
     };
@@ -87,33 +93,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nested_v_of_eight_is_the_papers() {
+    fn nested_v_of_eight_matches_the_paper() {
         let c = 35.0 / 2.0f64.sqrt();
-        let wanted =
+        let expected =
             [(0.0, 0.0), (-1.0, 1.0), (-1.0, -1.0), (-2.0, 2.0), (-2.0, -2.0), (-2.0, 0.0), (-3.0, 1.0), (-3.0, -1.0)];
-        for (slot, (x, y)) in Shape::NestedV.slots(8, 35.0).iter().zip(wanted) {
-            assert!((slot - Vec2::new(x * c, y * c)).norm() < 1e-9, "{slot} is not ({x}, {y})·c");
+        for (slot, (x, y)) in Shape::NestedV.slots(8, 35.0).iter().zip(expected) {
+            assert!((slot - Vec2::new(x * c, y * c)).norm() < 1e-9, "{slot} should be ({x}, {y})·c");
         }
     }
 
     #[test]
-    fn a_wedge_is_full_rows_of_one_two_and_three() {
+    fn a_wedge_of_six_has_rows_of_one_two_and_three() {
         let depth = 75.0f64.sqrt();
-        let wanted = [(0.0, 0.0), (-1.0, -5.0), (-1.0, 5.0), (-2.0, 0.0), (-2.0, 10.0), (-2.0, -10.0)];
-        for (slot, (row, y)) in Shape::Wedge.slots(6, 10.0).iter().zip(wanted) {
-            assert!((slot - Vec2::new(row * depth, y)).norm() < 1e-9, "{slot} is not in row {row} at {y} m");
+        let expected = [(0.0, 0.0), (-1.0, -5.0), (-1.0, 5.0), (-2.0, 0.0), (-2.0, 10.0), (-2.0, -10.0)];
+        for (slot, (row, y)) in Shape::Wedge.slots(6, 10.0).iter().zip(expected) {
+            assert!((slot - Vec2::new(row * depth, y)).norm() < 1e-9, "{slot} should be in row {row} at y = {y} m");
         }
     }
 
     #[test]
-    fn slots_are_spaced_and_the_front_one_is_first() {
+    fn slots_keep_the_spacing_and_the_front_slot_is_first() {
         for shape in [Shape::NestedV, Shape::V, Shape::Line, Shape::Column, Shape::Grid, Shape::Circle, Shape::Wedge] {
             for count in [1, 2, 5, 8, 13, 40] {
                 let slots = shape.slots(count, 10.0);
                 assert_eq!(slots.len(), count);
-                assert!(slots.iter().all(|s| s.x <= slots[0].x + 1e-9), "{shape:?} of {count}");
+                assert!(
+                    slots.iter().all(|s| s.x <= slots[0].x + 1e-9),
+                    "{shape:?} of {count}: the first slot is not in front"
+                );
                 for (i, a) in slots.iter().enumerate() {
-                    assert!(slots[..i].iter().all(|b| (a - b).norm() > 9.99), "{shape:?} of {count}");
+                    assert!(
+                        slots[..i].iter().all(|b| (a - b).norm() > 9.99),
+                        "{shape:?} of {count}: slot {i} is too close to another"
+                    );
                 }
             }
         }

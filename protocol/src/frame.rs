@@ -1,4 +1,5 @@
-//! The frame on the wire: a plain struct, never an enum read straight from memory that another process wrote.
+//! The layout of a frame. It contains no enum, because its bytes come from memory that another process wrote, and an arbitrary
+//! number need not be a valid enum value.
 
 use crate::Vec2;
 use crate::ids::DroneId;
@@ -6,48 +7,50 @@ use crate::link_faults::LinkFaults;
 use crate::time::Tick;
 use bytemuck::{Pod, Zeroable};
 
-/// Bytes of payload in a frame; the largest is an obstacle of 16 vertices.
+/// Size of the payload field of a frame, bytes. It is determined by the largest payload, an obstacle with 16 vertices.
 pub const FRAME_PAYLOAD: usize = 304;
 
-/// [`AirFrame::queue_ns`] of a frame that was never transmitted: it would have waited longer than the limit.
+/// Value of [`AirFrame::queue_ns`] for a frame that was never transmitted, because it would have waited longer than the
+/// channel's limit.
 pub const NEVER_TRANSMITTED: u64 = u64::MAX;
 
-/// What a drone hands to its radio. Decode with [`crate::Message::decode`].
+/// An encoded message, as a drone passes it to its radio. [`crate::Message::decode`] checks and decodes it.
 #[repr(C, align(8))]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Frame {
-    /// A [`crate::message::Topic`], if it is one.
+    /// Number of the message's [`crate::message::Topic`]. A frame from another process can contain any number.
     pub kind: u16,
-    /// [`crate::payload::VERSION`].
+    /// Version of the payload layout: [`crate::payload::VERSION`].
     pub version: u16,
-    /// Bytes of payload in use.
+    /// Number of payload bytes in use.
     pub len: u32,
-    /// The payload; zero past `len`.
+    /// The payload. The bytes from `len` on are 0.
     pub payload: [u8; FRAME_PAYLOAD],
 }
 
-/// A frame on the air, as the world stamps it. The stamp is for the receivers' radios alone: no pilot sees it.
+/// A frame that was sent, with the metadata that the world adds. Only the receivers' radios use the metadata; pilots never see
+/// it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct AirFrame {
-    /// Tick in which it was sent.
+    /// Tick in which the frame was sent.
     pub tick: Tick,
-    /// Who sent it.
+    /// The drone that sent the frame.
     pub source: DroneId,
-    /// Running number of the source's frames in this mission, from 0.
+    /// Sequence number of the frame among all frames that its source has sent in this mission, from 0.
     pub sequence: u32,
-    /// True position of the sender when it sent, m.
+    /// True position of the sender at the time of sending, world frame, m.
     pub position_m: [f64; 2],
-    /// How long it waited for the channel and took it, ns; [`NEVER_TRANSMITTED`] if it was not sent at all.
+    /// Time the frame waited for the shared channel plus its airtime, ns; [`NEVER_TRANSMITTED`] if it was not transmitted.
     pub queue_ns: u64,
-    /// The sender's radio when it sent.
+    /// Faults of the sender's radio at the time of sending.
     pub link_faults: LinkFaults,
-    /// What was sent.
+    /// The frame itself.
     pub frame: Frame,
 }
 
 impl AirFrame {
-    /// True position of the sender, m.
+    /// True position of the sender at the time of sending, world frame, m.
     #[must_use]
     pub fn position(&self) -> Vec2 {
         Vec2::new(self.position_m[0], self.position_m[1])

@@ -1,9 +1,11 @@
-//! Histograms of what comes in equal steps.
+//! Statistics of histograms with bins of equal width.
 
 use crate::record::Percentiles;
 
-/// Mean, quantiles (nearest ranks) and maximum of a histogram whose bins are `width_s` wide, s. The last bin holds all that is
-/// longer too: it counts as the maximum, `max` bins.
+/// Mean, quantiles and maximum of a histogram of times, s; all `None` if the histogram is empty.
+///
+/// Bin number `i` counts the values of `i` bin widths; a bin is `width_s` wide (s). The last bin also counts all greater values,
+/// so each value in it is taken as the maximum. `max` is the maximum, in bin widths. Quantiles are by the nearest-rank method.
 #[must_use]
 pub fn percentiles(bins: &[u32], max: u64, width_s: f64) -> Percentiles {
     let count: u64 = bins.iter().map(|&n| u64::from(n)).sum();
@@ -12,8 +14,8 @@ pub fn percentiles(bins: &[u32], max: u64, width_s: f64) -> Percentiles {
     }
     let steps = |bin: usize| if bin + 1 == bins.len() { max as f64 } else { bin as f64 };
     let mean = bins.iter().enumerate().map(|(bin, &n)| steps(bin) * f64::from(n)).sum::<f64>() / count as f64;
-    let quantile = |share: f64| {
-        let rank = (share * count as f64).ceil() as u64;
+    let quantile = |fraction: f64| {
+        let rank = (fraction * count as f64).ceil() as u64;
         let mut seen = 0;
         let reached = bins.iter().position(|&n| {
             seen += u64::from(n);

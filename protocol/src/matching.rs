@@ -1,8 +1,10 @@
-//! The exact solution of the assignment problem: the Hungarian method with potentials, O(rows² · columns). Pure, and the
-//! only solver of its kind in the project.
+//! An exact solver of the assignment problem: the Hungarian method with potentials, O(rows² · columns). All parts of the
+//! project that need such a solver use this one.
 
-/// The column of each row, no column twice, so that the sum of the costs is least. Surplus columns stay empty. A tie falls
-/// to the lower column.
+/// Assigns a column to each row so that no column is used twice and the sum of the costs is smallest. `cost` takes a row and a
+/// column. The result has one entry per row: the column assigned to that row.
+///
+/// Surplus columns stay free. Of equally cheap columns in a search step, the lower one is preferred.
 ///
 /// # Panics
 /// If there are more rows than columns.
@@ -34,11 +36,11 @@ struct Matching {
     column_potential: Vec<f64>,
 }
 
-/// The search for the cheapest augmenting path of one row.
+/// The search for the cheapest augmenting path from one new row to a free column.
 struct Search {
-    /// Reduced cost of the cheapest path to each column found so far.
+    /// For each column: reduced cost of the cheapest path to it found so far.
     reach: Vec<f64>,
-    /// Column before it on that path; `None`: the new row itself.
+    /// For each column: the column before it on that path; `None` if the path goes there directly from the new row.
     before: Vec<Option<usize>>,
     done: Vec<bool>,
 }
@@ -105,7 +107,8 @@ impl Search {
         }
     }
 
-    /// The open column with the shortest path: the first one of equals, and some column whatever the costs.
+    /// The column with the shortest path among those that are not done; the lowest such column if several are equal. There is
+    /// always one, even if costs are infinite or NaN.
     fn nearest(&self) -> usize {
         let open = (0..self.reach.len()).filter(|&column| !self.done[column]);
         open.min_by(|&a, &b| self.reach[a].total_cmp(&self.reach[b])).expect("no more rows than columns")
@@ -126,8 +129,9 @@ mod tests {
         positions.iter().zip(slot_of).map(|(p, &s)| (p - slots[s]).norm_squared()).sum()
     }
 
-    /// Least total over all ways to give the rest of the drones the rest of the slots.
-    fn brute(positions: &[Vec2], slots: &[Vec2], taken: &mut Vec<usize>) -> f64 {
+    /// The smallest total cost over all ways to assign the free slots to the drones that have none. `taken` holds the slots of
+    /// the first drones.
+    fn brute_force_cost(positions: &[Vec2], slots: &[Vec2], taken: &mut Vec<usize>) -> f64 {
         if taken.len() == positions.len() {
             return cost(positions, slots, taken);
         }
@@ -135,7 +139,7 @@ mod tests {
         for slot in 0..slots.len() {
             if !taken.contains(&slot) {
                 taken.push(slot);
-                best = best.min(brute(positions, slots, taken));
+                best = best.min(brute_force_cost(positions, slots, taken));
                 taken.pop();
             }
         }
@@ -143,20 +147,20 @@ mod tests {
     }
 
     fn points(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Vec2>> {
-        // Whole numbers, so that ties happen.
+        // Coordinates are whole numbers so that ties occur.
         prop::collection::vec((-5i32..6, -5i32..6).prop_map(|(x, y)| Vec2::new(x.into(), y.into())), count)
     }
 
     proptest! {
         #[test]
-        fn no_assignment_is_cheaper(positions in points(0..6), more in points(0..2), slots in points(6..7)) {
-            let slots = [slots, more].concat();
+        fn no_assignment_is_cheaper(positions in points(0..6), extra in points(0..2), slots in points(6..7)) {
+            let slots = [slots, extra].concat();
             let slot_of = assign(&positions, &slots);
-            let mut sorted = slot_of.clone();
-            sorted.sort_unstable();
-            sorted.dedup();
-            prop_assert_eq!(sorted.len(), positions.len());
-            let best = brute(&positions, &slots, &mut Vec::new());
+            let mut distinct = slot_of.clone();
+            distinct.sort_unstable();
+            distinct.dedup();
+            prop_assert_eq!(distinct.len(), positions.len(), "each drone has its own slot");
+            let best = brute_force_cost(&positions, &slots, &mut Vec::new());
             prop_assert!((cost(&positions, &slots, &slot_of) - best).abs() < 1e-9);
         }
     }

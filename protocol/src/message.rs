@@ -1,4 +1,7 @@
-//! What drones say. Soft state: repeated until superseded, idempotent, safe to lose, repeat and reorder.
+//! The messages that drones exchange, and how they are encoded in frames.
+//!
+//! Messages carry soft state: a drone repeats a message until a newer one supersedes it. Messages are idempotent, so they may be
+//! lost, duplicated and reordered.
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
@@ -9,80 +12,82 @@ use serde::{Deserialize, Serialize};
 use std::mem::offset_of;
 use thiserror::Error;
 
-/// The kinds of message; each is a topic of its own to an observer and to the radio's rules.
+/// The kind of a message. An observer sees each kind as a separate topic, and the rules of the radio apply to topics.
 #[repr(u16)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topic {
-    /// [`Pose`].
+    /// Carries a [`Pose`].
     Pose = 1,
-    /// [`Obstacle`].
+    /// Carries an [`Obstacle`].
     Obstacle = 2,
-    /// [`Leadership`].
+    /// Carries a [`Leadership`].
     Leadership = 3,
-    /// [`Plan`].
+    /// Carries a [`Plan`].
     Plan = 4,
-    /// [`Assignment`].
+    /// Carries an [`Assignment`].
     Assignment = 5,
-    /// [`Arrivals`].
+    /// Carries an [`Arrivals`].
     Arrivals = 6,
-    /// [`Passed`].
+    /// Carries a [`Passed`].
     Passed = 7,
 }
 
 impl Topic {
-    /// All topics, in wire order.
+    /// All topics, in the order of their numbers on the wire.
     pub const ALL: [Self; 7] =
         [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Arrivals, Self::Passed];
 
-    /// The topic with this number on the wire.
+    /// The topic with this number on the wire; `None` if no topic has it.
     #[must_use]
     pub fn from_wire(kind: u16) -> Option<Self> {
         Self::ALL.into_iter().find(|topic| *topic as u16 == kind)
     }
 }
 
-/// One message.
+/// A message, decoded and checked or about to be encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
-    /// Where a drone is and what it obeys.
+    /// A drone's state and the plan it obeys.
     Pose(Pose),
-    /// An obstacle somebody sensed.
+    /// An obstacle that a drone has sensed.
     Obstacle(Obstacle),
-    /// A claim to lead or a heartbeat.
+    /// A message of the leader election, such as a claim or a heartbeat.
     Leadership(Leadership),
-    /// What a leader decided.
+    /// A leader's plan for its group.
     Plan(Plan),
-    /// One drone's part in it.
+    /// One drone's part in a plan.
     Assignment(Assignment),
-    /// When one member of a group can be at the next gate.
+    /// The times at which one member of a group can reach the gate of an obstacle set.
     Arrivals(Arrivals),
-    /// Who is through which set.
+    /// A drone's notice that it has passed an obstacle set.
     Passed(Passed),
 }
 
-/// No coordinate, speed or time is greater than this, m, m/s or s.
+/// Maximum absolute value of a coordinate (m), speed (m/s) or time (s) in a message. [`Message::decode`] refuses greater
+/// values, except in fields that may be infinite or NaN.
 pub const MAX_ABS: f64 = 1e9;
 
-/// Why a frame is not a message.
+/// Why a frame could not be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum DecodeError {
-    /// Unknown kind.
+    /// No topic has this number.
     #[error("frame of unknown kind {0}")]
     Kind(u16),
-    /// Another version of the layouts.
+    /// The frame has this version of the payload layouts instead of [`payload::VERSION`].
     #[error("frame of version {0}, expected {expected}", expected = payload::VERSION)]
     Version(u16),
-    /// The length does not fit the kind.
+    /// The length of the payload (first number, bytes) is not the length that its kind requires (second number, bytes).
     #[error("frame of {0} bytes, expected {1}")]
     Length(u32, usize),
-    /// A number that is not finite or beyond [`MAX_ABS`], a count out of range, a group without lineage, or an unknown flag.
+    /// The named field is invalid: a number that is not finite or is greater than [`MAX_ABS`], a count out of range, a group that
+    /// is not a lineage, an invalid shape, or an unknown kind or phase.
     #[error("frame with an invalid {0}")]
     Field(&'static str),
 }
 
 impl Message {
-    /// Its topic.
+    /// The message's topic.
     #[must_use]
     pub fn topic(&self) -> Topic {
         match self {
@@ -96,7 +101,7 @@ impl Message {
         }
     }
 
-    /// The frame that carries it.
+    /// Encodes the message as a frame.
     #[must_use]
     #[inline]
     pub fn encode(&self) -> Frame {
@@ -119,16 +124,16 @@ impl Message {
         frame
     }
 
-    /// The message in a frame that another process wrote.
+    /// Checks and copies the message in a frame that another process wrote.
     ///
     /// # Errors
-    /// [`DecodeError`]; nothing a frame holds can panic.
+    /// [`DecodeError`] if the frame does not contain a valid message. No content of a frame causes a panic.
     pub fn decode(frame: &Frame) -> Result<Self, DecodeError> {
         MessageRef::read(frame).map(MessageRef::to_message)
     }
 }
 
-/// A message where it lies: in a frame, or in a [`Message`].
+/// A message that is borrowed from a frame or from a [`Message`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MessageRef<'a> {
     /// See [`Message::Pose`].
@@ -162,10 +167,10 @@ impl<'a> From<&'a Message> for MessageRef<'a> {
 }
 
 impl<'a> MessageRef<'a> {
-    /// Reads the message in a frame that another process wrote, in place.
+    /// Checks and borrows the message in a frame that another process wrote.
     ///
     /// # Errors
-    /// [`DecodeError`]; nothing a frame holds can panic.
+    /// [`DecodeError`] if the frame does not contain a valid message. No content of a frame causes a panic.
     #[inline]
     pub fn read(frame: &'a Frame) -> Result<Self, DecodeError> {
         if frame.version != payload::VERSION {
@@ -184,7 +189,7 @@ impl<'a> MessageRef<'a> {
         Ok(message)
     }
 
-    /// A copy of it.
+    /// Copies the message.
     #[must_use]
     pub fn to_message(self) -> Message {
         match self {
@@ -241,8 +246,8 @@ impl<'a> MessageRef<'a> {
                 lineage(a.group)?;
                 known(ArrivalsKind::from_wire(a.kind))?;
                 below(a.routes, payload::MAX_ROUTES as u32 + 1, "route count")?;
-                let never = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
-                if a.gate_s.iter().any(never) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
+                let invalid = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
+                if a.gate_s.iter().any(invalid) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
             }
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
         }
@@ -279,12 +284,12 @@ mod tests {
     }
 
     #[test]
-    fn a_message_survives_the_wire() {
+    fn a_decoded_message_equals_the_encoded_one() {
         assert_eq!(Message::decode(&obstacle().encode()), Ok(obstacle()));
     }
 
     #[test]
-    fn what_is_wrong_with_a_frame_is_named() {
+    fn a_decode_error_names_the_invalid_part_of_the_frame() {
         let good = obstacle().encode();
         assert_eq!(Message::decode(&Frame { kind: 99, ..good }), Err(DecodeError::Kind(99)));
         assert_eq!(Message::decode(&Frame { version: 9, ..good }), Err(DecodeError::Version(9)));
@@ -292,17 +297,17 @@ mod tests {
         let mut nan = good;
         nan.payload[..8].copy_from_slice(&f64::NAN.to_le_bytes());
         assert_eq!(Message::decode(&nan), Err(DecodeError::Field("shape")));
-        let mut far = good;
-        far.payload[..8].copy_from_slice(&1e10f64.to_le_bytes());
-        assert_eq!(Message::decode(&far), Err(DecodeError::Field("shape")));
+        let mut too_large = good;
+        too_large.payload[..8].copy_from_slice(&1e10f64.to_le_bytes());
+        assert_eq!(Message::decode(&too_large), Err(DecodeError::Field("shape")));
         let group = crate::GroupId([0, 0, 3, 0, 0, 0, 0, 0]);
-        let lost = Message::Assignment(payload::Assignment { group, ..bytemuck::Zeroable::zeroed() });
-        assert_eq!(Message::decode(&lost.encode()), Err(DecodeError::Field("group")));
+        let invalid = Message::Assignment(payload::Assignment { group, ..bytemuck::Zeroable::zeroed() });
+        assert_eq!(Message::decode(&invalid.encode()), Err(DecodeError::Field("group")));
     }
 
     proptest! {
         #[test]
-        fn rubbish_never_panics(kind in 0u16..9, len in 0u32..400, bytes in prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)) {
+        fn no_bytes_cause_a_panic(kind in 0u16..9, len in 0u32..400, bytes in prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)) {
             let mut frame = Frame { kind, version: payload::VERSION, len, payload: [0; FRAME_PAYLOAD] };
             frame.payload.copy_from_slice(&bytes);
             if let Ok(message) = Message::decode(&frame) {

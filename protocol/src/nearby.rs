@@ -1,5 +1,6 @@
-//! Frames by where they were sent, so that with a limited range no drone looks at all of them: what a tick costs a drone
-//! depends on who is near, not on how many there are.
+//! A spatial index of the frames of a tick, by the position of the sender. With a limited radio range, a drone examines
+//! only the frames from nearby cells. The cost of a tick for one drone then depends on the number of drones nearby, not on
+//! the size of the swarm.
 
 use crate::Vec2;
 use crate::frame::{AirFrame, NEVER_TRANSMITTED};
@@ -7,42 +8,42 @@ use crate::link_faults::LinkFaults;
 use crate::message::Topic;
 use bytemuck::{Pod, Zeroable};
 
-/// Up to so many frames it is cheaper to look at all of them.
+/// Up to this number of frames, examining all of them is cheaper than building the index.
 const FEW: usize = 32;
 
-/// Topics that are heard no farther than a range, as a radio gives them ([`crate::radio::Radio::locality`]).
+/// The topics that no drone hears beyond a limited range. [`crate::radio::Radio::locality`] computes them for a radio.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Locality {
-    /// Side of a square cell: no frame of these topics is heard from farther away, m.
+    /// Side of a square cell, m. No frame of these topics is heard from farther away.
     pub cell_m: f64,
-    /// One bit a topic, at its number on the wire; 0: none, and nothing is sorted.
+    /// One bit per topic, at the topic's number on the wire. 0: no topic is limited in range, and the index stays empty.
     pub topics: u32,
-    /// Frames of other topics: they come first in the order, and concern everybody.
+    /// Number of frames of other topics. They come first in the order, and every drone must examine them.
     pub everywhere: u32,
 }
 
 impl Locality {
-    /// Whether a frame of this kind is heard in the neighbourhood alone.
+    /// Whether frames of this kind are limited in range. `kind` is a topic's number on the wire.
     #[must_use]
     pub fn holds(&self, kind: u16) -> bool {
         kind < 32 && self.topics >> kind & 1 == 1
     }
 
-    /// Takes a topic in.
+    /// Adds a topic that is heard up to `range_m`, m. The cells grow to that size if they are smaller.
     #[must_use]
     pub fn with(self, topic: Topic, range_m: f64) -> Self {
         Self { cell_m: self.cell_m.max(range_m), topics: self.topics | 1 << topic as u16, ..self }
     }
 
     fn cell(&self, point: Vec2) -> (i32, i32) {
-        // A shade wider, so that rounding never puts two points at that distance two cells apart.
+        // The cells are slightly wider, so that rounding never puts two points at exactly this distance two cells apart.
         let side_m = (self.cell_m * 1.000_001).max(f64::MIN_POSITIVE);
         ((point.x / side_m).floor() as i32, (point.y / side_m).floor() as i32)
     }
 }
 
-/// Frames that were sent in one cell.
+/// The frames that were sent from one cell: a run of entries in the index's order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
 pub struct FrameCell {
@@ -50,35 +51,36 @@ pub struct FrameCell {
     pub x: i32,
     /// Row, along y.
     pub y: i32,
-    /// The first of them in the order.
+    /// Position in the order of the cell's first frame.
     pub first: u32,
-    /// Their number.
+    /// Number of frames in the cell.
     pub count: u32,
 }
 
-/// The index as the world builds it, tick after tick in the same memory.
+/// The index as the world builds it. Its memory is reused from tick to tick.
 #[derive(Clone, Debug, Default)]
 pub struct FrameIndex {
-    /// What it holds.
+    /// Cell size and the topics that are sorted into cells.
     pub locality: Locality,
-    /// By column, then row.
+    /// The cells with at least one frame, sorted by column, then by row.
     pub cells: Vec<FrameCell>,
-    /// Places of all frames: those that are heard everywhere, then cell by cell.
+    /// Positions of all frames in the tick's list: first the frames of other topics, then those of each cell in turn.
     pub order: Vec<u32>,
     sorted: Vec<((i32, i32), u32)>,
 }
 
 impl FrameIndex {
-    /// Sorts the frames of a tick. Not if they are few, nor if some are cut off for another reason than their range:
-    /// then everybody has to look at each, to count it right.
+    /// Sorts the frames of a tick into cells. The index stays empty if there are few frames. It also stays empty if any
+    /// frame may be dropped for another reason than its range: every drone must then examine every frame, so that each
+    /// drop is counted under its own reason.
     pub fn build(&mut self, locality: Locality, frames: &[AirFrame]) {
         self.locality = Locality::default();
         self.cells.clear();
         self.order.clear();
         self.sorted.clear();
-        let plain =
+        let unaffected =
             |frame: &AirFrame| frame.link_faults == LinkFaults::default() && frame.queue_ns != NEVER_TRANSMITTED;
-        if locality.topics == 0 || frames.len() <= FEW || !frames.iter().all(plain) {
+        if locality.topics == 0 || frames.len() <= FEW || !frames.iter().all(unaffected) {
             return;
         }
         for (frame, place) in frames.iter().zip(0..) {
@@ -99,26 +101,27 @@ impl FrameIndex {
         }
     }
 
-    /// Borrowed, for readers in the same process.
+    /// A borrowed view of the index, for readers in the same process.
     #[must_use]
     pub fn view(&self) -> NearbyFrames<'_> {
         NearbyFrames { locality: self.locality, cells: &self.cells, order: &self.order }
     }
 }
 
-/// The index as a drone reads it, in place.
+/// The index as a drone reads it, without a copy.
 #[derive(Clone, Copy, Debug)]
 pub struct NearbyFrames<'a> {
-    /// What it holds.
+    /// Cell size and the topics that are sorted into cells.
     pub locality: Locality,
-    /// By column, then row.
+    /// The cells with at least one frame, sorted by column, then by row.
     pub cells: &'a [FrameCell],
-    /// Places of all frames: those that are heard everywhere, then cell by cell.
+    /// Positions of all frames in the tick's list: first the frames of other topics, then those of each cell in turn.
     pub order: &'a [u32],
 }
 
 impl<'a> NearbyFrames<'a> {
-    /// Calls `visit` with the places of all frames that could be heard at `here`, m. Those left out are out of range.
+    /// Calls `visit` with the position in the tick's list of each frame that could be heard at `here` (world frame, m). All
+    /// other frames are out of range.
     pub fn each(&self, here: Vec2, mut visit: impl FnMut(usize)) {
         let mut run = |first: usize, count: usize| {
             let places = self.order.get(first..first.saturating_add(count)).unwrap_or_default();
@@ -149,7 +152,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_is_in_range_or_heard_everywhere_is_visited_once(
+        fn each_frame_in_range_or_of_unlimited_range_is_visited_exactly_once(
             points in prop::collection::vec(([-400f64..400.0, -400f64..400.0], 1u16..8), 0..300),
             here in [-500f64..500.0, -500f64..500.0],
         ) {
@@ -172,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn few_frames_and_frames_that_are_cut_off_are_not_sorted() {
+    fn the_index_stays_empty_for_few_frames_or_a_muted_sender() {
         let locality = Locality::default().with(Topic::Pose, 10.0);
         let mut index = FrameIndex::default();
         let mut frames = vec![frame(0, [0.0; 2], 1); FEW + 1];

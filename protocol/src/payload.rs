@@ -1,7 +1,7 @@
-//! Layouts of the message payloads: plain data of fixed size, versioned by [`VERSION`].
+//! Layouts of the message payloads. They are plain data of fixed size and have one common version, [`VERSION`].
 //!
 //! A payload is read from shared memory only through [`crate::Message::decode`] or [`crate::MessageRef::read`], which
-//! check every field. Kinds and phases are integers here and enums everywhere else: see [`crate::wire`].
+//! check every field. Kinds and phases are integers in payloads and enums in all other code: see [`crate::wire`].
 
 use crate::Vec2;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
@@ -11,16 +11,17 @@ use crate::wire::{ArrivalsKind, LeadershipKind, Phase};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
-/// Version of all layouts in this module. A frame of another version is refused.
+/// Version of all layouts in this module. A receiver rejects a frame of another version.
 pub const VERSION: u16 = 2;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
 
-/// Maximum number of routes past one set: one more than obstacles.
+/// Maximum number of routes past one set: one more than the number of obstacles.
 pub const MAX_ROUTES: usize = MAX_SET + 1;
 
-/// Number of sets for which a beacon can report a place: the one the drone is passing and the next.
+/// Number of obstacle sets for which a beacon can report a place in the queue: the set that the drone is passing and
+/// the next set.
 pub const MAX_PLACES: usize = 2;
 
 /// [`Pose::flags`]: the drone believes that it leads, in the term [`Pose::term`].
@@ -35,9 +36,9 @@ pub const NO_ROUTE: u16 = u16::MAX;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct QueuePlace {
-    /// Length of the path that remains to the set's gate, m; negative once past it.
+    /// Length of the path that remains to the set's gate, m; negative once the drone is past the gate.
     pub remaining_m: f64,
-    /// The obstacle set, by its [`set_tag`]; 0 in an unused entry.
+    /// The [`set_tag`] of the obstacle set; 0 in an unused entry.
     pub set: u32,
     /// Route past the set, 0 = rightmost.
     pub route: u16,
@@ -50,7 +51,7 @@ impl QueuePlace {
     pub const NO_RANK: u16 = u16::MAX;
 }
 
-/// A short name of an obstacle set; never 0. `set` holds the ids in ascending order.
+/// A hash that names an obstacle set; never 0. `set` must hold the ids in ascending order.
 #[must_use]
 pub fn set_tag(set: &[ObstacleId]) -> u32 {
     (xxhash_rust::xxh3::xxh3_64(bytemuck::cast_slice(set)) as u32).max(1)
@@ -62,21 +63,21 @@ pub fn set_tag(set: &[ObstacleId]) -> u32 {
 pub struct Pose {
     /// Time of the state.
     pub stamp: SimTime,
-    /// World frame, m.
+    /// Position, world frame, m.
     pub position_m: [f64; 2],
-    /// World frame, m/s.
+    /// Velocity, world frame, m/s.
     pub velocity_mps: [f64; 2],
     /// The drone's places in queues, nearest set first.
     pub queue: [QueuePlace; MAX_PLACES],
-    /// The plan it obeys.
+    /// The plan that the drone obeys.
     pub obeyed: PlanStamp,
-    /// Its group.
+    /// The drone's group.
     pub group: GroupId,
-    /// The term it obeys, or in which it leads.
+    /// The term that the drone obeys, or in which it leads.
     pub term: Ballot,
-    /// Incarnation of its process.
+    /// Number of the drone's current process, from 1; each restart adds 1.
     pub incarnation: u32,
-    /// [`POSE_LEADS`], [`POSE_IMPAIRED`].
+    /// Combination of [`POSE_LEADS`] and [`POSE_IMPAIRED`].
     pub flags: u32,
     /// Always 0.
     pub reserved: u32,
@@ -96,15 +97,15 @@ impl Pose {
     }
 }
 
-/// An obstacle that a drone has sensed, for the drones that have not.
+/// An obstacle that a drone has sensed, sent to the drones that have not sensed it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Obstacle {
     /// The obstacle's outline, world frame.
     pub shape: ConvexShape,
-    /// The world's number of the obstacle.
+    /// The obstacle's number in the world.
     pub id: ObstacleId,
-    /// The drone that sensed it first, as far as the sender knows.
+    /// The drone that sensed the obstacle first, as far as the sender knows.
     pub witness: DroneId,
 }
 
@@ -112,7 +113,7 @@ pub struct Obstacle {
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Leadership {
-    /// Time of sending. In a pre-vote and in its rejection: when the source last heard of the leader.
+    /// Time of sending. In a pre-vote and in its rejection: the time when the source last heard of the leader.
     pub stamp: SimTime,
     /// The term.
     pub ballot: Ballot,
@@ -127,7 +128,7 @@ pub struct Leadership {
 }
 
 impl Leadership {
-    /// What the message says. Decoding refuses unknown numbers; in a payload that was never decoded, such a number
+    /// What the message says. Decoding rejects unknown numbers. In a payload that was never decoded, an unknown number
     /// counts as a heartbeat.
     #[must_use]
     pub fn kind(&self) -> LeadershipKind {
@@ -152,46 +153,46 @@ impl fmt::Debug for Leadership {
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Plan {
-    /// The time for which the anchor holds; receivers extrapolate by its velocity.
+    /// The time at which `anchor_m` is valid. Receivers extrapolate the anchor with its velocity.
     pub stamp: SimTime,
-    /// Term and number.
+    /// The plan's term and number.
     pub id: PlanStamp,
     /// The group that the plan is for.
     pub group: GroupId,
     /// A [`Phase`], see [`Plan::phase`].
     pub phase: u32,
-    /// Number of drones in the plan; the target shape is the formation of that many.
+    /// Number of drones in the plan. The target shape is the formation of that many drones.
     pub members: u32,
     /// Position of the formation's front slot at `stamp`, world frame, m.
     pub anchor_m: [f64; 2],
-    /// Velocity of the front slot, m/s.
+    /// Velocity of the front slot, world frame, m/s.
     pub anchor_mps: [f64; 2],
-    /// Abscissa at which the anchor stops, m; infinity if it never stops.
+    /// x coordinate at which the anchor stops, world frame, m; infinity if it never stops.
     pub anchor_stop_x_m: f64,
-    /// Forecast: seconds from `stamp` until the last drone passes the gate; NaN unless avoiding.
+    /// Predicted time from `stamp` until the last drone passes the gate, s; NaN unless the phase is [`Phase::Avoid`].
     pub predicted_s: f64,
-    /// Number of groupings that were simulated before the choice.
+    /// Number of groupings that the leader simulated before it chose this one.
     pub candidates: u32,
-    /// Number of routes past the set; 0 unless avoiding.
+    /// Number of routes past the set; 0 unless the phase is [`Phase::Avoid`].
     pub routes: u32,
-    /// Number of obstacles in use below, at most [`MAX_SET`].
+    /// Number of entries of `set` in use, at most [`MAX_SET`].
     pub set_count: u32,
-    /// The obstacle set, in ascending order.
+    /// The obstacles of the set, in ascending order.
     pub set: [ObstacleId; MAX_SET],
     /// Always 0.
     pub reserved: u32,
 }
 
 impl Plan {
-    /// What the plan tells its group to do. Decoding refuses unknown numbers; in a payload that was never decoded, such
-    /// a number counts as [`Phase::Cruise`].
+    /// What the plan tells its group to do. Decoding rejects unknown numbers. In a payload that was never decoded, an
+    /// unknown number counts as [`Phase::Cruise`].
     #[must_use]
     pub fn phase(&self) -> Phase {
         Phase::from_wire(self.phase).unwrap_or_default()
     }
 
-    /// Position (world frame, m) and velocity (m/s) of the anchor at `now`. The anchor moves on from its stamp until it
-    /// reaches the abscissa where it stops.
+    /// Position (world frame, m) and velocity (world frame, m/s) of the anchor at `now`. The anchor moves from the time
+    /// of its stamp until it reaches [`Plan::anchor_stop_x_m`].
     #[must_use]
     pub fn anchor_at(&self, now: SimTime) -> (Vec2, Vec2) {
         let (start, velocity) = (Vec2::from(self.anchor_m), Vec2::from(self.anchor_mps));
@@ -224,25 +225,26 @@ impl fmt::Debug for Plan {
     }
 }
 
-/// One drone's part in a plan.
+/// What a plan assigns to one drone.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Assignment {
-    /// The plan that it belongs to.
+    /// The plan that the assignment belongs to.
     pub id: PlanStamp,
     /// The group that the plan is for.
     pub scope: GroupId,
-    /// The drone's group under this plan: the scope, or a group split from it.
+    /// The drone's group under this plan: the scope, or a group that was split from it.
     pub group: GroupId,
-    /// The drone that the part is for.
+    /// The drone that the assignment is for.
     pub drone: DroneId,
     /// Leader of the drone's group.
     pub leader: DroneId,
-    /// The drone's slot, relative to the anchor, m.
+    /// The drone's slot in the formation, relative to the anchor, m.
     pub slot_m: [f64; 2],
-    /// Free-flight time to the gate when the plan was made, s; 0 unless avoiding. The queue is in this order.
+    /// Free-flight time to the gate when the plan was made, s; 0 unless the phase is [`Phase::Avoid`]. The queue is in
+    /// this order.
     pub arrival_s: f64,
-    /// Route, 0 = rightmost; [`NO_ROUTE`] unless avoiding.
+    /// Route past the set, 0 = rightmost; [`NO_ROUTE`] unless the phase is [`Phase::Avoid`].
     pub route: u16,
     /// Place in the queue of that route, 0 = first.
     pub rank: u16,
@@ -250,32 +252,32 @@ pub struct Assignment {
     pub reserved: u32,
 }
 
-/// When one member of the source's group can be at the gate of an obstacle set. Leaders of groups that have the same set
-/// ahead exchange these rows, and each splits the union of all rows.
+/// When one member of the source's group can be at the gate of an obstacle set. If several groups have the same set ahead,
+/// their leaders exchange these rows, and each leader plans the split from the union of all rows.
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Arrivals {
-    /// When the row was made.
+    /// Time at which the row was made.
     pub stamp: SimTime,
     /// The source's term.
     pub ballot: Ballot,
-    /// The member.
+    /// The member that the row is about.
     pub drone: DroneId,
     /// The group that the source leads.
     pub group: GroupId,
-    /// Short name of the set: [`set_tag`].
+    /// The [`set_tag`] of the obstacle set.
     pub set: u32,
-    /// Number of routes in use below, from right to left, at most [`MAX_ROUTES`].
+    /// Number of entries of `gate_s` in use, at most [`MAX_ROUTES`]. Routes are numbered from right to left.
     pub routes: u32,
     /// An [`ArrivalsKind`], see [`Arrivals::kind`].
     pub kind: u32,
-    /// For each route: seconds from the stamp to the gate in free flight; infinite if the drone cannot take the route,
-    /// negative if it is past the gate.
+    /// For each route: time from the stamp to the gate in free flight, s. The time is infinite if the drone cannot take
+    /// the route, and negative if the drone is past the gate.
     pub gate_s: [f32; MAX_ROUTES],
 }
 
 impl Arrivals {
-    /// What the message is for. Decoding refuses unknown numbers; in a payload that was never decoded, such a number
+    /// What the message is for. Decoding rejects unknown numbers. In a payload that was never decoded, an unknown number
     /// counts as [`ArrivalsKind::Report`].
     #[must_use]
     pub fn kind(&self) -> ArrivalsKind {
@@ -298,13 +300,13 @@ impl fmt::Debug for Arrivals {
     }
 }
 
-/// The source is past these obstacles: beyond the rear edge of the set by the planning distance.
+/// Reports that the source is past these obstacles: beyond the rear edge of the set by the planning distance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Passed {
     /// Time of sending.
     pub stamp: SimTime,
-    /// Number of obstacles in use below, at most [`MAX_SET`].
+    /// Number of entries of `set` in use, at most [`MAX_SET`].
     pub set_count: u32,
     /// The obstacles, in ascending order.
     pub set: [ObstacleId; MAX_SET],

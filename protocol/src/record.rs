@@ -1,4 +1,4 @@
-//! What the world tells the recorder: a row a drone and tick, every frame, and events.
+//! What the world sends to the recorder: one row per drone and tick, every frame, and events.
 
 use crate::drop_reason::DROP_REASONS;
 use crate::frame::AirFrame;
@@ -10,114 +10,114 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A record sample's head; then come [`DroneRow`]s, [`AirFrame`]s, and `events_len` bytes of JSON lines, one
-/// [`RunEvent`] each.
+/// The head of a record sample. The [`DroneRow`]s, the [`AirFrame`]s and `events_len` bytes of JSON lines follow it in this
+/// order. Each line is one [`RunEvent`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RecordHeader {
     /// The tick that just ended.
     pub tick: Tick,
-    /// Time at its end: the rows' time.
+    /// Time at the end of the tick. The rows hold the state at this time.
     pub now: SimTime,
     /// Number of rows, one per drone.
     pub rows: u32,
     /// Number of frames sent in this tick.
     pub frames: u32,
-    /// Bytes of JSON lines.
+    /// Length of the JSON lines, bytes.
     pub events_len: u32,
-    /// Ticks whose rows were dropped since the last sample because the recorder was full (wall clock only).
+    /// Number of ticks whose records were dropped since the last sample because the recorder was full (wall clock only).
     pub lost: u32,
     /// Running digest of the mission so far.
     pub digest: u64,
 }
 
-/// [`DroneRow::flags`]: its process lives.
+/// [`DroneRow::flags`]: the drone's process is alive.
 pub const ROW_ALIVE: u32 = 1;
-/// [`DroneRow::flags`]: it leads a group.
+/// [`DroneRow::flags`]: the drone leads a group.
 pub const ROW_LEADS: u32 = 2;
-/// [`DroneRow::flags`]: it flies a route past an obstacle set.
+/// [`DroneRow::flags`]: the drone flies a route past an obstacle set.
 pub const ROW_QUEUED: u32 = 4;
-/// [`DroneRow::flags`]: it missed this tick's deadline, its last command was held (wall clock only).
+/// [`DroneRow::flags`]: the drone missed this tick's deadline, and the world held its last command (wall clock only).
 pub const ROW_LATE: u32 = 8;
-/// [`DroneRow::flags`]: its process is frozen.
+/// [`DroneRow::flags`]: the drone's process is frozen.
 pub const ROW_FROZEN: u32 = 16;
 
-/// A drone at the end of a tick: the world's truth, and what the drone says it obeys.
+/// A drone at the end of a tick: its true state in the world, and the plan that the drone reports to obey.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DroneRow {
-    /// World frame, m.
+    /// True position, world frame, m.
     pub position_m: [f64; 2],
-    /// m/s.
+    /// True velocity, world frame, m/s.
     pub velocity_mps: [f64; 2],
-    /// Energy used since the start, J.
+    /// Energy used since the start of the mission, J.
     pub energy_j: f64,
-    /// The plan it obeys.
+    /// The plan that the drone obeys.
     pub obeyed: PlanStamp,
-    /// The term it obeys, or leads in.
+    /// The term that the drone obeys, or in which it leads.
     pub term: Ballot,
-    /// Its group.
+    /// The drone's group.
     pub group: GroupId,
-    /// The group it leads, with [`ROW_LEADS`].
+    /// The group that the drone leads; meaningful only with [`ROW_LEADS`].
     pub led: GroupId,
-    /// [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`], [`ROW_FROZEN`].
+    /// Combination of [`ROW_ALIVE`], [`ROW_LEADS`], [`ROW_QUEUED`], [`ROW_LATE`] and [`ROW_FROZEN`].
     pub flags: u32,
     /// A [`Phase`], see [`DroneRow::phase`].
     pub phase: u32,
-    /// Messages heard in this tick.
+    /// Number of messages that the drone heard in this tick.
     pub heard: u32,
-    /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
+    /// Number of frames that its radio dropped in this tick, indexed by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
-    /// What faults do to its radio.
+    /// Effects of the current faults on its radio.
     pub link_faults: LinkFaults,
-    /// How long its step took, ns of wall time.
+    /// Wall time that the drone's step took, ns.
     pub step_ns: u32,
-    /// Route, [`crate::payload::NO_ROUTE`] if none.
+    /// Route past the obstacle set, 0 = rightmost; [`crate::payload::NO_ROUTE`] if the drone has none.
     pub route: u16,
-    /// Place in the queue.
+    /// Place in the queue of that route, 0 = first.
     pub rank: u16,
-    /// Always 0; keeps the row a multiple of eight bytes.
+    /// Always 0; makes the size of the row a multiple of eight bytes.
     pub reserved: [u32; DROP_REASONS % 2],
 }
 
 impl DroneRow {
-    /// Who leads it: the claimant of the ballot it obeys, if it obeys one.
+    /// The drone's leader: the claimant of the ballot that it obeys. `None` if it obeys no ballot.
     #[must_use]
     pub fn leader(&self) -> Option<DroneId> {
         self.obeyed.ballot.is_some().then_some(self.obeyed.ballot.claimant)
     }
 
-    /// Phase of the plan it obeys; an unknown number counts as [`Phase::Cruise`].
+    /// Phase of the plan that the drone obeys. An unknown number counts as [`Phase::Cruise`].
     #[must_use]
     pub fn phase(&self) -> Phase {
         Phase::from_wire(self.phase).unwrap_or_default()
     }
 
-    /// Whether its process is alive.
+    /// Whether the drone's process is alive.
     #[must_use]
     pub fn alive(&self) -> bool {
         self.flags & ROW_ALIVE != 0
     }
 
-    /// Whether it leads a group.
+    /// Whether the drone leads a group.
     #[must_use]
     pub fn leads(&self) -> bool {
         self.flags & ROW_LEADS != 0
     }
 
-    /// Whether it flies a route past an obstacle set.
+    /// Whether the drone flies a route past an obstacle set.
     #[must_use]
     pub fn is_queued(&self) -> bool {
         self.flags & ROW_QUEUED != 0
     }
 
-    /// Whether it missed this tick's deadline (wall clock only).
+    /// Whether the drone missed this tick's deadline (wall clock only).
     #[must_use]
     pub fn is_late(&self) -> bool {
         self.flags & ROW_LATE != 0
     }
 
-    /// Whether its process is frozen.
+    /// Whether the drone's process is frozen.
     #[must_use]
     pub fn is_frozen(&self) -> bool {
         self.flags & ROW_FROZEN != 0
@@ -128,70 +128,70 @@ impl DroneRow {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// The end condition is met, the formation closed.
+    /// The end condition is met and the formation is closed.
     Reached,
-    /// The mission's time ran out.
+    /// The time limit of the mission ran out.
     Timeout,
     /// An invariant was broken.
     Unsafe,
-    /// It was interrupted, or its world died.
+    /// The mission was interrupted, or its world process died.
     Aborted,
 }
 
-/// What a broken invariant is called.
+/// The invariant that is broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ViolationKind {
-    /// Two drones closer than the safe distance; value: their distance, m.
+    /// Two drones are closer than the safe distance. The event's value is their distance, m.
     Separation,
-    /// A drone nearer to an obstacle than the obstacle clearance; value: the distance, m.
+    /// A drone is closer to an obstacle than the obstacle clearance. The event's value is the distance, m.
     Clearance,
-    /// Two different parts obeyed under one plan.
+    /// A drone obeys two different assignments under the same plan. The event's value is 0.
     ConflictingAssignment,
-    /// The plan a drone obeys went back within an incarnation.
+    /// A drone obeys an older plan than before, although its process has not restarted. The event's value is 0.
     BallotWentBack,
 }
 
-/// What happens to a drone or a link on purpose, or to a process unasked.
+/// A fault: one that the scenario injects into a drone or a link, or an unscheduled failure of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// The process ended: by a signal, an exit or a crash.
+    /// The process ended by a signal, an exit or a crash.
     Kill,
-    /// It did not answer for five seconds of wall time in lockstep, and was killed.
+    /// The process did not answer for five seconds of wall time in lockstep, and was killed.
     Hung,
-    /// The process was stopped, to be continued.
+    /// The process is stopped and continues later.
     Freeze,
-    /// The process was killed, to be replaced by a new one.
+    /// The process is killed, and a new one replaces it.
     Restart,
-    /// The drone reacts later.
+    /// The drone reacts with a delay.
     Slow,
-    /// It hears nobody.
+    /// The drone hears no other drone.
     Deaf,
-    /// Nobody hears it.
+    /// No other drone hears this drone.
     Mute,
-    /// The air is cut between sets of drones.
+    /// Drones on different sides of the partition cannot hear each other.
     Partition,
-    /// It senses no obstacles, no neighbours, or neither.
+    /// The drone senses no obstacles, no neighbours, or neither of them.
     Blind,
-    /// Its own position or velocity is told wrong.
+    /// The drone receives a wrong position or velocity of its own.
     Noise,
-    /// It is blown about.
+    /// Wind pushes the drone.
     Wind,
 }
 
 impl FaultKind {
-    /// Whether it ends or stops the drone's process.
+    /// Whether the fault ends or stops the drone's process.
     #[must_use]
     pub fn stops_process(self) -> bool {
         matches!(self, Self::Kill | Self::Hung | Self::Freeze | Self::Restart)
     }
 }
 
-/// A range of counted delays or ages, s.
+/// Mean, percentiles and maximum of the counted delays or ages, s. All fields are `None` if nothing was counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Percentiles {
-    /// Mean, s; `None` if nothing was counted.
+    /// Mean, s.
     pub mean: Option<f64>,
     /// Median, s.
     pub p50: Option<f64>,
@@ -201,32 +201,32 @@ pub struct Percentiles {
     pub max: Option<f64>,
 }
 
-/// Counters of a whole mission, told at its end.
+/// Counters of a whole mission, reported at its end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Totals {
-    /// Frames sent.
+    /// Number of frames that all drones sent.
     pub sent: u64,
-    /// Messages heard, over all receivers, each counted once.
+    /// Messages heard, summed over all receivers; a message counts once per receiver.
     pub delivered: u64,
-    /// Messages heard for the second time, over all receivers.
+    /// Messages heard for the second time, summed over all receivers.
     pub duplicates: u64,
-    /// Not heard, by [`crate::radio::DropReason`] in its order.
+    /// Frames not heard, indexed by [`crate::radio::DropReason`], summed over all receivers.
     pub dropped: [u64; DROP_REASONS],
-    /// From sending to hearing.
+    /// Delay from sending to hearing.
     pub delay_s: Percentiles,
     /// Age of a peer's last known pose.
     pub age_s: Percentiles,
-    /// Commands that were not finite and were not carried out.
+    /// Commands that the world rejected because they were not finite.
     pub rejected_commands: u64,
-    /// Ticks a drone did not answer in time (wall clock only).
+    /// Number of times a drone missed a tick's deadline (wall clock only).
     pub deadline_misses: u64,
-    /// Wall time from the first tick opened to the last tick done, s.
+    /// Wall time from the start of the first tick to the end of the last tick, s.
     pub wall_s: f64,
-    /// How late ticks opened (wall clock only).
+    /// Delay of the ticks' starts behind their schedule (wall clock only).
     pub lateness_s: Percentiles,
 }
 
-/// Something that happened.
+/// An event in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum EventKind {
@@ -234,99 +234,99 @@ pub enum EventKind {
     Detected {
         /// Number of the set, from 0, in flight order.
         stage: u32,
-        /// Who.
+        /// The drone that senses it.
         drone: DroneId,
-        /// Which obstacle of the set.
+        /// The obstacle of the set that it senses.
         obstacle: ObstacleId,
-        /// Distance to it, m.
+        /// Distance from the drone to the obstacle, m.
         distance_m: f64,
     },
-    /// The last living drone is past the mean centre abscissa of a set.
+    /// The last living drone has passed the mean x coordinate of the obstacle centres of a set.
     Passed {
-        /// Number of the set.
+        /// Number of the set, from 0, in flight order.
         stage: u32,
     },
-    /// A drone takes up leading, or lays it down.
+    /// A drone starts to lead a group or stops leading it.
     Leader {
-        /// The group it leads.
+        /// The group.
         group: String,
         /// The term.
         ballot: Ballot,
-        /// Who.
+        /// The drone that starts or stops leading.
         leader: DroneId,
-        /// Whether it leads from now on.
+        /// Whether the drone leads from now on.
         leads: bool,
     },
-    /// A leader's decision for its group.
+    /// A leader decides on a plan for its group.
     Grouping {
         /// The plan.
         plan: PlanStamp,
-        /// The group it splits or keeps.
+        /// The group that the plan splits or keeps.
         group: String,
-        /// What the group is told to do.
+        /// What the plan tells the group to do.
         phase: Phase,
-        /// Number of drones planned for.
+        /// Number of drones in the plan.
         members: u32,
-        /// Routes past the set.
+        /// Number of routes past the set.
         routes: u32,
-        /// The obstacle set.
+        /// The obstacles of the set.
         obstacles: Vec<ObstacleId>,
-        /// Forecast of the pass time, s.
+        /// Predicted time from the plan's stamp until the last drone passes the gate, s.
         predicted_s: Option<f64>,
     },
-    /// One drone's part in a plan, when it is first said.
+    /// A plan's assignment for one drone is sent for the first time.
     Assigned {
         /// The plan.
         plan: PlanStamp,
-        /// Who.
+        /// The drone.
         drone: DroneId,
-        /// Its group.
+        /// The drone's group.
         group: String,
-        /// Its group's leader.
+        /// The leader of that group.
         leader: DroneId,
-        /// Route, 0 = rightmost; none unless avoiding.
+        /// Route past the set, 0 = rightmost; `None` unless the phase is [`Phase::Avoid`].
         route: Option<u16>,
-        /// Place in the queue.
+        /// Place in the queue of that route, 0 = first.
         rank: u16,
-        /// Slot relative to the anchor, m.
+        /// Slot in the formation, relative to the anchor, m.
         slot_m: [f64; 2],
     },
-    /// A fault.
+    /// A fault begins.
     Fault {
-        /// What.
+        /// The kind of fault.
         kind: FaultKind,
-        /// Whom; [`DroneId::NONE`]: the whole swarm.
+        /// The drone that it affects; [`DroneId::NONE`] for the whole swarm.
         target: DroneId,
-        /// Whether the scenario asked for it.
+        /// Whether the scenario scheduled the fault.
         scheduled: bool,
-        /// What is known of it, for people: the signal, the exit code.
+        /// Details for a human reader, for example the signal or the exit code.
         detail: String,
     },
     /// A scheduled fault is over.
     FaultOver {
-        /// What.
+        /// The kind of fault.
         kind: FaultKind,
-        /// Whom; [`DroneId::NONE`]: the whole swarm.
+        /// The drone that it affected; [`DroneId::NONE`] for the whole swarm.
         target: DroneId,
-        /// What goes on, for people.
+        /// Details for a human reader.
         detail: String,
     },
-    /// An invariant is broken; said once when it begins.
+    /// An invariant is broken. The event is sent once, when the violation begins.
     Violation {
-        /// Which.
+        /// The invariant.
         kind: ViolationKind,
-        /// Who.
+        /// The drones that break it.
         drones: Vec<DroneId>,
-        /// How far.
+        /// The measured distance, m; 0 if the invariant is not about a distance.
         value_m: f64,
     },
     /// The mission is over.
     End {
-        /// How.
+        /// How the mission ended.
         outcome: Outcome,
-        /// In words.
+        /// Why it ended, for a human reader.
         reason: String,
-        /// Counters.
+        /// Counters of the whole mission.
         totals: Box<Totals>,
     },
 }
@@ -334,39 +334,39 @@ pub enum EventKind {
 /// An event and its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunEvent {
-    /// When, s of simulated time.
+    /// Simulated time of the event, s.
     pub t_s: f64,
-    /// What.
+    /// The event.
     #[serde(flatten)]
     pub what: EventKind,
 }
 
-/// A record sample as its reader sees it, in place.
+/// A borrowed view of a record sample; nothing is copied.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordView<'a> {
-    /// Tick, time, counts, digest.
+    /// The head: tick, time, counts and digest.
     pub head: &'a RecordHeader,
-    /// One for each drone.
+    /// One row per drone, in the order of their ids.
     pub rows: &'a [DroneRow],
     /// Frames sent in this tick.
     pub frames: &'a [AirFrame],
-    /// JSON lines.
+    /// Events as JSON lines, one [`RunEvent`] per line. They include the events of lost records since the last sample.
     pub events: &'a [u8],
 }
 
-/// Why a sample is not a record.
+/// The error for a sample that is not a valid record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("the record of {bytes} bytes does not hold what its head announces")]
 pub struct RecordError {
-    /// Size of the sample.
+    /// Size of the sample, bytes.
     pub bytes: usize,
 }
 
 impl<'a> RecordView<'a> {
-    /// Reads a sample in place. `bytes` must be 8-aligned.
+    /// Reads a sample without copying it. `bytes` must be aligned to 8 bytes.
     ///
     /// # Errors
-    /// [`RecordError`] if the sample is too short for its head, or not aligned.
+    /// [`RecordError`] if the sample is shorter than its head announces, or not aligned.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RecordError> {
         let error = RecordError { bytes: bytes.len() };
         let cut = |bytes: &'a [u8], len: usize| bytes.split_at_checked(len).ok_or(error);
@@ -383,13 +383,16 @@ impl<'a> RecordView<'a> {
         })
     }
 
-    /// Bytes that [`RecordView::write_to`] needs.
+    /// Size of the sample that [`RecordView::write_to`] writes, bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
         size_of::<RecordHeader>() + size_of_val(self.rows) + size_of_val(self.frames) + self.events.len()
     }
 
-    /// Writes the sample; `out` must be at least [`RecordView::byte_len`] long.
+    /// Writes the sample to the start of `out`.
+    ///
+    /// # Panics
+    /// If `out` is shorter than [`RecordView::byte_len`].
     pub fn write_to(&self, out: &mut [u8]) {
         let parts = [
             bytemuck::bytes_of(self.head),
@@ -404,16 +407,16 @@ impl<'a> RecordView<'a> {
         }
     }
 
-    /// The events.
+    /// The events, each line parsed with `parse`.
     ///
     /// # Errors
-    /// A line that is not an event.
+    /// The first error that `parse` returns.
     pub fn parse_events<E>(&self, parse: impl Fn(&[u8]) -> Result<RunEvent, E>) -> Result<Vec<RunEvent>, E> {
         self.events.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()).map(parse).collect()
     }
 }
 
-/// Why a sink could not keep a record, for people.
+/// Why a sink could not keep a record, for a human reader.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct SinkError(String);
@@ -424,15 +427,15 @@ impl From<String> for SinkError {
     }
 }
 
-/// Whoever wants to see each record of a run, in order: the recorder, a live view, a test.
+/// A consumer that receives each record of a run in order, for example the recorder, a live view or a test.
 pub trait RecordSink: Send {
-    /// Takes the record of one tick. An error stops the recording, never the mission.
+    /// Takes the record of one tick. An error stops the recording but not the mission.
     ///
     /// # Errors
     /// [`SinkError`] if the record could not be kept.
     fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError>;
 
-    /// Whether it would take a record now, without waiting for something slow: a disk.
+    /// Whether the sink can take a record now without waiting for something slow, such as a disk.
     fn ready(&self) -> bool {
         true
     }

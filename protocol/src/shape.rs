@@ -1,47 +1,50 @@
-//! The one obstacle shape: a convex polygon with a rounding radius. A circle is one vertex with a radius, a rectangle
-//! four vertices without.
+//! The shape of every obstacle: a convex polygon with a rounding radius. A circle is one vertex with a radius. A rectangle
+//! is four vertices with radius 0.
 
 use crate::Vec2;
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
 
-/// Most vertices of an obstacle.
+/// Maximum number of vertices of an obstacle.
 pub const MAX_VERTICES: usize = 16;
 
-/// All points within `radius_m` of the convex hull of the first `count` vertices. World frame, metres, vertices
-/// counter-clockwise. Laid out for shared memory: call [`ConvexShape::check`] on one that another process wrote.
+/// All points within `radius_m` of the convex hull of the first `count` vertices. Coordinates are in the world frame, in
+/// metres; the vertices are in counter-clockwise order. The layout is that of shared memory: call [`ConvexShape::check`] on
+/// a shape that another process wrote.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ConvexShape {
-    /// Rounding radius, ≥ 0.
+    /// Rounding radius, m, ≥ 0.
     pub radius_m: f64,
     /// Number of vertices in use, 1 to [`MAX_VERTICES`].
     pub count: u32,
     /// Always 0.
     pub reserved: u32,
-    /// x and y of each vertex; zero past `count`.
+    /// x and y of each vertex, world frame, m; zero past `count`.
     pub vertices_m: [[f64; 2]; MAX_VERTICES],
 }
 
 /// What is wrong with a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ShapeError {
-    /// No vertex, or more than [`MAX_VERTICES`].
+    /// The shape has no vertex, or more than [`MAX_VERTICES`]. Holds the number of vertices.
     #[error("an obstacle has 1 to {MAX_VERTICES} vertices, not {0}")]
     Count(u32),
     /// A coordinate or the radius is not a finite number, or the radius is negative.
     #[error("an obstacle's coordinates and radius must be finite, its radius not negative")]
     NotFinite,
-    /// Clockwise or not convex.
+    /// The vertices are in clockwise order, the polygon is not convex, or three consecutive vertices are collinear.
     #[error("an obstacle's vertices must be convex and counter-clockwise")]
     NotConvex,
 }
 
 impl ConvexShape {
-    /// The shape around these vertices, which must be convex and counter-clockwise.
+    /// The shape with these vertices (world frame, m) and this rounding radius, m. The vertices must form a convex polygon
+    /// in counter-clockwise order.
     ///
     /// # Errors
-    /// [`ShapeError`] if they are not, are too many, or a number is not finite.
+    /// [`ShapeError`] if the polygon is not convex and counter-clockwise, has no vertex or too many, or if a number is not
+    /// finite.
     pub fn new(vertices: &[Vec2], radius_m: f64) -> Result<Self, ShapeError> {
         let count = u32::try_from(vertices.len()).unwrap_or(u32::MAX);
         if vertices.is_empty() || vertices.len() > MAX_VERTICES {
@@ -55,18 +58,19 @@ impl ConvexShape {
         Ok(shape)
     }
 
-    /// A disc.
+    /// A disc with this centre (world frame, m) and radius, m.
     ///
     /// # Errors
-    /// [`ShapeError::NotFinite`].
+    /// [`ShapeError::NotFinite`] if a number is not finite or the radius is negative.
     pub fn circle(centre: Vec2, radius_m: f64) -> Result<Self, ShapeError> {
         Self::new(&[centre], radius_m)
     }
 
-    /// A rectangle of the given half sizes, turned counter-clockwise by `rotation_rad`.
+    /// A rectangle with this centre (world frame, m) and these half sizes along its own axes, m, turned counter-clockwise
+    /// by `rotation_rad`.
     ///
     /// # Errors
-    /// [`ShapeError`] if a number is not finite or a size not positive.
+    /// [`ShapeError`] if a number is not finite, if a size is 0, or if exactly one size is negative.
     pub fn rectangle(centre: Vec2, half: Vec2, rotation_rad: f64) -> Result<Self, ShapeError> {
         let (sin, cos) = rotation_rad.sin_cos();
         let corner = |x: f64, y: f64| centre + Vec2::new(x * cos - y * sin, x * sin + y * cos);
@@ -78,7 +82,8 @@ impl ConvexShape {
     /// Checks a shape that another process wrote.
     ///
     /// # Errors
-    /// [`ShapeError`].
+    /// [`ShapeError`] if the number of vertices is wrong, a number is not finite, the radius is negative, or the polygon
+    /// is not convex and counter-clockwise.
     pub fn check(&self) -> Result<(), ShapeError> {
         if self.count == 0 || self.count as usize > MAX_VERTICES {
             return Err(ShapeError::Count(self.count));
@@ -98,18 +103,18 @@ impl ConvexShape {
         Ok(())
     }
 
-    /// Vertex `i`; the caller keeps `i` below `count`.
+    /// Vertex `i`, world frame, m. The caller must keep `i` below `count`.
     #[must_use]
     pub fn vertex(&self, i: usize) -> Vec2 {
         Vec2::new(self.vertices_m[i][0], self.vertices_m[i][1])
     }
 
-    /// The vertices in use.
+    /// The vertices in use, world frame, m.
     pub fn vertices(&self) -> impl ExactSizeIterator<Item = Vec2> + '_ {
         self.vertices_m[..(self.count as usize).min(MAX_VERTICES)].iter().map(|v| Vec2::new(v[0], v[1]))
     }
 
-    /// Least and greatest corner of the axis-aligned box around the shape.
+    /// Lower left and upper right corner of the axis-aligned bounding box, world frame, m.
     #[must_use]
     pub fn bounds(&self) -> (Vec2, Vec2) {
         let start = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
@@ -118,7 +123,7 @@ impl ConvexShape {
         (low - margin, high + margin)
     }
 
-    /// Centre of the box around the shape.
+    /// Centre of the axis-aligned bounding box, world frame, m.
     #[must_use]
     pub fn centre(&self) -> Vec2 {
         let (low, high) = self.bounds();
@@ -131,14 +136,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_hold_the_rounding() {
+    fn bounds_include_the_rounding_radius() {
         let disc = ConvexShape::circle(Vec2::new(3.0, -1.0), 2.0).unwrap();
         assert_eq!(disc.bounds(), (Vec2::new(1.0, -3.0), Vec2::new(5.0, 1.0)));
         assert_eq!(disc.centre(), Vec2::new(3.0, -1.0));
     }
 
     #[test]
-    fn bad_shapes_are_named() {
+    fn each_defect_of_a_shape_has_its_own_error() {
         let v = |x, y| Vec2::new(x, y);
         assert_eq!(ConvexShape::new(&[], 0.0), Err(ShapeError::Count(0)));
         assert_eq!(ConvexShape::new(&[v(f64::NAN, 0.0)], 1.0), Err(ShapeError::NotFinite));

@@ -1,5 +1,5 @@
-//! What a drone hands back in a tick: its actuators' command, what it obeys, and the tick's tally. Wire and clock, not
-//! a message path: no other drone reads it.
+//! What a drone returns to the world in each tick: its actuator command, the plan it obeys, and its counters. Slots are not
+//! a message path: no other drone reads them.
 
 use crate::drop_reason::DROP_REASONS;
 use crate::ids::{Ballot, GroupId, PlanStamp};
@@ -17,43 +17,44 @@ pub const SLOT_QUEUED: u32 = 2;
 pub struct Slot {
     /// Commanded acceleration, world frame, m/s².
     pub acceleration_mps2: [f64; 2],
-    /// Frames it has sent since its process started: all of them are in its uplink once its done word is set.
+    /// Number of frames that the drone has sent since its process started. All of them are in its uplink once its done
+    /// word is set.
     pub frames_total: u64,
-    /// Hash of which frames it heard in this tick, in which order; 0 if none.
+    /// Hash of the frames that the drone heard in this tick, in the order in which it heard them; 0 if it heard none.
     pub heard_hash: u64,
-    /// Hash of its route, rank, slot and phase under `obeyed`; 0 before the first. The same plan with another part for
-    /// the same drone shows as another hash.
+    /// Hash of the drone's route, rank, slot and phase under `obeyed`; 0 before its first assignment. A different assignment
+    /// for the same drone under the same plan has a different hash.
     pub part_hash: u64,
-    /// The plan it obeys.
+    /// The plan that the drone obeys.
     pub obeyed: PlanStamp,
-    /// Its group.
+    /// The drone's group.
     pub group: GroupId,
-    /// The group it leads, with [`SLOT_LEADS`].
+    /// The group that the drone leads; meaningful only with [`SLOT_LEADS`].
     pub led: GroupId,
     /// Number of messages heard in this tick, each counted once.
     pub heard: u32,
     /// Number of messages heard in this tick for the second time.
     pub duplicates: u32,
-    /// Frames that its radio refused in this tick, by [`crate::radio::DropReason`].
+    /// Number of frames that its radio dropped in this tick, indexed by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
-    /// [`SLOT_LEADS`], [`SLOT_QUEUED`].
+    /// Combination of [`SLOT_LEADS`] and [`SLOT_QUEUED`].
     pub flags: u32,
     /// A [`Phase`], see [`Slot::phase`].
     pub phase: u32,
-    /// Route, [`crate::payload::NO_ROUTE`] if none.
+    /// Route past the obstacle set, 0 = rightmost; [`crate::payload::NO_ROUTE`] if the drone has none.
     pub route: u16,
-    /// Place in the queue.
+    /// Place in the queue of that route, 0 = first.
     pub rank: u16,
-    /// How long the step took, ns of wall time; no part of the digest. 0 in the inline runtime.
+    /// Wall time that the drone's step took, ns; not part of the digest. 0 in the inline runtime.
     pub step_ns: u32,
-    /// The term it obeys, or leads in.
+    /// The term that the drone obeys, or in which it leads.
     pub term: Ballot,
     /// Always 0.
     pub reserved: [u32; 14],
 }
 
 impl Slot {
-    /// Phase of the plan it obeys; an unknown number counts as [`Phase::Cruise`].
+    /// Phase of the plan that the drone obeys. An unknown number counts as [`Phase::Cruise`].
     #[must_use]
     pub fn phase(&self) -> Phase {
         Phase::from_wire(self.phase).unwrap_or_default()
@@ -72,10 +73,10 @@ impl Slot {
     }
 }
 
-/// Bins of [`LinkStats`]' histograms, one tick wide; the last also holds all that is longer.
+/// Number of bins in the histograms of [`LinkStats`]. A bin is one tick wide; the last bin also counts all greater values.
 pub const STAT_BINS: usize = 256;
 
-/// What one drone's radio has counted since the mission began. Delays and ages in ticks.
+/// Counters of one drone's radio since the start of the mission. Delays and ages are in ticks.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LinkStats {
@@ -85,15 +86,16 @@ pub struct LinkStats {
     pub duplicates: u64,
     /// Frames that could not be decoded.
     pub malformed: u64,
-    /// Frames refused, by [`crate::radio::DropReason`].
+    /// Frames dropped, indexed by [`crate::radio::DropReason`].
     pub dropped: [u64; DROP_REASONS],
     /// Longest delay from sending to hearing, ticks.
     pub delay_max: u64,
     /// Greatest age of a peer's last known pose, ticks.
     pub age_max: u64,
-    /// Heard messages by delay.
+    /// Histogram of the delay of heard messages, one bin per tick.
     pub delay_bins: [u32; STAT_BINS],
-    /// Age of each known peer's pose, sampled at every beacon of one's own.
+    /// Histogram of the age of each known peer's last pose, one bin per tick. It is sampled each time this drone sends its
+    /// own beacon.
     pub age_bins: [u32; STAT_BINS],
     /// Always 0.
     pub reserved: [u64; 4],
@@ -106,20 +108,20 @@ impl Default for LinkStats {
 }
 
 impl LinkStats {
-    /// Counts a message heard `ticks` after it was sent.
+    /// Counts a message that was heard `ticks` after it was sent.
     pub fn delay(&mut self, ticks: u64) {
         self.heard += 1;
         self.delay_max = self.delay_max.max(ticks);
         self.delay_bins[(ticks as usize).min(STAT_BINS - 1)] += 1;
     }
 
-    /// Counts the age of a peer's last known pose.
+    /// Counts the age of a peer's last known pose, in ticks.
     pub fn age(&mut self, ticks: u64) {
         self.age_max = self.age_max.max(ticks);
         self.age_bins[(ticks as usize).min(STAT_BINS - 1)] += 1;
     }
 
-    /// Adds another drone's counts.
+    /// Adds another drone's counters; takes the larger of each pair of maxima.
     pub fn merge(&mut self, other: &Self) {
         self.heard += other.heard;
         self.duplicates += other.duplicates;

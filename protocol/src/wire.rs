@@ -1,5 +1,5 @@
-//! Numbers on the wire and the enums they stand for. Payloads and slots hold integers, because another process wrote
-//! them; everything that reads a payload works with the enums.
+//! Numbers on the wire and the enums that they stand for. Payloads and slots hold integers, because another process wrote
+//! them. Code that reads a payload works with the enums.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -9,13 +9,13 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("{number} is not a known {what}")]
 pub struct UnknownCode {
-    /// What was expected, for example `phase`.
+    /// Name of the expected enum, for example `phase`.
     pub what: &'static str,
     /// The number that was found.
     pub number: u32,
 }
 
-/// `bit` if `set` is true, else 0: to build a word of flags.
+/// `bit` if `set` is true, else 0. Used to build a word of flags.
 #[must_use]
 pub fn flag(set: bool, bit: u32) -> u32 {
     if set { bit } else { 0 }
@@ -29,20 +29,20 @@ pub enum LeadershipKind {
     Claim,
     /// The source leads and is alive.
     Heartbeat,
-    /// The source misses the leader of this term and asks which drones have heard of it since the stamp.
+    /// The source no longer hears the leader of this term. It asks which drones have heard of that leader since the stamp.
     PreVote,
-    /// The source has heard of this term's leader, most recently at the stamp. This answers a pre-vote.
+    /// Answer to a pre-vote: the source has heard of this term's leader, most recently at the stamp.
     PreVoteRejection,
     /// The source leads and asks the drone in [`crate::payload::Leadership::heir`] to take over.
     LeadershipTransfer,
 }
 
 impl LeadershipKind {
-    /// All kinds. On the wire, the first one is 1.
+    /// All kinds, in wire order from 1.
     pub const ALL: [Self; 5] =
         [Self::Claim, Self::Heartbeat, Self::PreVote, Self::PreVoteRejection, Self::LeadershipTransfer];
 
-    /// Its number on the wire, from 1.
+    /// The kind's number on the wire, from 1.
     #[must_use]
     pub const fn to_wire(self) -> u32 {
         self as u32 + 1
@@ -62,12 +62,12 @@ impl LeadershipKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// Fly in formation; the anchor moves on.
+    /// Fly in formation while the anchor moves forward.
     #[default]
     Cruise,
-    /// Fly around the obstacle set, each drone by its route and rank.
+    /// Fly past the obstacle set; each drone follows its route and rank.
     Avoid,
-    /// Take the slots of the target shape again.
+    /// Return to the slots of the target shape.
     Reform,
 }
 
@@ -75,7 +75,7 @@ impl Phase {
     /// All phases, in wire order from 0.
     pub const ALL: [Self; 3] = [Self::Cruise, Self::Avoid, Self::Reform];
 
-    /// Its number on the wire, from 0.
+    /// The phase's number on the wire, from 0.
     #[must_use]
     pub const fn to_wire(self) -> u32 {
         self as u32
@@ -89,7 +89,7 @@ impl Phase {
         Self::ALL.into_iter().find(|phase| phase.to_wire() == number).ok_or(UnknownCode { what: "phase", number })
     }
 
-    /// The word that stands for it in JSON and on the screen.
+    /// The phase's name in JSON and on the screen.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -104,12 +104,13 @@ impl Phase {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ArrivalsKind {
-    /// The source tells its times and expects nothing.
+    /// The source reports the arrival times of its members and expects no answer.
     #[default]
     Report,
-    /// The source waits for the times of the other groups before it decides.
+    /// The source asks for the arrival times of the other groups and waits for them before it decides.
     Query,
-    /// The one leader that plans for several groups has decided: the only route in use is the drone's.
+    /// The leader that plans for several groups has decided. Only the route that it assigned to the drone has a finite
+    /// time.
     Decision,
 }
 
@@ -117,7 +118,7 @@ impl ArrivalsKind {
     /// All kinds, in wire order from 0.
     pub const ALL: [Self; 3] = [Self::Report, Self::Query, Self::Decision];
 
-    /// Its number on the wire, from 0.
+    /// The kind's number on the wire, from 0.
     #[must_use]
     pub const fn to_wire(self) -> u32 {
         self as u32
@@ -152,13 +153,13 @@ impl BrokenSensors {
         self.obstacles || self.ranging
     }
 
-    /// As flags on the wire.
+    /// The sensors as flags on the wire.
     #[must_use]
     pub fn to_wire(self) -> u32 {
         flag(self.obstacles, Self::OBSTACLES) | flag(self.ranging, Self::RANGING)
     }
 
-    /// From flags on the wire. Unknown flags are ignored.
+    /// The sensors that these flags on the wire stand for. Unknown flags are ignored.
     #[must_use]
     pub const fn from_wire(flags: u32) -> Self {
         Self { obstacles: flags & Self::OBSTACLES != 0, ranging: flags & Self::RANGING != 0 }
@@ -176,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_value_has_its_own_number_and_comes_back() {
+    fn every_value_survives_a_round_trip_through_its_wire_number() {
         for kind in LeadershipKind::ALL {
             assert_eq!(LeadershipKind::from_wire(kind.to_wire()), Ok(kind));
         }
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_number_is_named() {
+    fn the_error_for_an_unknown_number_contains_it() {
         assert!(LeadershipKind::from_wire(0).is_err() && LeadershipKind::from_wire(6).is_err());
         assert_eq!(Phase::from_wire(3).unwrap_err().to_string(), "3 is not a known phase");
         assert_eq!(ArrivalsKind::from_wire(3), Err(UnknownCode { what: "kind of arrivals", number: 3 }));

@@ -1,5 +1,6 @@
 use super::*;
 
+/// The command of one drone at the origin with one neighbour on the x axis. Velocities in m/s, accelerations in m/s².
 fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
     let params = BrakingFilterParams {
         safe_distance_m: 33.0,
@@ -14,21 +15,24 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
 }
 
 #[test]
-fn a_file_at_the_nominal_speed_needs_hardly_more_than_the_safe_distance() {
+fn drones_in_line_at_the_nominal_speed_need_hardly_more_than_the_safe_distance() {
     let cruise = Vec2::new(10.0, 0.0);
     assert_eq!(pair(33.0 + 0.33 + 0.41, cruise, cruise, Vec2::zeros()), Vec2::zeros());
-    assert!(pair(33.0 + 0.33 + 0.1, cruise, cruise, Vec2::zeros()).x < -1.0, "too near to fly on");
+    assert!(
+        pair(33.0 + 0.33 + 0.1, cruise, cruise, Vec2::zeros()).x < -1.0,
+        "the drone is too near to fly on and has to brake"
+    );
 }
 
 #[test]
-fn a_drone_may_always_part() {
+fn a_drone_may_always_fly_away_from_a_neighbour() {
     let away = Vec2::new(-5.0, 0.0);
     assert_eq!(pair(33.0, Vec2::zeros(), Vec2::zeros(), away), away);
     assert!(pair(33.0, Vec2::zeros(), Vec2::zeros(), -away).norm() < 0.01);
 }
 
 #[test]
-fn what_is_far_away_is_ignored() {
+fn a_distant_neighbour_is_ignored() {
     let wanted = Vec2::new(5.0, 0.0);
     assert_eq!(pair(200.0, Vec2::new(10.0, 0.0), Vec2::new(-20.0, 0.0), wanted), wanted);
 }

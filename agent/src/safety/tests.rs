@@ -13,7 +13,7 @@ const PARAMS: SafetyParams = SafetyParams {
 };
 const DT: f64 = 0.02;
 
-/// Flies two drones, each of which wants to keep its velocity. Returns their least distance, m.
+/// Flies two drones. Each wants to keep its initial velocity. Returns their least distance, m.
 fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
     let wanted = v;
     let mut filters = [Safety::new(PARAMS), Safety::new(PARAMS)];
@@ -41,7 +41,9 @@ fn fly_pair(mut p: [Vec2; 2], mut v: [Vec2; 2], shares: [f64; 2]) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
-    fn two_drones_on_any_crossing_keep_their_distance(angle in 0.3..std::f64::consts::PI, offset in -40.0..40.0, share in 0.1..0.9) {
+    fn two_drones_on_any_crossing_keep_their_distance(
+        angle in 0.3..std::f64::consts::PI, offset in -40.0..40.0, share in 0.1..0.9
+    ) {
         let other = Vec2::new(f64::cos(angle), f64::sin(angle)) * 10.0;
         let start = -other * 15.0 + Vec2::new(0.0, offset);
         let (p, v) = ([Vec2::new(-150.0, 0.0), start], [Vec2::new(10.0, 0.0), other]);
@@ -52,13 +54,13 @@ proptest! {
 }
 
 #[test]
-fn a_drone_with_the_whole_share_is_safe_from_one_that_does_nothing() {
+fn a_drone_with_the_whole_share_keeps_its_distance_from_a_drone_that_does_nothing() {
     let least = fly_pair([Vec2::zeros(), Vec2::new(90.0, 5.0)], [Vec2::new(10.0, 0.0), Vec2::zeros()], [1.0, 0.0]);
     assert!(least >= PARAMS.safe_distance_m, "{least}");
 }
 
 #[test]
-fn a_drone_that_brakes_hard_ahead_is_not_hit_for_any_share() {
+fn a_drone_keeps_its_distance_behind_a_drone_that_brakes_hard_for_any_share() {
     for share in [0.1, 0.5, 0.9] {
         let (mut ahead, mut behind) = ((31.0, 10.0), (0.0, 10.0));
         let mut filter = Safety::new(PARAMS);
@@ -84,7 +86,7 @@ fn a_drone_that_brakes_hard_ahead_is_not_hit_for_any_share() {
 }
 
 #[test]
-fn drones_at_the_speed_on_sight_stop_for_each_other() {
+fn two_drones_at_the_speed_on_sight_stop_before_each_other() {
     let speed = PARAMS.speed_on_sight_mps();
     let (apart, towards) = (Vec2::new(PARAMS.ranging_m, 0.0), Vec2::new(speed, 0.0));
     for offset in [0.0, 0.1, 8.0] {
@@ -92,7 +94,7 @@ fn drones_at_the_speed_on_sight_stop_for_each_other() {
         assert!(least >= PARAMS.safe_distance_m, "{least}");
     }
     let least = fly_pair([Vec2::zeros(), apart], [towards * 1.1, -towards * 1.1], [1.0, 1.0]);
-    assert!(least < PARAMS.safe_distance_m, "the speed is not lower than necessary: {least}");
+    assert!(least < PARAMS.safe_distance_m, "the speed on sight is lower than necessary: {least}");
     let slow = SafetyParams { reaction_time_s: 0.5, ..PARAMS }.speed_on_sight_mps();
     assert!(slow < speed - 1.0 && slow > 0.0, "{slow}");
 }
@@ -109,7 +111,7 @@ fn a_drone_stops_before_a_wall() {
         v = next;
         assert!(x <= -PARAMS.clearance_m, "{x}");
     }
-    assert!(x > -PARAMS.clearance_m - 1.0, "the drone stops close to the wall: {x}");
+    assert!(x > -PARAMS.clearance_m - 1.0, "the drone stopped too far from the wall: {x}");
 }
 
 fn neighbour(position_m: Vec2, velocity_mps: Vec2, share: f64) -> Neighbour {
@@ -121,16 +123,19 @@ fn filtered(wanted: Vec2, velocity: Vec2, neighbours: &[Neighbour]) -> Vec2 {
 }
 
 #[test]
-fn an_old_beacon_causes_no_evasion_if_ranging_would_sense_a_near_drone() {
-    let told = Neighbour { age_s: 4.0, sensed: false, ..neighbour(Vec2::new(65.0, 0.0), Vec2::zeros(), 0.5) };
-    assert!(filtered(Vec2::zeros(), Vec2::zeros(), &[told]).x < -1.0, "without ranging the other may be anywhere");
-    let unsensed = Neighbour { least_m: PARAMS.ranging_m, ..told };
+fn an_old_beacon_causes_no_evasion_if_ranging_would_have_sensed_a_near_drone() {
+    let from_beacon = Neighbour { age_s: 4.0, sensed: false, ..neighbour(Vec2::new(65.0, 0.0), Vec2::zeros(), 0.5) };
+    assert!(
+        filtered(Vec2::zeros(), Vec2::zeros(), &[from_beacon]).x < -1.0,
+        "without ranging, the neighbour may be much nearer than its beacon says"
+    );
+    let unsensed = Neighbour { least_m: PARAMS.ranging_m, ..from_beacon };
     assert_eq!(filtered(Vec2::zeros(), Vec2::zeros(), &[unsensed]), Vec2::zeros());
 }
 
 #[test]
-fn a_drone_between_two_others_does_not_bolt_sideways() {
-    // Both are a little too near and not quite opposite. Full acceleration sideways gains nothing.
+fn a_drone_between_two_others_does_not_accelerate_sideways() {
+    // Both neighbours are slightly too near and almost opposite. Full sideways acceleration gains nothing.
     let distance_m = PARAMS.safe_distance_m + 0.3;
     let squeezed = [Vec2::new(distance_m, 0.0), Vec2::new(-distance_m, -0.6)].map(|p| neighbour(p, Vec2::zeros(), 1.0));
     let a = filtered(Vec2::zeros(), Vec2::zeros(), &squeezed);
@@ -138,12 +143,12 @@ fn a_drone_between_two_others_does_not_bolt_sideways() {
 }
 
 #[test]
-fn a_silent_drone_does_not_chase_another_into_a_body() {
-    let body = neighbour(Vec2::new(34.0, 0.0), Vec2::new(-6.0, 0.0), 1.0);
+fn a_silent_chaser_does_not_push_a_drone_into_a_neighbour_ahead() {
+    let ahead = neighbour(Vec2::new(34.0, 0.0), Vec2::new(-6.0, 0.0), 1.0);
     let chaser = neighbour(Vec2::new(-33.0, 0.0), Vec2::new(3.0, 0.0), 1.0);
     let own = Vec2::new(6.0, 0.0);
-    let alone = filtered(Vec2::zeros(), own, &[body]);
+    let alone = filtered(Vec2::zeros(), own, &[ahead]);
     assert!(alone.x < -2.0, "{alone}");
-    let chased = filtered(Vec2::zeros(), own, &[body, chaser]);
-    assert!((chased - alone).norm() < 0.2, "{chased} is not {alone}");
+    let chased = filtered(Vec2::zeros(), own, &[ahead, chaser]);
+    assert!((chased - alone).norm() < 0.2, "the chaser changed the command from {alone} to {chased}");
 }

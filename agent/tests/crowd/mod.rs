@@ -1,4 +1,4 @@
-//! Crowds of drones that all fly by the safety rule of `skein_agent::braking_filter`, whatever they wish for.
+//! Crowds of drones that all follow the safety rule of `skein_agent::braking_filter`, for any commands that they want.
 #![allow(clippy::unwrap_used, dead_code)]
 
 use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
@@ -12,97 +12,102 @@ fn law(params: &BrakingFilterParams) -> BrakingLaw {
     BrakingLaw { deceleration_mps2: params.acceleration_max_mps2, dt_s: params.dt_s }
 }
 
-/// Full braking, m/s².
+/// Acceleration of full braking, m/s².
 fn braking(params: &BrakingFilterParams, velocity: Vec2) -> Vec2 {
     let (speed, step) = (velocity.norm(), params.acceleration_max_mps2 * params.dt_s);
     if speed > step { velocity * (-params.acceleration_max_mps2 / speed) } else { -velocity / params.dt_s }
 }
 
-/// A crowd whose drones all fly by the rule.
+/// A crowd whose drones all follow the rule.
 #[derive(Clone, Debug)]
 pub(crate) struct Crowd {
     params: BrakingFilterParams,
     tick: u64,
+    /// Position, m, and velocity, m/s, of each drone.
     bodies: Vec<(Vec2, Vec2)>,
-    /// Ticks that a command takes until it has effect.
+    /// Delay from a command to its effect, ticks.
     lag: u32,
-    /// Commands on their way, by drone, the oldest first.
+    /// Commands of each drone that have not taken effect yet, m/s², the oldest first.
     pending: Vec<VecDeque<Vec2>>,
     obstacles: Vec<ConvexShape>,
 }
 
-/// What the drones of a crowd wish for. Each wish tries to break the rule.
+/// The commands that the drones of a crowd want. Each kind tries to violate the distances.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Wish {
     /// All drones fly to one point.
     Gather,
-    /// Each drone flies beyond the place of the drone opposite.
+    /// Each drone flies towards a point beyond the drone with the mirrored index.
     Swap,
     /// Each drone flies straight at the nearest other one.
     Chase,
-    /// Half of the drones circle the middle to the left, half to the right.
+    /// Half of the drones circle the origin to the left, the other half to the right.
     Rotate,
     /// Full acceleration in a direction that changes at random.
     Erratic,
 }
 
-/// A linear congruential generator (Knuth, MMIX): the same crowd for a seed everywhere.
+/// A linear congruential generator (Knuth, MMIX). A seed gives the same crowd on every machine.
 pub(crate) struct Keyed(pub u64);
 
 impl Keyed {
+    /// Next number, from 0 to 1.
     pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64) / (1u64 << 53) as f64
     }
 
+    /// Next number, from `low` to `high`.
     pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
+    /// Next point, uniformly distributed in a disc around the origin.
     fn disc(&mut self, radius: f64) -> Vec2 {
         let (angle, r) = (self.within(0.0, std::f64::consts::TAU), radius * self.unit().sqrt());
         Vec2::new(angle.cos(), angle.sin()) * r
     }
 }
 
+/// Distance between a point and a shape, m.
 fn shape_distance_m(shape: &ConvexShape, point: Vec2) -> f64 {
     let core: Vec<Vec2> = shape.vertices().collect();
     (nearest(&core, point) - point).norm() - shape.radius_m
 }
 
 impl Crowd {
-    /// As many drones as fit, up to `drones`, in random states whose braking paths keep all distances.
+    /// A crowd in random states whose braking paths keep all distances. It has at most `drones` drones; fewer if they do not fit.
     fn random(seed: u64, drones: usize, density: f64, lag: u32) -> Self {
-        let mut key = Keyed(seed);
-        key.unit();
-        let safe_distance_m = key.within(1.0, 40.0);
+        let mut random = Keyed(seed);
+        random.unit();
+        let safe_distance_m = random.within(1.0, 40.0);
         let params = BrakingFilterParams {
             safe_distance_m,
-            clearance_m: key.within(0.5, 20.0),
-            acceleration_max_mps2: key.within(1.0, 10.0),
-            speed_max_mps: key.within(2.0, 25.0),
-            dt_s: [0.005, 0.01, 0.02, 0.05, 0.1][(key.unit() * 5.0) as usize],
+            clearance_m: random.within(0.5, 20.0),
+            acceleration_max_mps2: random.within(1.0, 10.0),
+            speed_max_mps: random.within(2.0, 25.0),
+            dt_s: [0.005, 0.01, 0.02, 0.05, 0.1][(random.unit() * 5.0) as usize],
         };
         let side_m = (drones as f64).sqrt() * safe_distance_m * density;
-        let obstacles = (0..(key.unit() * 4.0) as usize)
+        let obstacles = (0..(random.unit() * 4.0) as usize)
             .map(|_| {
-                let centre = Vec2::new(key.within(-side_m, side_m), key.within(-side_m, side_m));
-                let half = Vec2::new(key.within(1.0, 30.0), key.within(1.0, 30.0));
-                if key.unit() < 0.5 {
+                let centre = Vec2::new(random.within(-side_m, side_m), random.within(-side_m, side_m));
+                let half = Vec2::new(random.within(1.0, 30.0), random.within(1.0, 30.0));
+                if random.unit() < 0.5 {
                     ConvexShape::circle(centre, half.x).unwrap()
                 } else {
-                    ConvexShape::rectangle(centre, half, key.within(0.0, 3.0)).unwrap()
+                    ConvexShape::rectangle(centre, half, random.within(0.0, 3.0)).unwrap()
                 }
             })
             .collect();
-        let tick = (key.unit() * 1e4) as u64;
+        let tick = (random.unit() * 1e4) as u64;
         let mut crowd = Self { params, tick, bodies: Vec::new(), lag, pending: Vec::new(), obstacles };
         for _ in 0..drones * 20 {
-            let position = Vec2::new(key.within(-side_m, side_m), key.within(-side_m, side_m));
-            let body = (position, key.disc(params.speed_max_mps));
+            let position = Vec2::new(random.within(-side_m, side_m), random.within(-side_m, side_m));
+            let body = (position, random.disc(params.speed_max_mps));
             if crowd.bodies.len() < drones && crowd.admits(body) {
                 crowd.bodies.push(body);
-                // At first every drone brakes.
+                // The first `lag` commands of each drone are full braking.
                 let (mut velocity, mut pending) = (body.1, VecDeque::new());
                 for _ in 0..lag {
                     let braking = braking(&params, velocity);
@@ -115,6 +120,7 @@ impl Crowd {
         crowd
     }
 
+    /// Whether the braking path of a body keeps all distances from the obstacles and the drones so far.
     fn admits(&self, (position, velocity): (Vec2, Vec2)) -> bool {
         let law = law(&self.params);
         let path = BrakingPath::new(position, velocity, law);
@@ -127,13 +133,14 @@ impl Crowd {
             })
         };
         let apart = |other: &(Vec2, Vec2)| {
-            let theirs = BrakingPath::new(other.0, other.1, law);
-            (0..=path.ticks().max(theirs.ticks())).all(|k| (path.at(k) - theirs.at(k)).norm() >= keep_m)
+            let other_path = BrakingPath::new(other.0, other.1, law);
+            (0..=path.ticks().max(other_path.ticks())).all(|k| (path.at(k) - other_path.at(k)).norm() >= keep_m)
         };
         self.obstacles.iter().all(clear) && self.bodies.iter().all(apart)
     }
 
-    fn wish(&self, i: usize, wish: Wish, key: &mut Keyed) -> Vec2 {
+    /// The acceleration that drone `i` wants, m/s².
+    fn wish(&self, i: usize, wish: Wish, random: &mut Keyed) -> Vec2 {
         let (position, velocity) = self.bodies[i];
         let towards = |target: Vec2| (target - position) * 2.0 - velocity;
         match wish {
@@ -148,17 +155,18 @@ impl Crowd {
                 let turn = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
                 Vec2::new(-position.y, position.x) * turn - velocity
             }
-            Wish::Erratic => key.disc(1.0).normalize() * 100.0,
+            Wish::Erratic => random.disc(1.0).normalize() * 100.0,
         }
     }
 
+    /// Position and velocity after one tick.
     fn fly(&self, (position, velocity): (Vec2, Vec2), acceleration: Vec2) -> (Vec2, Vec2) {
         let next = velocity + acceleration * self.params.dt_s;
         (position + (velocity + next) * (self.params.dt_s / 2.0), next)
     }
 
-    /// One tick of all drones, each by what it senses at the tick's start.
-    fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, key: &mut Keyed) {
+    /// One tick of all drones. Each drone decides by what it senses at the start of the tick.
+    fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, random: &mut Keyed) {
         let before = self.bodies.clone();
         for (i, filter) in filters.iter_mut().enumerate() {
             let lag_s = f64::from(self.lag) * self.params.dt_s;
@@ -172,7 +180,7 @@ impl Crowd {
             let neighbours = before.iter().enumerate().filter(|(j, _)| *j != i);
             let neighbours =
                 neighbours.map(|(_, b)| Moving { position_m: b.0 + b.1 * lag_s - position, velocity_mps: b.1 });
-            let wanted = self.wish(i, wish, key);
+            let wanted = self.wish(i, wish, random);
             let acceleration = filter.filter(&own, wanted, obstacles, neighbours);
             assert!(acceleration.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
             self.pending[i].push_back(acceleration);
@@ -183,7 +191,7 @@ impl Crowd {
         self.tick += 1;
     }
 
-    /// The least of all distances minus what is to be kept, m.
+    /// Least distance beyond the distance to keep, over all pairs of drones and all drones and obstacles, m.
     fn least_m(&self) -> f64 {
         let mut least_m = f64::INFINITY;
         for (i, (position, _)) in self.bodies.iter().enumerate() {
@@ -200,14 +208,14 @@ impl Crowd {
 
 pub(crate) const WISHES: [Wish; 5] = [Wish::Gather, Wish::Swap, Wish::Chase, Wish::Rotate, Wish::Erratic];
 
-/// Flies a crowd; the least distance beyond what is to be kept, m, and drone-ticks.
+/// Flies a crowd. Returns the least distance beyond the distance to keep, m, and the number of drone-ticks flown.
 pub(crate) fn fly(seed: u64, drones: usize, density: f64, ticks: usize, wish: Wish, lag: u32) -> (f64, usize) {
     let mut crowd = Crowd::random(seed, drones, density, lag);
-    let mut key = Keyed(seed ^ 0xabcdef);
+    let mut random = Keyed(seed ^ 0xabcdef);
     let mut filters = vec![BrakingFilter::new(crowd.params); crowd.bodies.len()];
     let mut least_m = crowd.least_m();
     for _ in 0..ticks {
-        crowd.step(&mut filters, wish, &mut key);
+        crowd.step(&mut filters, wish, &mut random);
         least_m = least_m.min(crowd.least_m());
     }
     (least_m, ticks * crowd.bodies.len())

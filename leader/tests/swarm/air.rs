@@ -8,60 +8,63 @@ use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, SimTime, Vec2};
 use std::collections::BTreeMap;
 
-/// Loss, delay and doubling of messages, drawn by a keyed hash.
+/// Channel between the drones. Loss and delay of each message are drawn by a keyed hash.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Air {
     pub seed: u64,
+    /// Probability that a receiver loses a message, 0 to 1.
     pub loss: f64,
+    /// Mean delay, s.
     pub delay_s: f64,
-    /// The delay is this much longer or shorter at most, s.
+    /// Greatest deviation of the delay from its mean, s.
     pub jitter_s: f64,
 }
 
 impl Air {
+    /// A random number from 0 to 1 for this message and receiver. `purpose` separates independent draws.
     fn draw(&self, purpose: u64, sequence: u64, to: usize) -> f64 {
         let mut digest = Digest::default();
         digest.word(self.seed).word(purpose).word(sequence).word(to as u64);
         (digest.value() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// When a message comes in, s after it was said; `None`: never.
+    /// Delay of a message to a receiver, s; `None` if it is lost.
     fn delay_s(&self, sequence: u64, to: usize) -> Option<f64> {
-        let heard = self.draw(1, sequence, to) >= self.loss;
-        heard.then(|| self.delay_s + self.jitter_s * (2.0 * self.draw(2, sequence, to) - 1.0))
+        let delivered = self.draw(1, sequence, to) >= self.loss;
+        delivered.then(|| self.delay_s + self.jitter_s * (2.0 * self.draw(2, sequence, to) - 1.0))
     }
 }
 
-/// Tick at which it is due, source, sequence number, destination.
+/// A message under way: tick at which it is due, source, sequence number, destination.
 pub(crate) type Post = (u64, usize, u64, usize);
 
-/// Machines, their motion, and the channel between them.
+/// The leadership state machines of all drones, their motion, and the channel between them.
 #[derive(Clone)]
 pub(crate) struct Swarm {
     pub periods: Periods,
     pub air: Air,
     pub tick: u64,
-    /// The dead are `None`.
+    /// State machine of each drone; `None` if the drone is dead.
     pub drones: Vec<Option<Leading>>,
-    /// Alive, but they do nothing and hear nothing.
+    /// Whether each drone is frozen: alive, but it does nothing and hears nothing.
     pub frozen: Vec<bool>,
     pub incarnations: Vec<u32>,
     pub own: Vec<OwnState>,
     /// Drones of different sides do not hear each other.
     pub sides: Vec<u8>,
-    /// Nor do those whose numbers differ by more: with 1 they are a chain.
+    /// Drones whose indices differ by more than this do not hear each other. With 1 the drones form a chain.
     pub reach: usize,
     pub scenery: Vec<(ObstacleId, ConvexShape)>,
-    /// How far a drone senses obstacles, m.
+    /// Detection range of obstacles, m.
     pub range_m: f64,
-    /// `None`: what happens is not honest, and nobody looks.
+    /// Checks the invariants in every tick; `None` if the test injects dishonest messages, so that they need not hold.
     pub watch: Option<Watch>,
     posts: BTreeMap<Post, Message>,
     sequence: u64,
 }
 
 impl Swarm {
-    /// Drones in a column 40 m apart, the first ahead, all just started.
+    /// Drones in a column, 40 m apart, the first drone ahead. All have just started.
     pub(crate) fn new(periods: Periods, air: Air, drones: usize) -> Self {
         let own = |i: usize| {
             let position = Vec2::new(-40.0 * i as f64, 7.0 * i as f64 - 3.0 * drones as f64);
@@ -102,7 +105,7 @@ impl Swarm {
         self.drones[drone] = Some(Leading::new(&params));
     }
 
-    /// Puts what a drone says on the air, to all who can hear it.
+    /// Sends a message to all other drones. The channel decides loss and delay.
     pub(crate) fn send(&mut self, from: usize, message: Message) {
         self.sequence += 1;
         for to in (0..self.own.len()).filter(|&to| to != from) {
@@ -112,23 +115,23 @@ impl Swarm {
         }
     }
 
-    /// Messages under way, the next due first.
+    /// Messages under way, the next due message first.
     pub(crate) fn posts(&mut self) -> &mut BTreeMap<Post, Message> {
         &mut self.posts
     }
 
-    /// Removes the message with this index, modulo their number.
+    /// Removes the message with this index, modulo the number of messages under way.
     pub(crate) fn take_post(&mut self, index: usize) -> Option<(Post, Message)> {
         let index = index.checked_rem(self.posts.len())?;
         let post = *self.posts.keys().nth(index)?;
         self.posts.remove_entry(&post)
     }
 
-    /// One tick: all drones hear the messages that are due, then all act.
+    /// One tick. First all drones receive the messages that are due, then all act.
     pub(crate) fn step(&mut self) -> Result<(), Breach> {
         self.deliver();
         let now = self.now();
-        let mut said = Vec::new();
+        let mut sent = Vec::new();
         for i in 0..self.drones.len() {
             let Some(leading) = self.drones[i].as_mut().filter(|_| !self.frozen[i]) else { continue };
             self.own[i].tick = self.tick;
@@ -138,14 +141,14 @@ impl Swarm {
                     leading.sense(now, *id, *shape);
                 }
             }
-            let mut say = Vec::new();
-            step(leading, now, &own, &mut say);
+            let mut outgoing = Vec::new();
+            step(leading, now, &own, &mut outgoing);
             if let Some(watch) = &mut self.watch {
                 watch.see(DroneId(i as u32), self.incarnations[i], leading)?;
             }
-            said.extend(say.into_iter().map(|message| (i, message)));
+            sent.extend(outgoing.into_iter().map(|message| (i, message)));
         }
-        for (from, message) in said {
+        for (from, message) in sent {
             self.send(from, message);
         }
         for own in &mut self.own {
@@ -163,9 +166,9 @@ impl Swarm {
                 continue;
             }
             let Some(leading) = &mut self.drones[to] else { continue };
-            let mut say = Vec::new();
-            leading.hear(now, DroneId(from as u32), &message, &mut say);
-            answers.extend(say.into_iter().map(|message| (to, message)));
+            let mut outgoing = Vec::new();
+            leading.hear(now, DroneId(from as u32), &message, &mut outgoing);
+            answers.extend(outgoing.into_iter().map(|message| (to, message)));
         }
         for (from, message) in answers {
             self.send(from, message);
@@ -179,7 +182,7 @@ impl Swarm {
         }
     }
 
-    /// Runs until `wrong` returns `None`. Returns how long that took, s, or what is wrong after `limit_s`.
+    /// Runs until `wrong` returns `None`. Returns the time that this took, s, or the result of `wrong` after `limit_s`.
     pub(crate) fn until(&mut self, limit_s: f64, wrong: impl Fn(&Self) -> Option<String>) -> Result<f64, String> {
         let start = self.tick;
         loop {
@@ -199,12 +202,12 @@ impl Swarm {
         (0..self.drones.len()).filter(of_side).filter_map(living).collect()
     }
 
-    /// What keeps the drones of a side from being one group.
+    /// The first reason why the drones of a side are not one group, if there is one.
     pub(crate) fn disunion(&self, side: u8) -> Option<String> {
         disunion(&self.side(side))
     }
 
-    /// The term that a living drone obeys.
+    /// The term that a drone obeys; `None` if it is dead.
     pub(crate) fn term(&self, drone: usize) -> Option<Ballot> {
         self.drones[drone].as_ref().map(|leading| leading.term())
     }

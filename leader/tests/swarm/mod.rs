@@ -1,6 +1,6 @@
-//! Machines as the pilot runs them, and the invariants between them. Shared by the tests of leadership.
-#![allow(dead_code, reason = "each test uses a part of it")]
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+//! Leadership state machines, run as the pilot runs them, and the invariants between them. Shared by the tests of leadership.
+#![allow(dead_code, reason = "each test uses only a part of this module")]
+#![allow(clippy::unwrap_used, reason = "test helpers")]
 
 pub(crate) mod air;
 
@@ -45,7 +45,7 @@ pub(crate) const DEFAULT: Periods = Periods {
     debounce_s: 0.1,
 };
 
-/// Parameters of the machine of drone `me`.
+/// Parameters of the state machine of drone `me`.
 pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start: SimTime) -> LeadingParams {
     LeadingParams {
         me: DroneId(me),
@@ -78,52 +78,52 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
     }
 }
 
-/// A wall across the course line at `x_m`, with a route past it on either side.
+/// A wall across the course line at `x_m`. A route leads past it on either side.
 pub(crate) fn wall(id: u32, x_m: f64) -> (ObstacleId, ConvexShape) {
     let shape = ConvexShape::rectangle(Vec2::new(x_m, 0.0), Vec2::new(5.0, 50.0), 0.0).unwrap();
     (ObstacleId(id), shape)
 }
 
-/// A drone's tick after it has heard its messages, in the pilot's order.
-pub(crate) fn step(leading: &mut Leading, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
-    leading.elect(now, own, say);
+/// One tick of a drone after it has received its messages, in the pilot's order. Adds the messages to send to `outgoing`.
+pub(crate) fn step(leading: &mut Leading, now: SimTime, own: &OwnState, outgoing: &mut Vec<Message>) {
+    leading.elect(now, own, outgoing);
     if leading.is_leader() {
         leading.refresh_members(now, own);
-        let mut bundle = leading.decide(now, &[], say);
+        let mut bundle = leading.decide(now, &[], outgoing);
         if !bundle.is_empty() {
             leading.adopt(now, bundle.swap_remove(0));
         }
     }
     leading.note_passed(own.position);
-    leading.speak(now, own, &Default::default(), say);
+    leading.speak(now, own, &Default::default(), outgoing);
 }
 
-/// A breach of an invariant.
+/// A violation of an invariant.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Breach {
-    /// Two drones know, or obey, different plans or assignments under one (ballot, epoch).
+    /// Two drones know or obey different plans or assignments with the same stamp (ballot, epoch).
     TwoPlans { drone: DroneId, of: DroneId, stamp: PlanStamp },
-    /// The stamp or term that a drone obeys went back within an incarnation.
+    /// The stamp or term that a drone obeys decreased within an incarnation.
     WentBack { drone: DroneId, from: (Ballot, PlanStamp), to: (Ballot, PlanStamp) },
-    /// Two drones lead under one ballot, or one drone leads under another one's ballot.
+    /// Two drones lead under the same ballot, or a drone leads under the ballot of another drone.
     TwoLeaders { drone: DroneId, other: DroneId, ballot: Ballot },
-    /// A drone obeys a plan of a later term than its own.
+    /// A drone obeys a plan whose term is later than the drone's term.
     NotOfTheTerm { drone: DroneId, term: Ballot, stamp: PlanStamp },
 }
 
-/// Checks the invariants against what was seen so far.
+/// Checks the invariants against all states seen so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Watch {
-    /// Hash of each drone's part in each plan; under [`DroneId::NONE`] the plan's own.
+    /// Hash of each drone's part in each plan. The entry of [`DroneId::NONE`] is the hash of the plan itself.
     parts: BTreeMap<(PlanStamp, DroneId), u64>,
     /// The leader of each ballot.
     pub leaders: BTreeMap<Ballot, DroneId>,
-    /// The term and stamp that each incarnation of each drone obeyed last.
+    /// The last term and stamp that each incarnation of each drone obeyed.
     obeyed: BTreeMap<(DroneId, u32), (Ballot, PlanStamp)>,
 }
 
 impl Watch {
-    /// Checks a drone.
+    /// Checks a drone, and remembers its state for later checks.
     pub(crate) fn see(&mut self, drone: DroneId, incarnation: u32, leading: &Leading) -> Result<(), Breach> {
         let (term, stamp) = (leading.term(), leading.stamp());
         let (from, to) = (self.obeyed.insert((drone, incarnation), (term, stamp)).unwrap_or_default(), (term, stamp));
@@ -157,7 +157,8 @@ pub(crate) fn hash(bytes: &[u8]) -> u64 {
     digest.value()
 }
 
-/// What is wrong among drones that hear each other. Each must obey the highest term for its group that one of them leads.
+/// Checks drones that all hear each other. Each must obey the highest term for its group that one of them leads. Returns the
+/// first violation.
 pub(crate) fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
     let leaders: Vec<_> = drones.iter().filter(|(_, l)| l.is_leader()).collect();
     for (id, leading) in drones {
@@ -171,8 +172,8 @@ pub(crate) fn discord(drones: &[(DroneId, &Leading)]) -> Option<String> {
     None
 }
 
-/// What is wrong among drones that hear each other and have no obstacle ahead. One must lead, and all must obey one plan for
-/// all of them.
+/// Checks drones that all hear each other and have no obstacle ahead. One must lead, and all must obey one plan for all of
+/// them. Returns the first violation.
 pub(crate) fn disunion(drones: &[(DroneId, &Leading)]) -> Option<String> {
     if let Some(discord) = discord(drones) {
         return Some(discord);

@@ -1,4 +1,5 @@
-//! Losses that come together: Gilbert and Elliott's two states in continuous time, without a memory.
+//! Burst losses: the two-state model of Gilbert and Elliott in continuous time. The state at any time is computed on demand;
+//! nothing is stored between calls.
 
 use super::key::KeyedRng;
 use super::link::Link;
@@ -6,32 +7,33 @@ use crate::ids::DroneId;
 use crate::time::SimTime;
 use serde::{Deserialize, Serialize};
 
-/// A block of time lasts so many mean bursts. The state is drawn from its stationary distribution at a block's start and
-/// evolves within the block by draws of the block's own key, so it can be told for any instant by itself.
+/// Length of a block of time, in mean burst lengths. At the start of a block, the state is drawn from its stationary
+/// distribution. Within the block it evolves by random numbers of the block's own key. The state at any time can therefore
+/// be computed from its block alone.
 pub const BLOCK_BURSTS: f64 = 64.0;
 
-/// Whom a burst befalls together.
+/// Which links share their bursts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum BurstScope {
-    /// One direction of one link.
+    /// Each direction of each link has its own bursts.
     #[default]
     Direction,
-    /// Both directions of one link.
+    /// Both directions of a link have the same bursts; each link has its own.
     Link,
-    /// Everybody at once.
+    /// All links in the swarm have the same bursts.
     Swarm,
 }
 
-/// Losses that come together.
+/// Parameters of the burst losses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Burst {
-    /// Share of time that bursts take, 0 to 1.
+    /// Share of time that is spent in bursts, 0 to 1.
     pub share: f64,
     /// Mean length of a burst, s; positive.
     pub length_s: f64,
-    /// Probability that a frame is lost in a burst, 0 to 1.
+    /// Probability that a frame is lost during a burst, 0 to 1.
     pub loss: f64,
-    /// Whom a burst befalls.
+    /// Which links share their bursts.
     pub scope: BurstScope,
 }
 
@@ -42,7 +44,7 @@ impl Burst {
         BLOCK_BURSTS * self.length_s
     }
 
-    /// Whether a burst is_active on a link.
+    /// Whether a burst is active on a link at the time `at`. `seed` is the radio's key.
     #[must_use]
     pub fn is_active(&self, seed: u64, link: Link, at: SimTime) -> bool {
         if self.share <= 0.0 || self.share >= 1.0 {
@@ -62,8 +64,9 @@ impl Burst {
         }
     }
 
-    /// Mean stay in either state, s. A block's end cuts a burst short unless the next block begins with one: the stay
-    /// within a block is by so much longer that a burst has its mean length all the same.
+    /// Mean time in a burst and mean time between bursts, within a block, s. The end of a block cuts a burst short unless
+    /// the next block begins with a burst. Both means are lengthened to compensate, so that bursts still have the mean
+    /// length `length_s` overall.
     fn means_s(&self) -> (f64, f64) {
         let burst_s = self.length_s / (1.0 - (1.0 - self.share) / BLOCK_BURSTS);
         (burst_s, burst_s * (1.0 - self.share) / self.share)

@@ -1,60 +1,61 @@
-//! What the air does to one frame at one receiver: its delay, its loss, its range, its copies.
+//! The channel model: delay, loss, range and duplication of one frame at one receiver.
 
 use super::burst::Burst;
 use super::key::KeyedRng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::SQRT_2;
 
-/// What the air does to a frame. The default is ideal.
+/// How a frame is delayed, lost and duplicated on its way to a receiver. The default is an ideal channel: no loss and no
+/// delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChannelModel {
-    /// Time on the air; a frame takes at least one tick.
+    /// Delay from transmission to reception. A receiver hears a frame one tick after it was sent at the earliest.
     pub delay: Delay,
-    /// Probability that a receiver does not hear a frame, 0 to 1, independent for each (Bernoulli).
+    /// Probability that a receiver does not hear a frame, 0 to 1; independent for each frame and receiver (Bernoulli).
     pub loss: f64,
-    /// Losses that come together; `None`: there are none.
+    /// Burst losses; `None`: there are none.
     pub burst: Option<Burst>,
-    /// How far a frame is heard; `None`: everywhere.
+    /// How far a frame is heard; `None`: at any distance.
     pub range: Option<Range>,
-    /// Probability that a frame that is heard is heard a second time, 0 to 1.
+    /// Probability that the receiver hears a frame a second time, given that it hears the frame at all, 0 to 1.
     pub duplicate: f64,
 }
 
 impl ChannelModel {
-    /// No frame is heard from farther away, m; infinite unless the range is a hard limit.
+    /// Greatest distance at which a frame is heard, m; infinite unless the range is a hard limit.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         self.range.filter(|range| range.shadowing_db <= 0.0).map_or(f64::INFINITY, |range| range.half_m)
     }
 }
 
-/// How a delay is distributed.
+/// The probability distribution of a delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DelayModel {
-    /// Always its mean.
+    /// The delay always equals its mean.
     #[default]
     Fixed,
-    /// All values within √3 deviations of the mean alike.
+    /// Uniform within √3 standard deviations of the mean.
     Uniform,
-    /// Normal, of the part that is not negative: mean and deviation are those before that cut.
+    /// Normal, truncated to values at or above 0. Mean and standard deviation are those before the truncation.
     Normal,
-    /// Gamma: never negative, a long tail.
+    /// Gamma: never negative, with a long tail.
     Gamma,
 }
 
-/// Time on the air.
+/// The delay from transmission to reception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Delay {
-    /// Its distribution.
+    /// Distribution of the delay.
     pub model: DelayModel,
-    /// Its mean, s.
+    /// Mean, s.
     pub mean_s: f64,
-    /// Its standard deviation, s.
+    /// Standard deviation, s.
     pub jitter_s: f64,
 }
 
 impl Delay {
-    /// A delay, s; never negative. Nothing is drawn where nothing varies.
+    /// Draws a delay, s; never negative. `draws` is called only if the delay is random.
     pub(super) fn draw(&self, draws: impl FnOnce() -> KeyedRng) -> f64 {
         let Self { model, mean_s, jitter_s } = *self;
         match model {
@@ -74,16 +75,18 @@ impl Delay {
 /// How far a frame is heard: log-distance path loss with log-normal shadowing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
-    /// Distance at which half of all frames are heard, m; without shadowing none is beyond it, and all are within.
+    /// Distance at which half of all frames are heard, m. Without shadowing, all frames are heard up to this distance and
+    /// none beyond it.
     pub half_m: f64,
-    /// Standard deviation of the shadowing, dB, drawn anew for each frame; 0: a hard limit.
+    /// Standard deviation of the shadowing, dB. It is drawn anew for each frame. 0: the range is a hard limit.
     pub shadowing_db: f64,
-    /// Exponent of the path loss: 2 in free space, dimensionless.
+    /// Exponent of the path loss, dimensionless; 2 in free space.
     pub exponent: f64,
 }
 
 impl Range {
-    /// The share of frames heard over the square root of `square_m2`: Q(10 n log10(d/R) / σ).
+    /// Share of frames that are heard at the distance d = √`square_m2`, 0 to 1: Q(10 n log10(d/R) / σ). Here n is
+    /// `exponent`, R is `half_m` and σ is `shadowing_db`.
     #[must_use]
     pub fn heard(&self, square_m2: f64) -> f64 {
         let square = self.half_m * self.half_m;

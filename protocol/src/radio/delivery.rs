@@ -1,18 +1,19 @@
-//! What a receiver hears of a frame.
+//! The outcome of a frame at one receiver.
 
 use crate::drop_reason::DropReason;
 use crate::time::SimTime;
 
-/// What becomes of a frame at one receiver.
+/// Whether and when a receiver hears a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Delivery {
-    /// Not heard.
+    /// The receiver does not hear the frame, for this reason.
     Drop(DropReason),
-    /// Heard.
+    /// The receiver hears the frame.
     Deliver {
-        /// The receiver hears it in the first tick at or after this instant.
+        /// The receiver hears the frame in the first tick at or after this time.
         due: SimTime,
-        /// If set, the receiver hears it a second time, in the first tick at or after this instant, which is not before `due`.
+        /// If set, the receiver hears the frame a second time, in the first tick at or after this time. It is not before
+        /// `due`.
         again: Option<SimTime>,
     },
 }

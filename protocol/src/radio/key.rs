@@ -1,18 +1,19 @@
-//! Random numbers that depend on a key and on nothing else: no generator is shared, so it does not matter who asks first.
-//! Logarithms and powers are libm's, so that no bit depends on a platform's mathematics.
+//! Random numbers that depend only on a key. No generator is shared, so the order of the calls has no effect. Logarithms and
+//! powers come from the crate libm, so that every bit is the same on all platforms.
 
 use super::link::Link;
 use crate::ids::DroneId;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// Tries before a rejection method gives up; each of those here succeeds at least every second time.
+/// Number of attempts after which a rejection method gives up. For each method in this module, an attempt succeeds with a
+/// probability of at least one half.
 const TRIES: usize = 64;
 
-/// Numbers of one key, in their order.
+/// The sequence of random numbers of one key.
 pub(super) struct KeyedRng(u64);
 
 impl KeyedRng {
-    /// For one frame at one receiver; `purpose` keeps its draws apart from each other.
+    /// Numbers for one frame at one receiver. Different values of `purpose` give independent sequences.
     pub(crate) fn of_frame(seed: u64, link: Link, purpose: &[u8; 4]) -> Self {
         let mut key = [0; 20];
         key[..4].copy_from_slice(&link.source.0.to_le_bytes());
@@ -23,7 +24,7 @@ impl KeyedRng {
         Self(xxh3_64_with_seed(&key, seed))
     }
 
-    /// For two drones, in this order, and a number.
+    /// Numbers for an ordered pair of drones and a number. Different values of `purpose` give independent sequences.
     pub(crate) fn of_pair(seed: u64, pair: [DroneId; 2], number: i64, purpose: &[u8; 4]) -> Self {
         let mut key = [0; 20];
         key[..4].copy_from_slice(&pair[0].0.to_le_bytes());
@@ -33,19 +34,19 @@ impl KeyedRng {
         Self(xxh3_64_with_seed(&key, seed))
     }
 
-    /// Uniform in [0, 1). The first one is the key's hash itself.
+    /// Uniform in [0, 1). The first number is the hash of the key, scaled to this interval.
     pub(crate) fn unit(&mut self) -> f64 {
         let value = (self.0 >> 11) as f64 / (1u64 << 53) as f64;
         self.0 = mix(self.0.wrapping_add(0x9e37_79b9_7f4a_7c15));
         value
     }
 
-    /// Exponential.
+    /// Exponential with this mean.
     pub(crate) fn exponential(&mut self, mean: f64) -> f64 {
         -libm::log(1.0 - self.unit()) * mean
     }
 
-    /// Standard normal: Marsaglia's polar method.
+    /// Standard normal, by Marsaglia's polar method.
     pub(crate) fn normal(&mut self) -> f64 {
         for _ in 0..TRIES {
             let (x, y) = (2.0 * self.unit() - 1.0, 2.0 * self.unit() - 1.0);
@@ -57,13 +58,14 @@ impl KeyedRng {
         0.0
     }
 
-    /// Normal, of the part that is not negative; `mean` must not be negative either.
+    /// Normal, truncated to values at or above 0. `mean` and `deviation` are those before the truncation; `mean` must not be
+    /// negative.
     pub(crate) fn normal_above_zero(&mut self, mean: f64, deviation: f64) -> f64 {
         let mut draws = std::iter::repeat_with(|| mean + deviation * self.normal());
         draws.by_ref().take(TRIES).find(|&value| value >= 0.0).unwrap_or(mean)
     }
 
-    /// Gamma of this shape and scale 1: Marsaglia and Tsang's method.
+    /// Gamma with this shape and scale 1, by the method of Marsaglia and Tsang.
     pub(crate) fn gamma(&mut self, shape: f64) -> f64 {
         if shape < 1.0 {
             return self.gamma(shape + 1.0) * libm::pow(1.0 - self.unit(), 1.0 / shape);

@@ -1,30 +1,30 @@
-//! A frame on its way to one receiver.
+//! One frame and one of its receivers.
 
 use crate::frame::AirFrame;
 use crate::ids::DroneId;
 use crate::message::Topic;
 
-/// A frame and one of its receivers: the key of all random numbers about their link.
+/// Identifies one frame at one of its receivers. It is part of the key of every random number about that reception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
     /// The drone that sent the frame.
     pub source: DroneId,
-    /// The drone that receives it.
+    /// The drone that receives the frame.
     pub destination: DroneId,
     /// The frame's kind on the wire.
     pub topic: u16,
-    /// Running number of the source's frames.
+    /// Running number of the frame among the source's frames.
     pub sequence: u32,
 }
 
 impl Link {
-    /// A frame and one of its receivers.
+    /// The link of a frame to the receiver `destination`.
     #[must_use]
     pub fn of(frame: &AirFrame, destination: DroneId) -> Self {
         Self { source: frame.source, destination, topic: frame.frame.kind, sequence: frame.sequence }
     }
 
-    /// The topic, if the kind is known.
+    /// The frame's topic; `None` if its kind is unknown.
     #[must_use]
     pub fn topic(&self) -> Option<Topic> {
         Topic::from_wire(self.topic)

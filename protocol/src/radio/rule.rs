@@ -1,4 +1,4 @@
-//! Another air for some topics, some senders, some receivers.
+//! A different channel model for some topics, senders or receivers.
 
 use super::channel_model::ChannelModel;
 use super::link::Link;
@@ -7,33 +7,34 @@ use crate::message::Topic;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Another air for the frames that it is about: those that meet all of its conditions.
+/// A different channel model for the frames that meet all of the rule's conditions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
-    /// Of these topics; `None`: of all.
+    /// Topics of the frames; `None`: all topics.
     pub topics: Option<BTreeSet<Topic>>,
-    /// Sent by these drones; `None`: by all.
+    /// Drones that send the frames; `None`: all drones.
     pub from: Option<BTreeSet<DroneId>>,
-    /// At these receivers; `None`: at all.
+    /// Drones that receive the frames; `None`: all drones.
     pub to: Option<BTreeSet<DroneId>>,
-    /// What the air does to them.
+    /// The channel model for these frames.
     #[serde(rename = "air")]
     pub channel: ChannelModel,
 }
 
 impl Rule {
-    /// Whether it is about this topic, whoever sends and hears it.
+    /// Whether the rule's topics include this one, regardless of senders and receivers.
     #[must_use]
     pub fn is_about(&self, topic: Topic) -> bool {
         self.topics.as_ref().is_none_or(|set| set.contains(&topic))
     }
 
-    /// Whether it is about this frame. A frame of an unknown kind has no topic.
+    /// Whether the rule covers this frame at this receiver. A frame of an unknown kind has no topic, so a rule with a list of
+    /// topics does not cover it.
     #[must_use]
     pub fn covers(&self, link: Link) -> bool {
-        let among = |set: &Option<BTreeSet<DroneId>>, id| set.as_ref().is_none_or(|set| set.contains(&id));
-        among(&self.from, link.source)
-            && among(&self.to, link.destination)
+        let includes = |set: &Option<BTreeSet<DroneId>>, id| set.as_ref().is_none_or(|set| set.contains(&id));
+        includes(&self.from, link.source)
+            && includes(&self.to, link.destination)
             && self.topics.as_ref().is_none_or(|set| link.topic().is_some_and(|topic| set.contains(&topic)))
     }
 }

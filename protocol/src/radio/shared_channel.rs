@@ -1,25 +1,25 @@
-//! The bandwidth that all drones share: frames queue for the channel before they are on the air.
+//! The bandwidth that all drones share. Frames queue for the channel before they are transmitted.
 
 use crate::frame::{AirFrame, FRAME_PAYLOAD, NEVER_TRANSMITTED};
 use crate::time::SimTime;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// Bytes of a frame before its payload: kind, version, length.
+/// Size of a frame's kind, version and length, which precede its payload, bytes.
 const HEAD_BYTES: u64 = 8;
 
 /// A channel of finite bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedChannel {
-    /// Key of the order in which drones get the channel in a tick.
+    /// Key of the random order in which drones get the channel within a tick.
     pub seed: u64,
-    /// Bit rate that is left for frames, bit/s; positive.
+    /// Bit rate that is available for frames, bit/s; positive.
     pub rate_bps: f64,
-    /// A frame that would wait longer than this for the channel is not sent, s.
+    /// Longest time that a frame waits for the channel, s. A frame that would have to wait longer is not transmitted.
     pub limit_s: f64,
 }
 
 impl SharedChannel {
-    /// How long a frame takes the channel, ns.
+    /// Time for which a frame occupies the channel, ns.
     #[must_use]
     pub fn airtime_ns(&self, frame: &AirFrame) -> u64 {
         let bytes = HEAD_BYTES + u64::from(frame.frame.len).min(FRAME_PAYLOAD as u64);
@@ -27,11 +27,11 @@ impl SharedChannel {
     }
 }
 
-/// A channel and the frames that wait for it.
+/// A channel and the time until which earlier frames occupy it.
 #[derive(Clone, Debug)]
 pub struct ChannelQueue {
     channel: SharedChannel,
-    /// When the channel is free again.
+    /// Time at which the channel is free again.
     free: SimTime,
     order: Vec<usize>,
 }
@@ -43,8 +43,8 @@ impl ChannelQueue {
         Self { channel, free: SimTime::ZERO, order: Vec::new() }
     }
 
-    /// Queues all frames of one tick, sent at `sent`, behind those of earlier ticks: sets how long each waits and takes
-    /// the channel. Who comes first in a tick is drawn, one drone's frames stay in their order.
+    /// Queues all frames of one tick, sent at `sent`, behind the frames of earlier ticks. Sets [`AirFrame::queue_ns`] of each
+    /// frame. The order of the drones within a tick is random; the frames of one drone keep their order.
     pub fn schedule(&mut self, sent: SimTime, frames: &mut [AirFrame]) {
         let seed = self.channel.seed;
         self.order.clear();
