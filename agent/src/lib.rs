@@ -50,6 +50,7 @@ pub mod detection;
 pub mod emergency_route;
 pub mod escape;
 pub mod guidance;
+mod lone_flight;
 pub mod navigator;
 mod neighbour_table;
 mod params;
@@ -65,6 +66,8 @@ mod stale_formation;
 mod state_predictor;
 mod straggler;
 mod swarm_pilot;
+#[cfg(test)]
+mod test_params;
 mod tuning;
 pub mod visibility;
 

@@ -6,6 +6,7 @@ use crate::detection::Detection;
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::Escape;
 use crate::guidance::anchor;
+use crate::lone_flight::LoneFlight;
 use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
@@ -49,6 +50,7 @@ pub struct SwarmPilot {
     escape: Escape,
     straggler: Straggler,
     stale_formation: StaleFormation,
+    lone_flight: LoneFlight,
     silent: SilentDrones,
     neighbours: NeighbourTable,
     /// Boxed: only a leader that looks ahead has one, and the others would carry the memory for it through every tick.
@@ -77,6 +79,7 @@ impl SwarmPilot {
             escape: Escape::default(),
             straggler: Straggler::default(),
             stale_formation: StaleFormation::default(),
+            lone_flight: LoneFlight::new(params.drones, &params.planner),
             silent: SilentDrones::default(),
             neighbours: NeighbourTable::new(params.neighbours()),
             rollout: None,
@@ -240,7 +243,10 @@ impl SwarmPilot {
                 let wanted = self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity);
                 self.limit_on_sight(wanted, senses.now)
             }
-            _ => Vec2::new(guidance.speed_mps, 0.0),
+            _ => {
+                let peers = self.leading.peers();
+                Vec2::new(self.lone_flight.speed_mps(senses.now, senses.position, peers, &guidance), 0.0)
+            }
         }
     }
 

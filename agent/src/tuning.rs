@@ -38,6 +38,14 @@ pub(crate) const BACK_OUT_SPEED: f64 = 0.5;
 /// experiments/silence.toml`.
 pub(crate) const UNHEARD_S: f64 = 5.0;
 
+/// How far a drone without a task flies ahead of the last drone, as time at nominal speed, s; a headway per drone is added.
+/// Chosen by hand: the paper's longest passage takes half of it. `skein sweep experiments/wide-scenes.toml`.
+pub(crate) const LEAD_S: f64 = 60.0;
+
+/// How far beyond the goal a drone without a task waits, as time at nominal speed, s; a headway per drone is added. Chosen by
+/// hand: the length of a formation. `skein sweep experiments/wide-scenes.toml`.
+pub(crate) const OVERSHOOT_S: f64 = 10.0;
+
 /// Drift of a silent drone after which the corridor is drawn again, m. Chosen by hand.
 pub(crate) const REDRAW_DRIFT_M: f64 = 1.0;
 

@@ -1,17 +1,27 @@
 //! What a drone broadcasts, and when: its beacon, its plan, and repetitions of what others may have missed.
 
+use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::obstacles::{Obstacles, set_array, set_ids};
 use crate::own_state::OwnState;
+use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use skein_protocol::payload::{MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
-use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag};
+use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag};
+use std::collections::BTreeMap;
 
 /// The broadcasts of one drone: their periods, and what was said when.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Broadcaster {
+    me: DroneId,
     beacon_ticks: u64,
     repeat_s: f64,
+    /// When each known obstacle is said again.
+    obstacles: BTreeMap<ObstacleId, Gossip>,
+    /// When the passed sets are said again.
+    passed: Gossip,
+    /// The term that this drone obeyed in the last tick.
+    term: Ballot,
     /// Whether the first beacon was said.
     spoken: bool,
     next_repeat: SimTime,
@@ -29,20 +39,38 @@ struct Extent {
 }
 
 impl Broadcaster {
-    /// Nothing said yet, at the time `start`; a tick takes `dt_s`.
-    pub(crate) fn new(start: SimTime, dt_s: f64, beacon_period_s: f64, repeat_s: f64) -> Self {
+    /// Nothing said yet.
+    pub(crate) fn new(params: &LeadingParams) -> Self {
+        let (me, repeat_s) = (params.me, params.repeat_period_s);
         Self {
-            beacon_ticks: ((beacon_period_s / dt_s).round() as u64).max(1),
+            me,
+            beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
             repeat_s,
+            obstacles: BTreeMap::new(),
+            passed: Gossip::new(params.start, repeat_s, me),
+            term: Ballot::NONE,
             spoken: false,
-            next_repeat: start,
+            next_repeat: params.start,
             announced: PlanStamp::default(),
         }
     }
 
-    /// Makes the next repetition due at once: something new is known.
+    /// Makes the next repetition of plans due at once: there is a new one.
     pub(crate) fn hurry(&mut self) {
         self.next_repeat = SimTime::ZERO;
+    }
+
+    /// Notes that another drone has said an obstacle.
+    pub(crate) fn hear_obstacle(&mut self, id: ObstacleId) {
+        if let Some(gossip) = self.obstacles.get_mut(&id) {
+            gossip.hear();
+        }
+    }
+
+    /// Repeats all facts soon: a drone that may not know them can be heard (again).
+    pub(crate) fn restart_gossip(&mut self, now: SimTime) {
+        self.obstacles.values_mut().for_each(|gossip| gossip.restart(now));
+        self.passed.restart(now);
     }
 
     /// Says what is due; `places` are this drone's places in queues. Call once per tick.
@@ -57,13 +85,38 @@ impl Broadcaster {
         if self.beacon_due(own.tick, k.me()) {
             say.push(Message::Pose(pose(k, now, own, places)));
         }
-        if !self.repeat_due(now) {
-            return;
+        if std::mem::replace(&mut self.term, k.election().obeyed()) != k.election().obeyed() {
+            // The new leader may not know.
+            self.restart_gossip(now);
         }
-        say_obstacles(k, say);
-        say_passed(k, now, own, say);
-        if k.election().leads() {
+        // Plans come first. Where bandwidth is short, the first frames of a tick are those that are transmitted.
+        if self.repeat_due(now) && k.election().leads() {
             self.say_plans(k, now, say);
+        }
+        self.say_obstacles(k, now, say);
+        if self.passed.is_due(now) {
+            say_passed(k, now, own, say);
+        }
+    }
+
+    /// Says the obstacles that are due and that no plan covers yet, so that the leader learns what any member senses. A drone
+    /// says what it has sensed first at once.
+    fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, say: &mut Vec<Message>) {
+        if self.obstacles.len() < k.obstacles().count() {
+            for (id, known) in k.obstacles().iter() {
+                let (me, repeat_s) = (self.me, self.repeat_s);
+                self.obstacles.entry(id).or_insert_with(|| {
+                    if known.witness == me {
+                        say.extend(obstacle(k.obstacles(), id));
+                    }
+                    Gossip::new(now, repeat_s, me)
+                });
+            }
+        }
+        for (&id, gossip) in &mut self.obstacles {
+            if gossip.is_due(now) && is_open(k, id) {
+                say.extend(obstacle(k.obstacles(), id));
+            }
         }
     }
 
@@ -120,12 +173,9 @@ fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_P
     }
 }
 
-/// Repeats the obstacles that no plan covers yet, so that the leader learns what any member senses.
-fn say_obstacles(k: &Knowledge, say: &mut Vec<Message>) {
-    let planned = |id: ObstacleId| k.ledger().sets().iter().any(|set| set.ids.contains(&id));
-    let known = k.obstacles().iter().map(|(id, _)| id);
-    let open = known.filter(|&id| !planned(id) && !k.obstacles().has_passed(k.me(), id));
-    say.extend(open.filter_map(|id| obstacle(k.obstacles(), id)));
+/// Whether no plan covers an obstacle yet and this drone still has to pass it.
+fn is_open(k: &Knowledge, id: ObstacleId) -> bool {
+    !k.obstacles().has_passed(k.me(), id) && !k.ledger().sets().iter().any(|set| set.ids.contains(&id))
 }
 
 /// Says which sets this drone has passed, until the swarm re-forms.

@@ -164,6 +164,11 @@ impl Knowledge {
         self.election.leads() && peers.peek().is_some() && peers.all(|(_, pose)| pose.term != self.election.obeyed())
     }
 
+    /// Whether a beacon comes from a drone that may have missed what others said: from a new process, or after a silence.
+    pub(crate) fn is_back(&self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
+        self.peers.last_of_living(source, now).is_none_or(|last| last.incarnation != pose.incarnation)
+    }
+
     /// Hears a beacon. Returns whether it shows a plan of this leader's term that this leader never made.
     pub(crate) fn hear_pose(&mut self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
         self.peers.hear(now, source, *pose);
@@ -283,8 +288,14 @@ impl Knowledge {
         self.join(now);
     }
 
-    /// Tells the election which group this drone is in.
+    /// Tells the election which group this drone is in, and notes what all drones have passed.
     fn join(&mut self, now: SimTime) {
+        let ended = self.ledger.take_ended();
+        if !ended.is_empty() {
+            for drone in 0..self.drones {
+                self.obstacles.note_passed(DroneId(drone), &ended);
+            }
+        }
         let group = self.ledger.group();
         self.election.handle(now, 0, Input::Joined(group));
     }

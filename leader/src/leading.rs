@@ -49,7 +49,7 @@ impl Leading {
             roles: Roles::default(),
             membership: Membership::default(),
             planner: Planner::new(params.drones, params.repeat_period_s),
-            broadcaster: Broadcaster::new(params.start, params.dt_s, params.beacon_period_s, params.repeat_period_s),
+            broadcaster: Broadcaster::new(params),
         }
     }
 
@@ -198,11 +198,17 @@ impl Leading {
         }
         match message.into() {
             MessageRef::Pose(pose) => {
+                if self.knowledge.is_back(now, source, pose) {
+                    self.broadcaster.restart_gossip(now);
+                }
                 if self.knowledge.hear_pose(now, source, pose) {
                     self.roles.note_plan_conflict();
                 }
             }
-            MessageRef::Obstacle(o) => _ = self.knowledge.learn(now, o.id, o.shape, o.witness),
+            MessageRef::Obstacle(o) => {
+                self.knowledge.learn(now, o.id, o.shape, o.witness);
+                self.broadcaster.hear_obstacle(o.id);
+            }
             MessageRef::Leadership(l) => {
                 say.extend(self.knowledge.hear_leadership(now, source, l).map(Message::Leadership));
             }
@@ -215,11 +221,7 @@ impl Leading {
 
     /// Senses a whole obstacle, world frame. Returns whether it is new.
     pub fn sense(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape) -> bool {
-        let new = self.knowledge.learn(now, id, shape, self.knowledge.me());
-        if new {
-            self.broadcaster.hurry();
-        }
-        new
+        self.knowledge.learn(now, id, shape, self.knowledge.me())
     }
 
     /// Sets whether a sensor of this drone is broken. An impaired drone leads only while no healthy one can.

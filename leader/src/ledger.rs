@@ -9,7 +9,7 @@ use crate::routes::{RouteParams, Routes};
 use bytemuck::Zeroable;
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
-use skein_protocol::{Ballot, DroneId, GroupId, Phase, PlanStamp};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp};
 
 /// The ledger of one drone. Memory is bounded by the size of the swarm and of an obstacle set.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub struct Ledger {
     /// The plan of an earlier leader that split the group, if this drone obeys a plan for a part.
     origin: Option<PlanBundle>,
     sets: Vec<PlannedSet>,
+    /// The obstacles of sets that a formation of the whole swarm has ended. Its leader knew that all drones had passed them.
+    ended: Vec<ObstacleId>,
     /// Hash of `mine`.
     part_hash: u64,
 }
@@ -48,6 +50,7 @@ impl Ledger {
             mine: None,
             origin: None,
             sets: Vec::new(),
+            ended: Vec::new(),
             part_hash: 0,
         }
     }
@@ -129,6 +132,12 @@ impl Ledger {
     #[must_use]
     pub fn sets(&self) -> &[PlannedSet] {
         &self.sets
+    }
+
+    /// Takes the obstacles that all drones have passed: those of the sets that a formation of the whole swarm has ended since
+    /// the last call.
+    pub fn take_ended(&mut self) -> Vec<ObstacleId> {
+        std::mem::take(&mut self.ended)
     }
 
     /// Hash of this drone's assignment: equal stamps must mean equal hashes. 0 before the first plan.
@@ -224,7 +233,8 @@ impl Ledger {
             self.sets.push(PlannedSet { ids, tag, stamp, made, members, scope, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));
         } else {
-            self.sets.clear();
+            let ended = self.sets.drain(..).filter(|_| plan.phase() == Phase::Reform && plan.group == GroupId::ALL);
+            self.ended.extend(ended.flat_map(|set| set.ids));
         }
         let parts = std::mem::take(&mut self.parts);
         let before = self.obeyed.replace(PlanBundle { plan, parts });

@@ -5,6 +5,7 @@ use crate::avoidance;
 use crate::formation_planner::FormationPlanner;
 use crate::joint_planner::JointPlanner;
 use crate::plan_bundle::PlanBundle;
+use crate::plan_pace::PlanPace;
 use crate::situation::Situation;
 use crate::survey::Survey;
 use crate::task::{Task, learnt};
@@ -16,6 +17,7 @@ use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime};
 pub(crate) struct Planner {
     joint: JointPlanner,
     formation: FormationPlanner,
+    pace: PlanPace,
     /// Index of the alternative, of those decided on last, that is flown until a choice is made.
     interim: usize,
 }
@@ -23,7 +25,8 @@ pub(crate) struct Planner {
 impl Planner {
     /// A planner that has decided nothing yet, in a swarm of `drones`. Questions are repeated every `repeat_s`.
     pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
-        Self { joint: JointPlanner::new(drones, repeat_s), formation: FormationPlanner::default(), interim: 0 }
+        let joint = JointPlanner::new(drones, repeat_s);
+        Self { joint, formation: FormationPlanner::default(), pace: PlanPace::default(), interim: 0 }
     }
 
     /// Hears when a drone of another group can be where.
@@ -45,8 +48,12 @@ impl Planner {
         }
         match Task::next(s) {
             Task::Avoid(set) => {
-                let due = s.now.since(learnt(s, &set)) >= s.params.debounce_s;
-                due.then(|| self.avoid(s, &set, say)).flatten().unwrap_or_default()
+                let due = s.now.since(learnt(s, &set)) >= s.params.debounce_s && self.pace.allows(s, &set);
+                let bundles = due.then(|| self.avoid(s, &set, say)).flatten().unwrap_or_default();
+                if !bundles.is_empty() {
+                    self.pace.note(s, &set);
+                }
+                bundles
             }
             Task::Form if s.scope == GroupId::ALL => self.formation.decide(s).into_iter().collect(),
             Task::Wait | Task::Form => Vec::new(),

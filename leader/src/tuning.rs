@@ -39,6 +39,14 @@ pub(crate) const BEHIND_S: f64 = 3.0;
 /// it, s. 4. By hand.
 pub(crate) const LEFT_OUT_S: f64 = 4.0;
 
+// ---- Rate of plans (`plan_pace.rs`) ----
+
+/// Least time between two plans of one leader for the same set, s. The message delay is added twice, so that the members'
+/// beacons can show the first plan before the second is made. 0.5. By hand: a few beacon periods.
+pub(crate) const PLAN_INTERVAL_S: f64 = 0.5;
+/// How often that time is doubled at most while the members stay the same. No unit. 4: at most 8 s without delay. By hand.
+pub(crate) const MAX_PLAN_DOUBLINGS: u32 = 4;
+
 // ---- Joint planning (`joint_planner.rs`, `plan_exchange.rs`, `planner.rs`) ----
 
 /// A leader waits this long for the arrivals of other groups and then plans alone, s. The message delay is added twice.
@@ -58,6 +66,15 @@ pub(crate) const INTERIM_RULE_SAVING: f64 = 0.2;
 /// Most groupings that are handed to a rollout, the shortest paths and the rule's among them. 16. By hand: what a second
 /// of rollouts suffices for.
 pub(crate) const MAX_CANDIDATES: usize = 16;
+
+// ---- Gossip (`gossip.rs`), after Trickle, RFC 6206 ----
+
+/// A drone that hears a fact this often within an interval does not repeat it. No unit. 3. RFC 6206, section 6.2, names values
+/// between 1 and 5; `skein sweep experiments/presets.toml`.
+pub(crate) const REDUNDANCY: u32 = 3;
+/// How often the shortest interval between repetitions is doubled at most. No unit. 3: with the default period that is 1.6 s.
+/// By hand; `skein sweep experiments/presets.toml`.
+pub(crate) const MAX_GOSSIP_DOUBLINGS: u32 = 3;
 
 // ---- Formation (`formation_planner.rs`) ----
 

@@ -35,6 +35,6 @@ impl<'s> DroneFactory<'s> {
     }
 
     fn beacon_ticks(&self) -> u64 {
-        (self.scenario.protocol.beacon_period_s / self.scenario.time.dt_s).round() as u64
+        (self.scenario.beacon_period_s() / self.scenario.time.dt_s).round() as u64
     }
 }

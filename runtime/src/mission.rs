@@ -112,7 +112,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         velocity_gain_per_s: scenario.guidance.velocity_gain_per_s,
         precedence_share: scenario.guidance.precedence_share,
         queue: scenario.guidance.queue,
-        beacon_period_s: protocol.beacon_period_s,
+        beacon_period_s: scenario.beacon_period_s(),
         repeat_period_s: protocol.repeat_period_s,
         peer_timeout_s: protocol.peer_timeout_s,
     }

@@ -15,7 +15,8 @@ fn assert_reached(name: &str, strategy: &str) {
     assert!(clearance_m >= scenario.avoidance.clearance_m, "{name}: {clearance_m} m to an obstacle");
 }
 
-const SWARMS: [&str; 6] = ["defaults", "column", "reform-blind", "gap-crush", "in-sight-at-start", "obstacle-hit"];
+const SWARMS: [&str; 7] =
+    ["defaults", "column", "reform-blind", "gap-crush", "in-sight-at-start", "obstacle-hit", "plan-storm"];
 
 #[test]
 fn a_single_drone_finds_its_path() {

@@ -306,9 +306,10 @@ impl Default for Avoidance {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
-    /// Time between two pose beacons of a drone.
+    /// Time between two pose beacons of a drone. Default: 0.1 s. Where `radio.rate_bps` limits the bandwidth, the default is longer
+    /// if the beacons of all drones would take more than a quarter of it, up to a third of `peer_timeout_s`.
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
-    pub beacon_period_s: f64,
+    pub beacon_period_s: Option<f64>,
     /// Time between two heartbeats of a leader; at most `leader_timeout_s`.
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
     pub heartbeat_period_s: f64,
@@ -332,7 +333,7 @@ pub struct Protocol {
 impl Default for Protocol {
     fn default() -> Self {
         Self {
-            beacon_period_s: 0.1,
+            beacon_period_s: None,
             heartbeat_period_s: 0.2,
             repeat_period_s: 0.2,
             election_wait_s: 0.2,

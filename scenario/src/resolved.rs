@@ -6,11 +6,17 @@ use crate::parse::{self, ScenarioSource};
 use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
-use skein_protocol::radio::{Radio, SharedChannel};
+use skein_protocol::payload::Pose;
+use skein_protocol::radio::{HEAD_BYTES, Radio, SharedChannel};
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
 /// Gravity as in the paper, m/s².
 const GRAVITY_MPS2: f64 = 9.81;
+
+/// Default of `protocol.beacon_period_s` where bandwidth is no limit, s.
+const BEACON_PERIOD_S: f64 = 0.1;
+/// Greatest share of the bandwidth that the beacons of all drones take by default.
+const BEACON_SHARE: f64 = 0.25;
 
 impl Scenario {
     /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`. They
@@ -104,6 +110,17 @@ impl Scenario {
         let late_m = 2.0 * top_mps * (drone.reaction_time_s + 2.0 * self.time.dt_s);
         let enough_m = 1.01 * drone.safe_distance_m + top_mps.powi(2) / drone.acceleration_max_mps2 + late_m;
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))
+    }
+
+    /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or [`BEACON_PERIOD_S`], or longer where the beacons of
+    /// all drones would take more than [`BEACON_SHARE`] of the bandwidth.
+    #[must_use]
+    pub fn beacon_period_s(&self) -> f64 {
+        let frame_bits = 8.0 * (HEAD_BYTES as f64 + size_of::<Pose>() as f64);
+        let share_bps = self.radio.rate_bps.map_or(f64::INFINITY, |rate_bps| BEACON_SHARE * rate_bps);
+        let least_s = f64::from(self.formation.drones) * frame_bits / share_bps;
+        let longest_s = BEACON_PERIOD_S.max(self.protocol.peer_timeout_s / 3.0);
+        self.protocol.beacon_period_s.unwrap_or_else(|| least_s.clamp(BEACON_PERIOD_S, longest_s))
     }
 
     /// The radio of the scenario: delay, loss, range and copies, keyed by the seed.

@@ -112,8 +112,10 @@ impl Rules<'_> {
         let p = &self.scenario.protocol;
         let heartbeat = ("protocol.heartbeat_period_s", p.heartbeat_period_s);
         self.at_most(heartbeat, ("protocol.leader_timeout_s", p.leader_timeout_s), "s");
-        let beacon = ("protocol.beacon_period_s", p.beacon_period_s);
-        self.at_most(beacon, ("protocol.peer_timeout_s", p.peer_timeout_s), "s");
+        let peer_timeout = ("protocol.peer_timeout_s", p.peer_timeout_s);
+        if let Some(beacon_s) = p.beacon_period_s {
+            self.at_most(("protocol.beacon_period_s", beacon_s), peer_timeout, "s");
+        }
     }
 
     fn mission(&mut self) {

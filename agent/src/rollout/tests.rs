@@ -2,13 +2,10 @@
 
 use super::*;
 use crate::pilot::{Command, Heard, Pilot};
+use crate::test_params::planner;
 use bytemuck::Zeroable;
-use skein_leader::params::{Destination, PlannerParams, Strategy};
 use skein_leader::roster::Roster;
-use skein_leader::routes::RouteParams;
-use skein_leader::slots::Reformation;
 use skein_protocol::downlink::Senses;
-use skein_protocol::formation::Shape;
 use skein_protocol::payload::{Assignment, Plan};
 use skein_protocol::{Message, PlanStamp, Vec2};
 
@@ -69,20 +66,7 @@ fn params() -> RolloutParams {
         ranging_m: 60.0,
         speed_mps: 10.0,
         reform_speed_max_mps: 15.0,
-        planner: PlannerParams {
-            strategy: Strategy::PaperRule,
-            speed_mps: 10.0,
-            headway_s: 4.0,
-            routes: RouteParams { clearance_m: 15.0, planning_distance_m: 40.0 },
-            shape: Shape::Line,
-            spacing_m: 40.0,
-            reformation: Reformation::Identity,
-            arrival_error_m: 1.0,
-            safe_distance_m: 30.0,
-            course_y_m: 0.0,
-            destination: Destination::Goal { front_m: Vec2::new(100.0, 0.0) },
-            debounce_s: 0.1,
-        },
+        planner: planner(),
     }
 }
 

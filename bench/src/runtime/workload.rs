@@ -36,7 +36,7 @@ impl Workload {
         let window = ticks.unwrap_or(if quick { window / 3 } else { window });
         let until = WARM_UP_TICKS + window;
         let scenario = scenario(drones, until + COOL_DOWN_TICKS)?;
-        let beacons = f64::from(drones) * scenario.time.dt_s / scenario.protocol.beacon_period_s;
+        let beacons = f64::from(drones) * scenario.time.dt_s / scenario.beacon_period_s();
         let heard =
             if drones < LIMITED_RANGE_DRONES { beacons } else { beacons.min(8.0 * beacons / f64::from(drones)) };
         let senses = size_of::<SensesHeader>() + 4 * size_of::<SensedNeighbour>();

@@ -17,7 +17,7 @@ pub use channel_model::{ChannelModel, Delay, DelayModel, Range};
 pub use delivery::Delivery;
 pub use link::Link;
 pub use rule::Rule;
-pub use shared_channel::{ChannelQueue, SharedChannel};
+pub use shared_channel::{ChannelQueue, HEAD_BYTES, SharedChannel};
 
 use crate::Vec2;
 use crate::frame::AirFrame;

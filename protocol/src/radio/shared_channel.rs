@@ -5,7 +5,7 @@ use crate::time::SimTime;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Size of a frame's kind, version and length, which precede its payload, bytes.
-const HEAD_BYTES: u64 = 8;
+pub const HEAD_BYTES: u64 = 8;
 
 /// A channel of finite bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]

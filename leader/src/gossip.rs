@@ -1,0 +1,92 @@
+//! When a fact is repeated that any drone may have missed: the Trickle algorithm (RFC 6206).
+//!
+//! The time between two repetitions doubles as long as nothing changes. A drone that hears the fact often enough from others
+//! does not repeat it in that interval. A change, such as a drone that is heard again after a silence, starts with the
+//! shortest interval. So a fact spreads at once, and a swarm that agrees says little.
+
+use crate::tuning::{MAX_GOSSIP_DOUBLINGS, REDUNDANCY};
+use skein_protocol::{DroneId, SimTime};
+
+/// The repetitions of one fact by one drone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gossip {
+    shortest_s: f64,
+    /// Point within the second half of each interval at which this drone speaks, 0 to 1. It differs between drones.
+    phase: f64,
+    /// How often the shortest interval has been doubled.
+    doublings: u32,
+    /// Start of the present interval.
+    since: SimTime,
+    /// How often the fact was heard in the present interval.
+    heard: u32,
+    /// Whether this drone has had its turn in the present interval.
+    over: bool,
+}
+
+impl Gossip {
+    /// A fact that drone `me` learnt at `now`. Its first interval lasts `shortest_s`.
+    pub(crate) fn new(now: SimTime, shortest_s: f64, me: DroneId) -> Self {
+        // Multiples of the golden ratio spread the drones evenly, whatever their number is.
+        let phase = (f64::from(me.0) * 0.618_033_988_749_894_9).fract();
+        Self { shortest_s, phase, doublings: 0, since: now, heard: 0, over: false }
+    }
+
+    /// Starts again with the shortest interval: some drone may not know the fact.
+    pub(crate) fn restart(&mut self, now: SimTime) {
+        *self = Self { doublings: 0, since: now, heard: 0, over: false, ..*self };
+    }
+
+    /// Notes that another drone has said the fact.
+    pub(crate) fn hear(&mut self) {
+        self.heard = self.heard.saturating_add(1);
+    }
+
+    /// Whether this drone says the fact now. Call once per tick.
+    pub(crate) fn is_due(&mut self, now: SimTime) -> bool {
+        let length_s = self.shortest_s * f64::from(1_u32 << self.doublings);
+        let age_s = now.since(self.since);
+        let turn = !self.over && age_s >= length_s * (0.5 + 0.5 * self.phase);
+        let due = turn && self.heard < REDUNDANCY;
+        self.over |= turn;
+        if age_s >= length_s {
+            let doublings = (self.doublings + 1).min(MAX_GOSSIP_DOUBLINGS);
+            *self = Self { doublings, since: now, heard: 0, over: false, ..*self };
+        }
+        due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn says(gossip: &mut Gossip, from_s: f64, to_s: f64) -> Vec<f64> {
+        let ticks = (from_s * 50.0).round() as u32..(to_s * 50.0).round() as u32;
+        let due = ticks.filter(|tick| gossip.is_due(SimTime::from_secs(f64::from(*tick) / 50.0)));
+        due.map(|tick| f64::from(tick) / 50.0).collect()
+    }
+
+    #[test]
+    fn a_drone_that_hears_no_other_repeats_less_and_less_often() {
+        let mut gossip = Gossip::new(SimTime::ZERO, 0.2, DroneId(0));
+        let said = says(&mut gossip, 0.0, 20.0);
+        assert!(said[0] < 0.2 && (12..=16).contains(&said.len()), "{said:?}");
+        assert!(said.windows(2).all(|two| two[1] - two[0] < 1.5 * 0.2 * f64::from(1_u32 << MAX_GOSSIP_DOUBLINGS)));
+    }
+
+    #[test]
+    fn a_fact_that_is_heard_often_is_not_repeated() {
+        let mut gossip = Gossip::new(SimTime::ZERO, 0.2, DroneId(1));
+        (0..REDUNDANCY).for_each(|_| gossip.hear());
+        assert_eq!(says(&mut gossip, 0.0, 0.22), Vec::<f64>::new());
+        assert!(!says(&mut gossip, 0.22, 0.7).is_empty(), "the next interval counts anew");
+    }
+
+    #[test]
+    fn after_a_restart_the_shortest_interval_comes_first() {
+        let mut gossip = Gossip::new(SimTime::ZERO, 0.2, DroneId(2));
+        says(&mut gossip, 0.0, 30.0);
+        gossip.restart(SimTime::from_secs(30.0));
+        assert!(says(&mut gossip, 30.0, 30.22).len() == 1);
+    }
+}
