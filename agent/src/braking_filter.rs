@@ -22,8 +22,10 @@ pub struct BrakingFilterParams {
     pub safe_distance_m: f64,
     /// Least distance of a drone's centre to an obstacle, m.
     pub clearance_m: f64,
-    /// Greatest acceleration, m/s². It is also the deceleration of a drone that brakes fully.
+    /// Greatest acceleration, m/s².
     pub acceleration_max_mps2: f64,
+    /// Deceleration of a drone that brakes fully, m/s²; at most the greatest acceleration.
+    pub braking_mps2: f64,
     /// Greatest speed of any drone, m/s.
     pub speed_max_mps: f64,
     /// Length of a tick, s.
@@ -83,8 +85,14 @@ impl BrakingFilterParams {
         ((8.0 * self.margin_m() / bend).sqrt() / self.dt_s).max(1.0) as u32
     }
 
+    /// The distance that two drones keep if commands take effect `lag` ticks late, m.
+    pub(crate) fn keep_m(&self, lag: u32) -> f64 {
+        let late_s = f64::from(lag) * self.dt_s;
+        self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
+    }
+
     fn law(&self) -> BrakingLaw {
-        BrakingLaw { deceleration_mps2: self.acceleration_max_mps2, dt_s: self.dt_s }
+        BrakingLaw { deceleration_mps2: self.braking_mps2, dt_s: self.dt_s }
     }
 
     /// Greatest speed from which a drone stops within `room_m`, m/s. The drone flies on at this speed for `lag` + 2 ticks before
@@ -92,7 +100,7 @@ impl BrakingFilterParams {
     #[must_use]
     pub fn speed_within_mps(&self, room_m: f64, lag: u32) -> f64 {
         let late_s = f64::from(lag + 2) * self.dt_s;
-        let brake = self.acceleration_max_mps2;
+        let brake = self.braking_mps2;
         (brake * late_s).hypot((2.0 * brake * room_m.max(0.0)).sqrt()) - brake * late_s
     }
 
@@ -101,7 +109,7 @@ impl BrakingFilterParams {
     fn reach_m(&self, speed_squared: f64) -> f64 {
         let step_mps = self.acceleration_max_mps2 * self.dt_s;
         let speed_mps = speed_squared.sqrt() + step_mps;
-        speed_mps * speed_mps / (2.0 * self.acceleration_max_mps2) + speed_mps * self.dt_s
+        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * self.dt_s
     }
 }
 
@@ -190,12 +198,8 @@ impl BrakingFilter {
 
     /// Acceleration of full braking, m/s². It stops the drone exactly in the last tick.
     fn braking(&self, velocity: Vec2) -> Vec2 {
-        let (speed, step) = (velocity.norm(), self.params.acceleration_max_mps2 * self.params.dt_s);
-        if speed > step {
-            velocity * (-self.params.acceleration_max_mps2 / speed)
-        } else {
-            -velocity / self.params.dt_s
-        }
+        let (speed, step) = (velocity.norm(), self.params.braking_mps2 * self.params.dt_s);
+        if speed > step { velocity * (-self.params.braking_mps2 / speed) } else { -velocity / self.params.dt_s }
     }
 
     /// Samples the braking paths of this drone and of each neighbour that some command could bring too close.
@@ -203,9 +207,7 @@ impl BrakingFilter {
         let params = self.params;
         self.samples.clear();
         self.ends.clear();
-        let late_s = f64::from(own.lag) * params.dt_s;
-        let late_m = late_s * (1.0 + params.acceleration_max_mps2 * late_s);
-        let keep_m = params.safe_distance_m + params.margin_m() + late_m;
+        let keep_m = params.keep_m(own.lag);
         let (own_speed2, limit) = (own.velocity.norm_squared(), params.acceleration_max_mps2);
         let own_reach_m = params.reach_m(own_speed2);
         let path = BrakingPath::new(Vec2::zeros(), own.velocity, params.law());
@@ -217,7 +219,7 @@ impl BrakingFilter {
             }
             // Full braking is a projection, and projections do not increase distances. So the distance of two braking
             // paths changes by at most the relative speed times the time until both drones are at rest.
-            let stop_s = own_speed2.max(speed2).sqrt() / limit + 2.0 * params.dt_s;
+            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
             let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.velocity).norm() * stop_s;
             if SHARE * room_m >= 2.0 * limit * params.dt_s * stop_s {
                 continue;
@@ -325,7 +327,7 @@ struct Hit {
 impl BrakingFilterParams {
     /// Speed limit after this tick, m/s. It is never lower than the speed that full braking reaches.
     fn speed_limit_mps(&self, own: &OwnMotion) -> f64 {
-        let braked = own.velocity.norm() - self.acceleration_max_mps2 * self.dt_s;
+        let braked = own.velocity.norm() - self.braking_mps2 * self.dt_s;
         own.speed_limit_mps.min(self.speed_max_mps).max(braked)
     }
 
@@ -359,6 +361,12 @@ struct Nearest {
 /// Distance between a segment and the core of a shape, m. Negative if the segment enters the core.
 pub(crate) fn core_distance_m(shape: &ConvexShape, from: Vec2, to: Vec2) -> f64 {
     segment_to_core(shape, from, to).distance_m
+}
+
+/// Distance between a segment and a shape, m. Negative if the segment enters the shape.
+#[must_use]
+pub fn distance_m(shape: &ConvexShape, from: Vec2, to: Vec2) -> f64 {
+    core_distance_m(shape, from, to) - shape.radius_m
 }
 
 /// Finds the segment's point nearest to the core of a shape. The core is the polygon of the shape's vertices, without the

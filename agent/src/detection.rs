@@ -3,14 +3,11 @@
 use skein_protocol::Vec2;
 use skein_protocol::downlink::SensedObstacle;
 
-/// Standard gravity, m/s².
-pub const GRAVITY_MPS2: f64 = 9.81;
-
 /// Constants of the vehicle that determine its stopping distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Braking {
-    /// c_d of equation 3, dimensionless, > 0.
-    pub drag_coefficient: f64,
+    /// Deceleration of full braking, m/s², > 0: g c_d of equation 3, at most the drone's greatest acceleration.
+    pub deceleration_mps2: f64,
     /// Reaction time t_c of equation 4, s.
     pub reaction_time_s: f64,
 }
@@ -50,10 +47,10 @@ impl Braking {
         if speed_mps > 0.0 { distance_m / speed_mps } else { f64::INFINITY }
     }
 
-    /// Braking distance d_b = v² / (2 g c_d) (equation 3), m.
+    /// Braking distance d_b (equation 3), m: v² / (2 g c_d), where g c_d is at most the drone's greatest acceleration.
     #[must_use]
     pub fn braking_m(&self, speed_mps: f64) -> f64 {
-        speed_mps * speed_mps / (2.0 * GRAVITY_MPS2 * self.drag_coefficient)
+        speed_mps * speed_mps / (2.0 * self.deceleration_mps2)
     }
 
     /// Reaction distance d_r = v t_c (equation 4), m.
@@ -82,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_detection_has_distance_bearing_time_to_impact_and_danger() {
-        let braking = Braking { drag_coefficient: 5.0 / GRAVITY_MPS2, reaction_time_s: 0.0 };
+        let braking = Braking { deceleration_mps2: 5.0, reaction_time_s: 0.0 };
         let obstacle = |nearest_m: [f64; 2]| {
             let distance_m = Vec2::from(nearest_m).norm();
             SensedObstacle { nearest_m, distance_m, shape: 0, reserved: 0 }
@@ -99,7 +96,7 @@ mod tests {
 
     #[test]
     fn equations_one_to_four() {
-        let braking = Braking { drag_coefficient: 5.0 / GRAVITY_MPS2, reaction_time_s: 0.5 };
+        let braking = Braking { deceleration_mps2: 5.0, reaction_time_s: 0.5 };
         assert_eq!(Braking::time_to_impact_s(90.0, 10.0), 9.0);
         assert!((braking.braking_m(10.0) - 10.0).abs() < 1e-12);
         assert_eq!(braking.reaction_m(10.0), 5.0);

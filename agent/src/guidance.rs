@@ -13,8 +13,8 @@ pub struct GuidanceParams {
     pub speed_change_mps: f64,
     /// Largest speed while a drone approaches its slot, m/s.
     pub reform_speed_max_mps: f64,
-    /// Largest acceleration, m/s².
-    pub acceleration_max_mps2: f64,
+    /// Deceleration of full braking, m/s².
+    pub braking_mps2: f64,
 }
 
 /// The anchor of a plan at `now`: position (world frame, m) and velocity (m/s). It moves with the plan's velocity from
@@ -30,7 +30,7 @@ impl GuidanceParams {
     #[must_use]
     pub fn to_slot(&self, offset: Vec2, slot_velocity: Vec2) -> Vec2 {
         let distance = offset.norm();
-        let closing = (APPROACH_PER_S * distance).min((self.acceleration_max_mps2 * distance).sqrt());
+        let closing = (APPROACH_PER_S * distance).min((self.braking_mps2 * distance).sqrt());
         let mut wanted = slot_velocity;
         if distance > 1e-9 {
             wanted += offset * (closing / distance);
@@ -66,12 +66,8 @@ mod tests {
 
     #[test]
     fn a_slot_is_approached_no_faster_than_the_drone_can_brake() {
-        let guidance = GuidanceParams {
-            speed_mps: 10.0,
-            speed_change_mps: 5.0,
-            reform_speed_max_mps: 15.0,
-            acceleration_max_mps2: 5.0,
-        };
+        let guidance =
+            GuidanceParams { speed_mps: 10.0, speed_change_mps: 5.0, reform_speed_max_mps: 15.0, braking_mps2: 5.0 };
         assert!((guidance.to_slot(Vec2::new(0.0, 1.0), Vec2::zeros()) - Vec2::new(0.0, 0.8)).norm() < 1e-12);
         assert!((guidance.to_slot(Vec2::new(20.0, 0.0), Vec2::zeros()).norm() - 10.0).abs() < 1e-12);
         assert!((guidance.to_slot(Vec2::new(900.0, 0.0), Vec2::zeros()).norm() - 15.0).abs() < 1e-12);

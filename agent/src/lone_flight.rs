@@ -48,7 +48,7 @@ impl LoneFlight {
             self.last_x_m = living.fold(f64::INFINITY, f64::min);
         }
         let room_m = (self.last_x_m + self.lead_m).min(self.limit_x_m) - position.x;
-        (guidance.acceleration_max_mps2 * room_m.max(0.0)).sqrt().min(guidance.speed_mps)
+        (guidance.braking_mps2 * room_m.max(0.0)).sqrt().min(guidance.speed_mps)
     }
 }
 
@@ -59,12 +59,8 @@ mod tests {
     use skein_protocol::DroneId;
     use skein_protocol::payload::Pose;
 
-    const GUIDANCE: GuidanceParams = GuidanceParams {
-        speed_mps: 10.0,
-        speed_change_mps: 5.0,
-        reform_speed_max_mps: 10.0,
-        acceleration_max_mps2: 5.0,
-    };
+    const GUIDANCE: GuidanceParams =
+        GuidanceParams { speed_mps: 10.0, speed_change_mps: 5.0, reform_speed_max_mps: 10.0, braking_mps2: 5.0 };
 
     fn flight(destination: Destination) -> LoneFlight {
         LoneFlight::new(2, &PlannerParams { destination, ..crate::test_params::planner() })

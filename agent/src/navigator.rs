@@ -12,6 +12,8 @@ const MOVED_M: f64 = 10.0;
 /// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
 /// rounding errors.
 const TIGHT_M: f64 = 0.02;
+/// A path with the planning distance that is longer than the path with the least distance by this factor is a long detour.
+const DETOUR_FACTOR: f64 = 1.25;
 /// A search that found no path is repeated after this many ticks.
 const RETRY_TICKS: u64 = 50;
 
@@ -47,8 +49,8 @@ pub struct Navigator {
 }
 
 impl Navigator {
-    /// Creates a navigator that knows no obstacle. Paths keep `planning_m` from obstacles if such a path exists, and otherwise
-    /// `clearance_m`.
+    /// Creates a navigator that knows no obstacle. Paths keep `planning_m` from obstacles if such a path exists and is no long
+    /// detour, and otherwise `clearance_m`.
     #[must_use]
     pub fn new(clearance_m: f64, planning_m: f64) -> Self {
         Self {
@@ -80,6 +82,14 @@ impl Navigator {
         self.tight.is_free(from, to)
     }
 
+    /// Length that is left of the path that the drone flies, m; `None` if it flies none.
+    #[must_use]
+    pub fn left_m(&self, from: Vec2) -> Option<f64> {
+        let corners = &self.path.as_ref()?.corners;
+        let first_m = (corners.last()? - from).norm();
+        Some(first_m + corners.windows(2).map(|two| (two[1] - two[0]).norm()).sum::<f64>())
+    }
+
     /// Returns the next step of the shortest path from `from` to `to`, world frame, m. `tick`: number of the present tick.
     pub fn head(&mut self, tick: u64, from: Vec2, to: Vec2) -> Heading {
         if self.is_free(from, to) {
@@ -92,14 +102,23 @@ impl Navigator {
         if tick < self.retry_at {
             return Heading::NoPath;
         }
-        let found = self.wide.path(from, to).or_else(|| self.tight.path(from, to));
-        let Some((mut corners, _)) = found else {
+        let Some((mut corners, _)) = self.search(from, to) else {
             self.retry_at = tick + RETRY_TICKS;
             return Heading::NoPath;
         };
         corners.reverse();
         self.path = Some(Path { target: to, corners });
         self.follow(from, to).map_or(Heading::NoPath, Heading::Via)
+    }
+
+    /// The shortest path with the planning distance; or with the least distance, if that is much shorter: then it leads through
+    /// a gap that the planning distance closes.
+    fn search(&self, from: Vec2, to: Vec2) -> Option<(Vec<Vec2>, f64)> {
+        let (wide, tight) = (self.wide.path(from, to), self.tight.path(from, to));
+        match (wide, tight) {
+            (Some(wide), Some(tight)) if wide.1 > DETOUR_FACTOR * tight.1 => Some(tight),
+            (wide, tight) => wide.or(tight),
+        }
     }
 
     /// The next corner of the present path. `None` if the path no longer leads to the target, or the way to the next corner is

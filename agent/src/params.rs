@@ -104,6 +104,7 @@ impl PilotParams {
             safe_distance_m: self.safety.safe_distance_m,
             clearance_m: self.safety.clearance_m,
             acceleration_max_mps2: self.safety.acceleration_max_mps2,
+            braking_mps2: self.safety.braking_mps2,
             speed_max_mps: self.speed_max_mps,
             dt_s: self.dt_s,
         }
@@ -111,7 +112,8 @@ impl PilotParams {
 
     /// The speed up to which the drone can stop within what it senses, if its commands take effect `lag` ticks late, m/s.
     /// Two drones that come into ranging distance must both be able to stop.
-    pub(crate) fn speed_on_sight_mps(&self, lag: u32) -> f64 {
+    #[must_use]
+    pub fn speed_on_sight_mps(&self, lag: u32) -> f64 {
         let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
         let obstacles_mps = filter.speed_within_mps(self.detection_range_m - self.safety.clearance_m, lag);
         if !self.ranging || self.drones < 2 {
@@ -119,6 +121,15 @@ impl PilotParams {
         }
         let room_m = self.safety.ranging_m - self.safety.safe_distance_m - filter.margin_m();
         obstacles_mps.min(filter.speed_within_mps(room_m / 2.0, lag))
+    }
+
+    /// The distance that two drones keep while nothing hinders them, m: the safe distance, its margin, and what a reaction time
+    /// adds.
+    #[must_use]
+    pub fn separation_kept_m(&self) -> f64 {
+        let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
+        let lag = (self.braking.reaction_time_s / self.tick_s).round() as u32;
+        filter.keep_m(lag).max(self.safety.keep_m(self.braking.reaction_time_s))
     }
 
     pub(crate) fn neighbours(&self) -> NeighbourParams {

@@ -195,6 +195,12 @@ impl RouteFollower {
         self.corridor.as_ref().map(|corridor| corridor.pull(position, self.first_gate_x_m()))
     }
 
+    /// Where the route ends, world frame, m; `None` if nothing lies ahead.
+    #[must_use]
+    pub fn end(&self) -> Option<Vec2> {
+        self.corridor.as_ref().map(Corridor::target)
+    }
+
     /// Where the route ends (world frame, m), if a leg of it is not free; `None` if all are, or nothing lies ahead.
     #[must_use]
     pub fn end_if_blocked(&self, position: Vec2, is_free: impl Fn(Vec2, Vec2) -> bool) -> Option<Vec2> {

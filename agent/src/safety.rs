@@ -18,6 +18,8 @@ pub struct SafetyParams {
     pub clearance_m: f64,
     /// Largest acceleration, m/s².
     pub acceleration_max_mps2: f64,
+    /// Deceleration of full braking, m/s²; at most the largest acceleration.
+    pub braking_mps2: f64,
     /// γ: largest rate at which a barrier may fall, 1/s.
     pub gain_per_s: f64,
     /// Margin on the safe distance, as a share of it; at least [`MIN_MARGIN_M`].
@@ -42,6 +44,8 @@ const INTRUSION: f64 = 0.5;
 const MIN_LIMIT_MPS: f64 = 0.5;
 /// Share of the acceleration that is assumed for braking before an obstacle. The rest is left for turning.
 const OBSTACLE_BRAKING: f64 = 0.7;
+/// Two obstacles are the sides of a gap if the product of their unit normals is below this.
+const OPPOSITE: f64 = -0.7;
 /// Least margin on the safe distance, m. It covers what happens within a tick, and the small distance by which a
 /// drone that is pushed may pass the border.
 pub const MIN_MARGIN_M: f64 = 0.25;
@@ -56,6 +60,14 @@ pub struct NearObstacle {
     pub nearest_m: Vec2,
     /// Distance to it, negative inside, m.
     pub distance_m: f64,
+}
+
+impl NearObstacle {
+    /// Unit vector from the obstacle to the drone.
+    fn normal(&self) -> Vec2 {
+        let away = -self.nearest_m / self.distance_m.abs().max(1e-9);
+        if self.distance_m < 0.0 { -away } else { away }
+    }
 }
 
 /// A neighbour, sensed or known from its beacon.
@@ -93,6 +105,8 @@ struct Expectation {
 #[derive(Clone, Debug)]
 pub struct Safety {
     params: SafetyParams,
+    /// The obstacles in reach.
+    obstacles: Vec<NearObstacle>,
     planes: Vec<HalfPlane>,
     program: Program,
     /// Expectations of the neighbours, the newest last. One entry per tick, kept until the commands of that tick have taken
@@ -107,6 +121,7 @@ impl Safety {
     pub fn new(params: SafetyParams) -> Self {
         Self {
             params,
+            obstacles: Vec::new(),
             planes: Vec::new(),
             program: Program::default(),
             expected: VecDeque::new(),
@@ -136,8 +151,11 @@ impl Safety {
         neighbours: impl Iterator<Item = Neighbour>,
     ) -> Vec2 {
         let params = self.params;
+        let reach_m = params.clearance_m + OBSTACLE_REACH_M;
+        self.obstacles.clear();
+        self.obstacles.extend(obstacles.filter(|obstacle| obstacle.distance_m <= reach_m));
         self.planes.clear();
-        self.planes.extend(obstacles.filter_map(|obstacle| params.obstacle_plane(&obstacle, velocity)));
+        self.planes.extend(self.obstacles.iter().map(|o| params.obstacle_plane(o, velocity, &self.obstacles)));
         let lag = (params.reaction_time_s / params.dt_s).round() as usize;
         let full = self.expected.len() > lag + 1;
         let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
@@ -231,7 +249,7 @@ impl SafetyParams {
     }
 
     /// Distance to keep from a drone whose state is known with a delay of `late_s`, m.
-    fn keep_m(&self, late_s: f64) -> f64 {
+    pub(crate) fn keep_m(&self, late_s: f64) -> f64 {
         self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
     }
 
@@ -239,21 +257,27 @@ impl SafetyParams {
     /// within the ranging distance.
     #[must_use]
     pub fn speed_on_sight_mps(&self) -> f64 {
-        let (late_s, brake) = (self.reaction_time_s, self.acceleration_max_mps2);
+        let (late_s, brake) = (self.reaction_time_s, self.braking_mps2);
         let room_m = (self.ranging_m - self.keep_m(late_s)).max(0.0);
         (brake * late_s).hypot((brake * room_m).sqrt()) - brake * late_s
     }
 
-    fn obstacle_plane(&self, obstacle: &NearObstacle, velocity: Vec2) -> Option<HalfPlane> {
-        if obstacle.distance_m > self.clearance_m + OBSTACLE_REACH_M {
-            return None;
-        }
-        let away = -obstacle.nearest_m / obstacle.distance_m.abs().max(1e-9);
-        let normal = if obstacle.distance_m < 0.0 { -away } else { away };
-        let alpha = OBSTACLE_BRAKING * self.acceleration_max_mps2;
-        let (root, slope) = root(alpha, obstacle.distance_m - self.clearance_m - OBSTACLE_MARGIN_M);
+    /// Half-plane that keeps the drone clear of an obstacle. `all`: the obstacles in reach.
+    fn obstacle_plane(&self, obstacle: &NearObstacle, velocity: Vec2, all: &[NearObstacle]) -> HalfPlane {
+        let normal = obstacle.normal();
+        let alpha = OBSTACLE_BRAKING * self.braking_mps2;
+        let beyond_m = obstacle.distance_m - self.clearance_m - self.obstacle_margin_m(obstacle, all);
+        let (root, slope) = root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
-        Some(HalfPlane { normal, bound: -(self.gain_per_s * (root + speed) + slope * speed) })
+        HalfPlane { normal, bound: -(self.gain_per_s * (root + speed) + slope * speed) }
+    }
+
+    /// The margin on the clearance from one obstacle, m. In a gap whose two sides leave less room than two margins, each side
+    /// gets half of the room, so that the drone can fly through the middle.
+    fn obstacle_margin_m(&self, obstacle: &NearObstacle, all: &[NearObstacle]) -> f64 {
+        let opposite = all.iter().filter(|other| other.normal().dot(&obstacle.normal()) < OPPOSITE);
+        let narrowest_m = opposite.map(|other| obstacle.distance_m + other.distance_m).fold(f64::INFINITY, f64::min);
+        OBSTACLE_MARGIN_M.min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
     }
 
     fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
@@ -262,7 +286,7 @@ impl SafetyParams {
         let velocity = -neighbour.velocity_mps;
         // The state is old and the reaction is late. Meanwhile the neighbour may have turned.
         let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
-        let alpha = self.acceleration_max_mps2;
+        let alpha = self.braking_mps2;
         let unsensed_m = neighbour.least_m - self.keep_m(self.reaction_time_s);
         let beyond_m = (distance - self.keep_m(late_s)).max(unsensed_m);
         let (root, slope) = root(alpha, beyond_m);
@@ -283,7 +307,7 @@ impl SafetyParams {
         if other_speed <= 0.0 || own_speed <= 0.0 {
             return None;
         }
-        let stop = self.acceleration_max_mps2;
+        let stop = self.braking_mps2;
         let limit =
             (other_speed * other_speed + 2.0 * stop * barrier.beyond_m).max(MIN_LIMIT_MPS * MIN_LIMIT_MPS).sqrt();
         let apart = -other.velocity_mps;

@@ -14,9 +14,9 @@ pub(crate) struct SilentDrones {
 
 impl SilentDrones {
     /// Finds the silent drones. A ranged one is where it is ranged, whether it was ever heard or not. Another one is where
-    /// it has come to rest since its last beacon, braking at `acceleration_max_mps2`.
-    pub(crate) fn update(&mut self, senses: &Senses<'_>, peers: &Peers, acceleration_max_mps2: f64) {
-        let braking = 2.0 * acceleration_max_mps2;
+    /// it has come to rest since its last beacon, braking at `braking_mps2`.
+    pub(crate) fn update(&mut self, senses: &Senses<'_>, peers: &Peers, braking_mps2: f64) {
+        let braking = 2.0 * braking_mps2;
         let ranged = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
         self.positions.clear();
         self.positions.extend(ranged.map(|n| senses.position + Vec2::from(n.position_m)));

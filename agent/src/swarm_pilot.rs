@@ -227,7 +227,7 @@ impl SwarmPilot {
             return Vec2::new(-BACK_OUT_SPEED * guidance.speed_mps, 0.0);
         }
         if let Some(steering) = self.route.steering(senses.position) {
-            let direction = self.detour(senses).unwrap_or(steering.direction);
+            let direction = self.detour(senses, steering.total_m).unwrap_or(steering.direction);
             return direction * self.queue_speed_mps(senses.now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
@@ -250,11 +250,16 @@ impl SwarmPilot {
         }
     }
 
-    /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route.
-    fn detour(&mut self, senses: &Senses<'_>) -> Option<Vec2> {
+    /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route. `route_m`: length
+    /// of the planned route that is left. A detour that was begun is kept while it is shorter than that.
+    fn detour(&mut self, senses: &Senses<'_>, route_m: f64) -> Option<Vec2> {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
-            self.detour_to = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_free(a, b));
+            let blocked = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_free(a, b));
+            let begun = self.detour_to.filter(|to| self.route.end() == Some(*to));
+            let shorter =
+                begun.filter(|_| self.navigator.left_m(senses.position).is_some_and(|left_m| left_m < route_m));
+            self.detour_to = blocked.or(shorter);
         }
         let target = self.detour_to?;
         let next = match self.navigator.head(senses.tick, senses.position, target) {
@@ -385,7 +390,7 @@ impl Pilot for SwarmPilot {
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
         let safety = self.params.safety;
-        self.silent.update(senses, self.leading.peers(), safety.acceleration_max_mps2);
+        self.silent.update(senses, self.leading.peers(), safety.braking_mps2);
         self.lead(senses, &own, say);
         self.emergency_avoidance(senses);
         let bodies = self.silent.bodies(SILENT_DRONE_RADIUS * safety.safe_distance_m);

@@ -212,7 +212,7 @@ fn record(drones: u32, rounds: u32, executable: &Path, figures: &mut Vec<Figure>
     let file = scratch.path().join("record.toml");
     let ticks = (80_000 / drones.max(8)).max(100);
     let mut flown = scenario(drones, "")?;
-    flown.time.timeout_s = f64::from(ticks) * flown.time.dt_s;
+    flown.time.timeout_s = Some(f64::from(ticks) * flown.time.dt_s);
     let text = flown.to_toml()?;
     std::fs::write(&file, text).map_err(BenchError::file(&file))?;
     for runtime in ["inline", "processes"] {

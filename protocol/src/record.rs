@@ -132,6 +132,8 @@ pub enum Outcome {
     Reached,
     /// The time limit of the mission ran out.
     Timeout,
+    /// It is certain that the mission cannot reach its goal, because some drone has no way there.
+    Stuck,
     /// An invariant was broken.
     Unsafe,
     /// The mission was interrupted, or its world process died.
@@ -326,6 +328,9 @@ pub enum EventKind {
         outcome: Outcome,
         /// Why it ended, for a human reader.
         reason: String,
+        /// The drones that have no way to the goal. Empty unless the outcome is [`Outcome::Stuck`].
+        #[serde(default)]
+        stuck: Vec<DroneId>,
         /// Counters of the whole mission.
         totals: Box<Totals>,
     },

@@ -54,6 +54,7 @@ struct Counts {
 struct End {
     t_s: f64,
     outcome: Outcome,
+    stuck: Vec<DroneId>,
     reason: String,
     totals: Totals,
 }
@@ -137,8 +138,8 @@ impl Accumulator {
             EventKind::Violation { kind, drones, value_m } => {
                 self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
             }
-            EventKind::End { outcome, reason, totals } => {
-                self.end = Some(End { t_s, outcome, reason, totals: *totals });
+            EventKind::End { outcome, reason, stuck, totals } => {
+                self.end = Some(End { t_s, outcome, reason, stuck, totals: *totals });
             }
             // Decisions are read from the frames, the end of a leadership from the rows. The summary does not report
             // the end of a fault.
@@ -215,6 +216,7 @@ impl Accumulator {
             report_s: None,
             outcome: self.end.as_ref().map_or(completion.fallback, |end| end.outcome),
             reason: self.end.as_ref().map(|end| end.reason.clone()),
+            stuck: self.end.as_ref().map_or(Vec::new(), |end| end.stuck.iter().map(|id| id.0).collect()),
             mission_s: self.end.as_ref().map_or(sim_s, |end| end.t_s),
             reform_start_s: self.reform_start_s,
             reform_end_s: self.closing.since_s(),

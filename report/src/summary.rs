@@ -46,10 +46,13 @@ pub struct Summary {
     /// Wall time after the last tick, for files and plots, s.
     pub report_s: Option<f64>,
     /// How the mission ended.
-    #[schemars(with = "String", extend("enum" = ["reached", "timeout", "unsafe", "aborted"]))]
+    #[schemars(with = "String", extend("enum" = ["reached", "timeout", "stuck", "unsafe", "aborted"]))]
     pub outcome: Outcome,
     /// Why the mission ended, in words.
     pub reason: Option<String>,
+    /// The drones that have no way to the goal. Empty unless `outcome` is `stuck`.
+    #[serde(default)]
+    pub stuck: Vec<u32>,
     /// One for each obstacle set, in flight order.
     pub stages: Vec<Stage>,
     /// When the mission ended, s.

@@ -21,6 +21,7 @@ pub(crate) fn outcome(summary: &Summary, colour: bool) -> String {
     let (word, shade, why) = match summary.outcome {
         Outcome::Reached => ("reached", 32, "the formation is closed and every invariant held".to_owned()),
         Outcome::Timeout => ("timeout", 33, "the goal was not reached".to_owned()),
+        Outcome::Stuck => ("stuck", 33, "some drones have no way to the goal".to_owned()),
         Outcome::Unsafe => ("unsafe", 31, violations(summary)),
         Outcome::Aborted => ("aborted", 31, "the mission did not reach its end".to_owned()),
     };

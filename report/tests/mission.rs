@@ -165,7 +165,12 @@ fn end() -> RunEvent {
     };
     RunEvent {
         t_s: 10.0,
-        what: EventKind::End { outcome: Outcome::Reached, reason: "goal met".to_owned(), totals: Box::new(totals) },
+        what: EventKind::End {
+            outcome: Outcome::Reached,
+            reason: "goal met".to_owned(),
+            stuck: Vec::new(),
+            totals: Box::new(totals),
+        },
     }
 }
 

@@ -11,7 +11,7 @@ use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::{DroneId, SimTime, Vec2};
-use skein_scenario::{End, Failsafe, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
+use skein_scenario::{End, Failsafe, FaultKind, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
 
 /// Number of drones in a scenario.
@@ -34,9 +34,11 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
     let drone = &scenario.drone;
     let params = WorldParams {
         dt_ns: dt_ns(scenario),
-        timeout_s: scenario.time.timeout_s,
+        timeout_s: scenario.timeout_s(),
+        without_way: without_way(scenario)?,
         speed_max_mps: drone.speed_max_mps,
         acceleration_max_mps2: drone.acceleration_max_mps2,
+        braking_mps2: scenario.braking_mps2(),
         safe_distance_m: drone.safe_distance_m,
         clearance_m: scenario.avoidance.clearance_m,
         planning_distance_m: scenario.avoidance.planning_distance_m,
@@ -63,6 +65,15 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
     Ok(World::new(params, &starts, &shapes)?)
 }
 
+/// The drones that have no way to their destination; none if a scheduled kill may take such a drone out of the mission.
+fn without_way(scenario: &Scenario) -> Result<Vec<DroneId>, RuntimeError> {
+    if scenario.fault_plan.iter().any(|event| event.kind == FaultKind::Kill) {
+        return Ok(Vec::new());
+    }
+    let drones = scenario.drones_without_a_way().map_err(RuntimeError::Shape)?;
+    Ok(drones.into_iter().map(DroneId).collect())
+}
+
 /// Where the mission ends, as the pilots know it.
 #[must_use]
 pub fn destination(scenario: &Scenario) -> Destination {
@@ -87,12 +98,13 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             speed_mps: drone.speed_mps,
             speed_change_mps: drone.speed_change_mps,
             reform_speed_max_mps: scenario.mission.reform_speed_max_mps,
-            acceleration_max_mps2: drone.acceleration_max_mps2,
+            braking_mps2: scenario.braking_mps2(),
         },
         safety: SafetyParams {
             safe_distance_m: drone.safe_distance_m,
             clearance_m: scenario.avoidance.clearance_m,
             acceleration_max_mps2: drone.acceleration_max_mps2,
+            braking_mps2: scenario.braking_mps2(),
             gain_per_s: scenario.guidance.filter_gain_per_s,
             margin: scenario.guidance.filter_margin,
             reaction_time_s: drone.reaction_time_s,
@@ -102,7 +114,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         detection_range_m: scenario.sensors.detection_range_m,
         speed_max_mps: drone.speed_max_mps,
         ranging: scenario.sensors.ranging,
-        braking: Braking { drag_coefficient: drone.drag_coefficient, reaction_time_s: drone.reaction_time_s },
+        braking: Braking { deceleration_mps2: scenario.braking_mps2(), reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
         election: ElectionParams {
             heartbeat_period_s: protocol.heartbeat_period_s,

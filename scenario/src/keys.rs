@@ -85,14 +85,15 @@ pub struct Time {
     /// `drone.safe_distance_m`.
     #[schemars(range(min = 1e-4, max = 0.1))]
     pub dt_s: f64,
-    /// Time limit. A mission that takes longer has failed.
+    /// Time limit. A mission that takes longer has failed. Default: 180 s, or twice what a smooth flight takes from the last slot
+    /// past all obstacles and to the goal, one drone behind another, if that is longer.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
-    pub timeout_s: f64,
+    pub timeout_s: Option<f64>,
 }
 
 impl Default for Time {
     fn default() -> Self {
-        Self { dt_s: 0.02, timeout_s: 180.0 }
+        Self { dt_s: 0.02, timeout_s: None }
     }
 }
 
@@ -235,8 +236,8 @@ pub struct Drone {
     /// Least distance between the centres of two drones. It must hold at all times.
     #[schemars(range(max = 10_000.0), extend("exclusiveMinimum" = 0.0))]
     pub safe_distance_m: f64,
-    /// c_d in the braking distance v²/(2 g c_d) with g = 9.81 m/s² (the paper's E3), dimensionless. With the default, a
-    /// drone brakes with g·c_d = 5 m/s².
+    /// c_d in the braking distance v²/(2 g c_d) with g = 9.81 m/s² (the paper's E3), dimensionless. A drone that brakes fully
+    /// decelerates with g·c_d, at most with `acceleration_max_mps2`. With the default, g·c_d is 5 m/s².
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub drag_coefficient: f64,
     /// Time to compute and react: the paper's t_c in the reaction distance v·t_c (E4).

@@ -52,6 +52,7 @@ mod node;
 mod objective;
 mod obstacle;
 mod parse;
+mod passage;
 mod radio;
 mod radio_keys;
 mod reference;

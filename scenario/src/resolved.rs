@@ -1,8 +1,9 @@
 //! What a scenario can do: it is parsed from text, and gives the values that follow from its keys.
 
 use crate::error::ScenarioErrors;
-use crate::keys::{FormationShape, Scenario};
+use crate::keys::{End, FormationShape, Scenario};
 use crate::parse::{self, ScenarioSource};
+use crate::passage::Barrier;
 use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -13,6 +14,10 @@ use skein_protocol::shape::{ConvexShape, ShapeError};
 /// Gravity as in the paper, m/s².
 const GRAVITY_MPS2: f64 = 9.81;
 
+/// Default of `time.timeout_s` for a small swarm, s.
+const TIMEOUT_S: f64 = 180.0;
+/// The default of `time.timeout_s` is at least this many times the duration of a smooth flight.
+const TIMEOUT_FACTOR: f64 = 2.0;
 /// Default of `protocol.beacon_period_s` where bandwidth is no limit, s.
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
@@ -92,13 +97,18 @@ impl Scenario {
         self.obstacles.iter().map(crate::Obstacle::shape).collect()
     }
 
-    /// The stopping distance at nominal speed, m: the paper's E2 = E4 + E3 = v·t_c + v²/(2 g c_d), where g·c_d is at most
-    /// the drone's greatest acceleration.
+    /// Deceleration of a drone that brakes fully, m/s²: g·c_d of the paper's E3, at most the drone's greatest acceleration.
+    #[must_use]
+    pub fn braking_mps2(&self) -> f64 {
+        (GRAVITY_MPS2 * self.drone.drag_coefficient).min(self.drone.acceleration_max_mps2)
+    }
+
+    /// The stopping distance at nominal speed, m: the paper's E2 = E4 + E3 = v·t_c + v²/(2 g c_d), with
+    /// [`Self::braking_mps2`] for g·c_d.
     #[must_use]
     pub fn stopping_distance_m(&self) -> f64 {
         let drone = &self.drone;
-        let braking_mps2 = (GRAVITY_MPS2 * drone.drag_coefficient).min(drone.acceleration_max_mps2);
-        drone.speed_mps * drone.reaction_time_s + drone.speed_mps.powi(2) / (2.0 * braking_mps2)
+        drone.speed_mps * drone.reaction_time_s + drone.speed_mps.powi(2) / (2.0 * self.braking_mps2())
     }
 
     /// Greatest distance at which drones sense neighbours, m: `sensors.ranging_m`; or enough for two drones that fly at each
@@ -108,7 +118,7 @@ impl Scenario {
         let drone = &self.drone;
         let top_mps = drone.speed_mps.max(self.mission.reform_speed_max_mps);
         let late_m = 2.0 * top_mps * (drone.reaction_time_s + 2.0 * self.time.dt_s);
-        let enough_m = 1.01 * drone.safe_distance_m + top_mps.powi(2) / drone.acceleration_max_mps2 + late_m;
+        let enough_m = 1.01 * drone.safe_distance_m + top_mps.powi(2) / self.braking_mps2() + late_m;
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))
     }
 
@@ -133,6 +143,35 @@ impl Scenario {
     #[must_use]
     pub fn channel(&self) -> Option<SharedChannel> {
         radio::channel(self.seed, &self.radio)
+    }
+
+    /// The drones that have no way to their destination: obstacles that no drone fits between enclose the drone, or the goal.
+    /// Ids in ascending order. A mission without a goal leads out of every enclosure.
+    ///
+    /// # Errors
+    /// [`ShapeError`], as for [`Self::shapes`].
+    pub fn drones_without_a_way(&self) -> Result<Vec<u32>, ShapeError> {
+        let shapes = self.shapes()?;
+        let barrier = Barrier::new(&shapes, self.avoidance.clearance_m);
+        let far_m = shapes.iter().map(|shape| shape.bounds().1.x).fold(0.0, f64::max) + 1e6;
+        let goal = self.mission.goal_m.filter(|_| self.mission.end == End::Goal);
+        let to = goal.map_or(Vec2::new(far_m, self.formation.start_m[1]), Vec2::from);
+        let starts = self.starts().into_iter().zip(0..);
+        Ok(starts.filter(|(start, _)| barrier.separates(*start, to)).map(|(_, drone)| drone).collect())
+    }
+
+    /// The time limit of the mission, s: `time.timeout_s`; or [`TIMEOUT_S`], or [`TIMEOUT_FACTOR`] times what a smooth flight takes
+    /// from the last slot past all obstacles and to the goal, one drone behind another, if that is longer.
+    #[must_use]
+    pub fn timeout_s(&self) -> f64 {
+        let (drone, start_x_m) = (&self.drone, self.formation.start_m[0]);
+        let goal_x_m = self.mission.goal_m.map_or(start_x_m, |goal| goal[0]);
+        let rears = self.shapes().unwrap_or_default();
+        let last_x_m = rears.iter().map(|shape| shape.bounds().1.x).fold(goal_x_m, f64::max);
+        let rear_x_m = self.slots().iter().map(|slot| slot.x).fold(0.0, f64::min) + start_x_m;
+        let headway_s = self.avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps;
+        let smooth_s = (last_x_m - rear_x_m) / drone.speed_mps + f64::from(self.formation.drones) * headway_s;
+        self.time.timeout_s.unwrap_or_else(|| TIMEOUT_S.max((TIMEOUT_FACTOR * smooth_s).ceil()))
     }
 
     /// The scenario as TOML with every key written out. [`Scenario::parse`] makes an equal scenario of it.

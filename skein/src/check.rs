@@ -4,7 +4,7 @@ use crate::cli::CheckArgs;
 use crate::exit::{Exit, Failure};
 use crate::input;
 use serde_json::json;
-use skein_runtime::{mission, run_facts};
+use skein_runtime::{advice, mission, run_facts};
 use std::io::Write;
 
 /// Prints the processes, services and routes of a mission.
@@ -13,6 +13,8 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
     let sets = run_facts::obstacle_sets(&scenario).map_err(Failure::usage)?;
     let drones = mission::drones(&scenario);
     let shards = skein_bus::shards(drones);
+    let on_sight_mps = advice::speed_on_sight_mps(&scenario);
+    let warnings = advice::warnings(&scenario).map_err(Failure::usage)?;
     let mut out = std::io::stdout().lock();
     // A closed pipe is the reader's choice.
     let _ = if args.json {
@@ -24,18 +26,23 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
         let plan = json!({
             "scenario": scenario.name, "strategy": scenario.strategy.to_string(), "seed": scenario.seed,
             "drones": drones, "processes": drones + 2, "services": services, "sets": sets,
+            "speed_on_sight_mps": on_sight_mps, "warnings": warnings,
         });
         writeln!(out, "{plan}")
     } else {
         let mut text = format!("{}: valid, {} with seed {}\n", scenario.name, scenario.strategy, scenario.seed);
         text += &format!("processes  launcher, world, {drones} drones\n");
         text += &format!("services   {}\n", services(shards).join(", "));
-        text += &format!("ticks      {} s each, for {} s at most\n", scenario.time.dt_s, scenario.time.timeout_s);
+        text += &format!("ticks      {} s each, for {} s at most\n", scenario.time.dt_s, scenario.timeout_s());
         for (number, set) in sets.iter().enumerate() {
             let ids: Vec<String> = set.obstacles.iter().map(|id| id.0.to_string()).collect();
             let ids = ids.join(", ");
             let (routes, gate_x_m) = (set.routes.count(), set.routes.gate_x_m());
             text += &format!("set {number}      obstacles {ids}: {routes} routes, gate at x = {gate_x_m} m\n");
+        }
+        text += &format!("on sight   {on_sight_mps:.2} m/s at most: drones can stop within what they sense\n");
+        for warning in &warnings {
+            text += &format!("warning    {warning}\n");
         }
         write!(out, "{text}")
     };

@@ -9,6 +9,7 @@ use crate::options::RuntimeChoice;
 use crate::progress::MissionBar;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};
+use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
@@ -29,6 +30,11 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
         RuntimeChoice::Inline => "inline",
     };
     let facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
+    if !args.quiet {
+        for warning in advice::warnings(&scenario).map_err(Failure::usage)? {
+            eprintln!("skein: warning: {warning}");
+        }
+    }
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
     let manifest = write_manifest(&folder, &facts, &scenario)?;
@@ -36,7 +42,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
         true => Recorder::in_memory(facts.clone()),
         false => Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?,
     };
-    let ticks = (scenario.time.timeout_s / scenario.time.dt_s).ceil() as u64;
+    let ticks = (scenario.timeout_s() / scenario.time.dt_s).ceil() as u64;
     let mut sink = MissionBar::new(recorder, args.quiet || args.json, ticks);
     let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
@@ -155,7 +161,7 @@ fn exit(end: &RunEnd, trouble: bool, summary: &Summary) -> Exit {
         _ if trouble => Exit::Environment,
         (None, Outcome::Aborted) => Exit::Environment,
         (None, Outcome::Unsafe) => Exit::Unsafe,
-        (None, Outcome::Timeout) => Exit::NotReached,
+        (None, Outcome::Timeout | Outcome::Stuck) => Exit::NotReached,
         (None, Outcome::Reached) => Exit::Reached,
     }
 }

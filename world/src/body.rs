@@ -84,7 +84,7 @@ impl Body {
         let dt = params.dt_s();
         let speed = self.velocity.norm();
         if speed > 0.0 {
-            let rest = (speed - params.acceleration_max_mps2 * dt).max(0.0);
+            let rest = (speed - params.braking_mps2 * dt).max(0.0);
             self.glide(self.velocity * (rest / speed), dt);
         }
         speed > 0.0

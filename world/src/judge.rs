@@ -4,8 +4,8 @@ use crate::body::Body;
 use crate::end_condition::EndCondition;
 use crate::params::WorldParams;
 use crate::stages::Stages;
-use skein_protocol::SimTime;
 use skein_protocol::record::Outcome;
+use skein_protocol::{DroneId, SimTime};
 
 /// What the judge looks at, at the end of a tick.
 #[derive(Clone, Copy)]
@@ -40,7 +40,7 @@ impl MissionJudge {
         self.end.get_or_insert_with(|| (Outcome::Aborted, reason.to_owned())).clone()
     }
 
-    /// Ends the mission if its end condition is met, no drone is left, or its time is over.
+    /// Ends the mission if its end condition is met, no drone is left, some drone has no way, or the time is over.
     pub(crate) fn judge(&mut self, params: &WorldParams, state: MissionState<'_>) {
         if self.end.is_some() {
             return;
@@ -49,6 +49,8 @@ impl MissionJudge {
             (Outcome::Reached, "the end condition is met".to_owned())
         } else if !state.bodies.iter().any(Body::is_alive) && !state.awaits_restarts {
             (Outcome::Timeout, "no drone is left alive".to_owned())
+        } else if !params.without_way.is_empty() {
+            (Outcome::Stuck, without_way(&params.without_way))
         } else if state.end >= SimTime::from_secs(params.timeout_s) {
             (Outcome::Timeout, format!("the time of {} s is over", params.timeout_s))
         } else {
@@ -59,4 +61,11 @@ impl MissionJudge {
             count => (Outcome::Unsafe, format!("{reason}, but invariants were broken {count} times")),
         });
     }
+}
+
+/// Names the drones that have no way to their destination.
+fn without_way(drones: &[DroneId]) -> String {
+    let (noun, verb) = if drones.len() == 1 { ("drone", "has") } else { ("drones", "have") };
+    let ids: Vec<String> = drones.iter().map(|id| id.0.to_string()).collect();
+    format!("{noun} {} {verb} no way to the destination: the obstacles leave no gap of two clearances", ids.join(", "))
 }

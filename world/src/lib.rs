@@ -32,8 +32,10 @@
 //! let params = WorldParams {
 //!     dt_ns: 20_000_000,
 //!     timeout_s: 60.0,
+//!     without_way: Vec::new(),
 //!     speed_max_mps: 20.0,
 //!     acceleration_max_mps2: 5.0,
+//!     braking_mps2: 5.0,
 //!     safe_distance_m: 25.0,
 //!     clearance_m: 15.0,
 //!     planning_distance_m: 20.0,

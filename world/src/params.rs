@@ -2,11 +2,11 @@
 
 use crate::fault_plan::FaultPlan;
 use crate::tuning::{DESCENT_MPS, FLIGHT_ALTITUDE_M};
-use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::SharedChannel;
 use skein_protocol::shape::ShapeError;
+use skein_protocol::{DroneId, Vec2};
 use thiserror::Error;
 
 /// What a drone without a process does.
@@ -46,10 +46,14 @@ pub struct WorldParams {
     pub dt_ns: i64,
     /// The mission ends after this time, s.
     pub timeout_s: f64,
+    /// The drones that have no way to their destination, by id. If there is one, the mission ends as stuck in its first tick.
+    pub without_way: Vec<DroneId>,
     /// Greatest speed of a drone, m/s.
     pub speed_max_mps: f64,
     /// Greatest acceleration of a drone in any direction, m/s².
     pub acceleration_max_mps2: f64,
+    /// Deceleration of a drone that brakes fully, m/s².
+    pub braking_mps2: f64,
     /// Least distance of two bodies, m.
     pub safe_distance_m: f64,
     /// Least distance of a body to an obstacle, m.
@@ -128,6 +132,7 @@ impl WorldParams {
             ("timeout_s", self.timeout_s),
             ("speed_max_mps", self.speed_max_mps),
             ("acceleration_max_mps2", self.acceleration_max_mps2),
+            ("braking_mps2", self.braking_mps2),
             ("safe_distance_m", self.safe_distance_m),
             ("clearance_m", self.clearance_m),
             ("planning_distance_m", self.planning_distance_m),

@@ -16,8 +16,10 @@ pub(crate) fn params() -> WorldParams {
     WorldParams {
         dt_ns: 20_000_000,
         timeout_s: 10.0,
+        without_way: Vec::new(),
         speed_max_mps: 20.0,
         acceleration_max_mps2: 5.0,
+        braking_mps2: 5.0,
         safe_distance_m: 33.0,
         clearance_m: 15.0,
         planning_distance_m: 20.0,

@@ -220,7 +220,8 @@ impl World {
     pub fn finish(&mut self, stats: &LinkStats, wall_s: f64) {
         let (outcome, reason) = self.judge.abort("the mission was stopped");
         let totals = Box::new(self.counters.close(stats, self.params.dt_s(), wall_s));
-        self.log.push(self.now(), EventKind::End { outcome, reason, totals });
+        let stuck = if outcome == Outcome::Stuck { self.params.without_way.clone() } else { Vec::new() };
+        self.log.push(self.now(), EventKind::End { outcome, reason, stuck, totals });
         self.log.end_tick();
         self.record.close_mission(self.digest(), self.log.ended().len());
     }

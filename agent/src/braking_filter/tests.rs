@@ -6,6 +6,7 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
         safe_distance_m: 33.0,
         clearance_m: 15.0,
         acceleration_max_mps2: 5.0,
+        braking_mps2: 5.0,
         speed_max_mps: 20.0,
         dt_s: 0.02,
     };

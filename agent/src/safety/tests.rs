@@ -5,6 +5,7 @@ const PARAMS: SafetyParams = SafetyParams {
     safe_distance_m: 30.0,
     clearance_m: 15.0,
     acceleration_max_mps2: 5.0,
+    braking_mps2: 5.0,
     gain_per_s: 1.5,
     margin: 0.02,
     reaction_time_s: 0.0,

@@ -9,13 +9,13 @@ use skein_protocol::shape::ConvexShape;
 use std::collections::VecDeque;
 
 fn law(params: &BrakingFilterParams) -> BrakingLaw {
-    BrakingLaw { deceleration_mps2: params.acceleration_max_mps2, dt_s: params.dt_s }
+    BrakingLaw { deceleration_mps2: params.braking_mps2, dt_s: params.dt_s }
 }
 
 /// Acceleration of full braking, m/s².
 fn braking(params: &BrakingFilterParams, velocity: Vec2) -> Vec2 {
-    let (speed, step) = (velocity.norm(), params.acceleration_max_mps2 * params.dt_s);
-    if speed > step { velocity * (-params.acceleration_max_mps2 / speed) } else { -velocity / params.dt_s }
+    let (speed, step) = (velocity.norm(), params.braking_mps2 * params.dt_s);
+    if speed > step { velocity * (-params.braking_mps2 / speed) } else { -velocity / params.dt_s }
 }
 
 /// A crowd whose drones all follow the rule.
@@ -81,10 +81,12 @@ impl Crowd {
         let mut random = Keyed(seed);
         random.unit();
         let safe_distance_m = random.within(1.0, 40.0);
+        let acceleration_max_mps2 = random.within(1.0, 10.0);
         let params = BrakingFilterParams {
             safe_distance_m,
             clearance_m: random.within(0.5, 20.0),
-            acceleration_max_mps2: random.within(1.0, 10.0),
+            acceleration_max_mps2,
+            braking_mps2: acceleration_max_mps2 * random.within(0.5, 1.0),
             speed_max_mps: random.within(2.0, 25.0),
             dt_s: [0.005, 0.01, 0.02, 0.05, 0.1][(random.unit() * 5.0) as usize],
         };

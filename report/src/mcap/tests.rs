@@ -46,7 +46,12 @@ fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
     let totals = Totals { wall_s: f64::from(wall), ..Totals::default() };
     let what = match tick {
         40 => EventKind::Fault { kind: FaultKind::Kill, target: DroneId(2), scheduled: true, detail: "asked".into() },
-        99 => EventKind::End { outcome: Outcome::Reached, reason: "there".into(), totals: Box::new(totals) },
+        99 => EventKind::End {
+            outcome: Outcome::Reached,
+            reason: "there".into(),
+            stuck: Vec::new(),
+            totals: Box::new(totals),
+        },
         _ => return Vec::new(),
     };
     vec![RunEvent { t_s: (tick + 1) as f64 * 0.02, what }]

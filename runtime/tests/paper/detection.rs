@@ -42,8 +42,7 @@ fn e1_to_e4_a_scenario_has_the_stopping_distance_of_the_equations_and_must_sense
     let s2 = |t_c: &str| scenario("paper/s2-right", &[("drone.reaction_time_s", t_c)]);
     for (t_c, stopping_m) in [("0", 10.0), ("0.3", 13.0)] {
         let flown = s2(t_c);
-        let braking =
-            Braking { drag_coefficient: flown.drone.drag_coefficient, reaction_time_s: flown.drone.reaction_time_s };
+        let braking = Braking { deceleration_mps2: flown.braking_mps2(), reaction_time_s: flown.drone.reaction_time_s };
         assert!((braking.stopping_m(10.0) - stopping_m).abs() < 1e-9);
         assert!((flown.stopping_distance_m() - stopping_m).abs() < 1e-9);
     }

@@ -1,0 +1,165 @@
+//! What arithmetic alone says against a scenario: it is valid, but it cannot work, or not at its nominal speed.
+
+use crate::mission;
+use skein_agent::PilotParams;
+use skein_protocol::shape::{ConvexShape, ShapeError};
+use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_scenario::{End, Scenario};
+
+/// The greatest speed from which a drone of this scenario stops within what it senses, m/s: before an obstacle at the edge of the
+/// detection range, and before a drone that comes the other way at the edge of the ranging distance.
+#[must_use]
+pub fn speed_on_sight_mps(scenario: &Scenario) -> f64 {
+    let params = pilot(scenario);
+    params.speed_on_sight_mps(lag(scenario))
+}
+
+/// Sentences about what cannot work in this scenario, each with its numbers and the keys to change. Empty if there is nothing.
+///
+/// # Errors
+/// [`ShapeError`] if an obstacle has an invalid shape. A checked scenario has none.
+pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
+    let shapes = scenario.shapes()?;
+    let no_way = scenario.drones_without_a_way()?;
+    let found = [
+        too_fast(scenario, "drone.speed_mps", scenario.drone.speed_mps),
+        too_fast(scenario, "mission.reform_speed_max_mps", scenario.mission.reform_speed_max_mps),
+        slots_too_close(scenario),
+        start_too_fast(scenario, &shapes),
+        stops_unseen(scenario, &shapes),
+        enclosed(&no_way),
+    ];
+    Ok(found.into_iter().flatten().collect())
+}
+
+fn pilot(scenario: &Scenario) -> PilotParams {
+    mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO)
+}
+
+/// Delay from a command to its effect, ticks.
+fn lag(scenario: &Scenario) -> u32 {
+    (scenario.drone.reaction_time_s / scenario.time.dt_s).round() as u32
+}
+
+fn too_fast(scenario: &Scenario, key: &str, speed_mps: f64) -> Option<String> {
+    let limit_mps = speed_on_sight_mps(scenario);
+    (speed_mps > limit_mps + 1e-9).then(|| {
+        let ranging_m = scenario.ranging_m();
+        format!(
+            "{key} = {speed_mps} m/s, but drones fly at most {limit_mps:.2} m/s: from a higher speed they cannot stop within \
+             sensors.detection_range_m = {} m and sensors.ranging_m = {ranging_m:.1} m",
+            scenario.sensors.detection_range_m
+        )
+    })
+}
+
+/// Slots that are closer together than the drones let each other come.
+fn slots_too_close(scenario: &Scenario) -> Option<String> {
+    let keep_m = pilot(scenario).separation_kept_m();
+    let slots = scenario.slots();
+    let nearest_m = nearest_pair_m(&slots)?;
+    (nearest_m < keep_m).then(|| {
+        format!(
+            "the nearest slots of the formation are {nearest_m:.2} m apart, but drones keep {keep_m:.2} m \
+             (drone.safe_distance_m, its margin, and the reaction time): the formation may not close; \
+             raise formation.spacing_m or lower drone.reaction_time_s"
+        )
+    })
+}
+
+/// Distance of the two nearest points, m; `None` for fewer than two. A sweep along x.
+fn nearest_pair_m(points: &[Vec2]) -> Option<f64> {
+    let mut order: Vec<Vec2> = points.to_vec();
+    order.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut nearest_m = f64::INFINITY;
+    for (i, a) in order.iter().enumerate() {
+        for b in &order[i + 1..] {
+            if b.x - a.x >= nearest_m {
+                break;
+            }
+            nearest_m = nearest_m.min((b - a).norm());
+        }
+    }
+    nearest_m.is_finite().then_some(nearest_m)
+}
+
+/// A drone that starts so close to an obstacle that it cannot stop before it.
+fn start_too_fast(scenario: &Scenario, shapes: &[ConvexShape]) -> Option<String> {
+    let (stop_m, clearance_m) = (scenario.stopping_distance_m(), scenario.avoidance.clearance_m);
+    scenario.starts().into_iter().enumerate().find_map(|(drone, start)| {
+        let end = start + Vec2::new(stop_m, 0.0);
+        let distance_m = |shape: &ConvexShape| skein_agent::braking_filter::distance_m(shape, start, end);
+        let (obstacle, nearest_m) =
+            shapes.iter().map(distance_m).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (nearest_m < clearance_m).then(|| {
+            format!(
+                "drone {drone} starts at {} m/s and stops within {stop_m:.2} m, {nearest_m:.2} m from obstacle {obstacle}, \
+                 expected at least avoidance.clearance_m = {clearance_m} m: it cannot keep the clearance",
+                scenario.drone.speed_mps
+            )
+        })
+    })
+}
+
+/// A formation that stops before any drone senses the first obstacle, though the mission ends behind it.
+fn stops_unseen(scenario: &Scenario, shapes: &[ConvexShape]) -> Option<String> {
+    let (stop_x_m, range_m) = (scenario.mission.stop_x_m, scenario.sensors.detection_range_m);
+    if scenario.mission.end != End::Hold || shapes.is_empty() {
+        return None;
+    }
+    let first_x_m = shapes.iter().map(|shape| shape.bounds().0.x).fold(f64::INFINITY, f64::min);
+    (stop_x_m + range_m < first_x_m).then(|| {
+        format!(
+            "the formation stops at mission.stop_x_m = {stop_x_m} m and senses {range_m} m far, but the first obstacle begins at \
+             x = {first_x_m:.1} m: no drone ever senses it, and the mission does not end before its time limit"
+        )
+    })
+}
+
+fn enclosed(drones: &[u32]) -> Option<String> {
+    let ids: Vec<String> = drones.iter().map(u32::to_string).collect();
+    (!ids.is_empty()).then(|| {
+        format!(
+            "obstacles with gaps of less than two avoidance.clearance_m enclose drone {} or the goal: the mission ends as stuck",
+            ids.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_scenario::ScenarioSource;
+
+    fn warned(text: &str) -> String {
+        let text =
+            if text.contains("[formation]") { text.to_owned() } else { format!("[formation]\ndrones = 8\n{text}") };
+        let scenario = Scenario::parse(&text, ScenarioSource { name: "test", stem: "test" }, &[]).unwrap();
+        warnings(&scenario).unwrap().join("\n")
+    }
+
+    #[test]
+    fn a_scenario_that_works_gives_no_warning() {
+        assert_eq!(warned("[formation]\ndrones = 8\n"), "");
+    }
+
+    #[test]
+    fn each_warning_names_its_keys() {
+        let blind = warned("[drone]\nspeed_mps = 12\n[sensors]\nranging_m = 36\n");
+        assert!(blind.contains("drone.speed_mps = 12") && blind.contains("sensors.ranging_m"), "{blind}");
+        let late = warned("[drone]\nreaction_time_s = 1.5\n[sensors]\ndetection_range_m = 200\n");
+        assert!(late.contains("formation.spacing_m"), "{late}");
+        let wall = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\ncentre_m = ";
+        let close = warned(&format!("{wall}[27, 0]\n"));
+        assert!(close.contains("drone 0 starts at 10 m/s") && close.contains("obstacle 0"), "{close}");
+        let unseen = warned(&format!("[mission]\nstop_x_m = 100\n{wall}[900, 0]\n"));
+        assert!(unseen.contains("mission.stop_x_m = 100"), "{unseen}");
+        let ring: String = [(0, 100, 100, 5), (0, -100, 100, 5), (-95, 0, 5, 100), (95, 0, 5, 100)]
+            .map(|(x, y, hx, hy)| {
+                format!("[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [{hx}, {hy}]\ncentre_m = [{x}, {y}]\n")
+            })
+            .concat();
+        let caught = warned(&format!("[formation]\ndrones = 1\n{ring}"));
+        assert!(caught.contains("enclose drone 0"), "{caught}");
+    }
+}
