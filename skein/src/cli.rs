@@ -34,6 +34,8 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Fly a grid of missions side by side; write CSV, JSON and plots with 95 % intervals; resumable
     Sweep(crate::sweep::SweepArgs),
+    /// Search an experiment's runs and their neighbourhood for missions that fail, and make what is found small
+    Hunt(crate::hunt::HuntArgs),
     /// Reproduce the paper's tables and figures, with the published numbers beside ours, in one report
     Reproduce(crate::reproduce::ReproduceArgs),
     /// Print the TOML of a random scene

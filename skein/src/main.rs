@@ -11,6 +11,7 @@ mod clean;
 mod cli;
 mod doctor;
 mod exit;
+mod hunt;
 mod input;
 mod interrupt;
 mod options;
@@ -55,6 +56,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Run(args) => run::run(&args),
         Command::Check(args) => check::check(&args),
         Command::Sweep(args) => sweep::sweep(&args),
+        Command::Hunt(args) => hunt::hunt(&args),
         Command::Reproduce(args) => reproduce::reproduce(&args),
         Command::Scene(args) => sweep::scene(&args),
         Command::Report(args) => report::report(&args),

@@ -11,6 +11,9 @@
 //! `runs.csv`, `summary.json` and `plots/*.svg`; and `ratios.csv` and `plots/ratios.svg` if `shortest-path` is one of
 //! several strategies. If a run fails, the sweep goes on, and the run's row says why.
 //!
+//! A [`hunt::Hunt`] searches the runs of a grid, and missions that differ a little from them, for failures, and makes what it finds
+//! small.
+//!
 //! This crate does not print, and it does not know the command line: progress and interruption are callbacks. It does not
 //! know what the missions are about.
 //!
@@ -43,6 +46,7 @@ mod error;
 mod experiment;
 mod flight;
 mod grid;
+pub mod hunt;
 mod metrics;
 mod plots;
 mod random_scene;

@@ -1,0 +1,165 @@
+//! `skein hunt`.
+
+use crate::exit::{Exit, Failure};
+use crate::interrupt::Interrupt;
+use crate::options::key_value;
+use crate::progress::RunsBar;
+use crate::sweep::jobs;
+use clap::Args;
+use serde_json::json;
+use skein_sweep::hunt::{self, FailureKind, Hunt, HuntReport};
+use skein_sweep::{Grid, Progress};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `hunt`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "A hunt flies runs of the experiment (or seeds of the scenario), then missions that differ a little from \
+those that came nearest to a failure. It makes each kind of failure that it finds small and writes it as a scenario file.
+
+Exit codes: 0 nothing found, 1 a mission that does not reach its goal, 4 a broken invariant.
+
+Examples:
+  skein hunt experiments/wide-scenes.toml --flights 2000
+  skein hunt scenarios/paper/forest.toml --set radio.preset=jammed"
+)]
+pub(crate) struct HuntArgs {
+    /// Experiment or scenario file (TOML)
+    pub(crate) source: PathBuf,
+    /// Flights of the search; each finding takes up to 300 more to make it small
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(crate) flights: u32,
+    /// Seed of the changes that make neighbours
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Missions to fly side by side [default: number of cores]
+    #[arg(long, value_name = "N", value_parser = jobs)]
+    pub(crate) jobs: Option<usize>,
+    /// Override a scenario key in every run, such as radio.range_m=200; repeatable
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
+    pub(crate) overrides: Vec<(String, String)>,
+    /// Folder for the scenario files of what is found; it must not exist [default: hunts/<name>-<number>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Hunts, writes what was found, and prints the report.
+pub(crate) fn hunt(args: &HuntArgs) -> Result<Exit, Failure> {
+    let experiment = hunt::source(&args.source).map_err(Failure::usage)?;
+    let grid = Grid::new(&experiment, &args.overrides);
+    let interrupt = Interrupt::watch()?;
+    let interrupted = || interrupt.signal();
+    let workers = args.jobs.or_else(|| std::thread::available_parallelism().ok().map(std::num::NonZero::get));
+    let mut bar = RunsBar::new(args.quiet || args.json);
+    let search = Hunt::new(&grid).flights(args.flights as usize).seed(args.seed).workers(workers.unwrap_or(1));
+    let runs = args.flights as usize;
+    let report = search.interrupted(&interrupted).run(|done, _| bar.show(Progress { done, runs }));
+    bar.finish();
+    let report = report.map_err(|error| Failure::usage(format!("{}: {error}", args.source.display())))?;
+    let files = write(args, &experiment.name, &report)?;
+    print(args, &report, &files);
+    let found = |kind| report.findings.iter().any(|finding| finding.failure.kind == kind);
+    Ok(match interrupt.signal() {
+        Some(signal) => Exit::Interrupted(signal),
+        None if report.findings.is_empty() => Exit::Reached,
+        None if report.findings.len() == 1 && found(FailureKind::NotReached) => Exit::NotReached,
+        None => Exit::Unsafe,
+    })
+}
+
+/// Writes one scenario file for each finding. Returns their paths.
+fn write(args: &HuntArgs, name: &str, report: &HuntReport) -> Result<Vec<PathBuf>, Failure> {
+    if report.findings.is_empty() {
+        return Ok(Vec::new());
+    }
+    let folder = folder(args, name)?;
+    let files = report.findings.iter().enumerate().map(|(number, finding)| {
+        let path = folder.join(format!("finding-{}.toml", number + 1));
+        let text = format!(
+            "# {}: {:.3} of the distance to keep.\n{}",
+            finding.failure.kind.words(),
+            finding.failure.value,
+            finding.toml
+        );
+        std::fs::write(&path, text).map(|()| path.clone()).map_err(|error| refused(&path, &error))
+    });
+    files.collect()
+}
+
+/// Makes the folder: the one that is named, or the first free number.
+fn folder(args: &HuntArgs, name: &str) -> Result<PathBuf, Failure> {
+    if let Some(path) = &args.out {
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let made = parent.map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::create_dir(path));
+        return made.map(|()| path.clone()).map_err(|error| refused(path, &error));
+    }
+    let parent = Path::new("hunts");
+    std::fs::create_dir_all(parent).map_err(|error| refused(parent, &error))?;
+    for number in 1..u32::MAX {
+        let path = parent.join(format!("{name}-{number}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(refused(&path, &error)),
+        }
+    }
+    Err(Failure::usage("hunts: every number is taken; name a folder with --out"))
+}
+
+fn refused(path: &Path, error: &std::io::Error) -> Failure {
+    match error.kind() {
+        std::io::ErrorKind::AlreadyExists => Failure::usage(format!("{}: exists; name another --out", path.display())),
+        _ => Failure::environment(format!("{}: {error}", path.display())),
+    }
+}
+
+fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
+    let mut out = std::io::stdout().lock();
+    let findings = report.findings.iter().zip(files);
+    let text = if args.json {
+        let findings: Vec<_> = findings
+            .map(|(finding, file)| {
+                json!({
+                    "failure": finding.failure.kind.words(), "value": finding.failure.value, "file": file,
+                    "command": format!("skein run {}", file.display()), "found_by": finding.command,
+                })
+            })
+            .collect();
+        let (separation, clearance) = (report.least_separation, report.least_clearance);
+        format!(
+            "{}\n",
+            json!({
+                "flights": report.flights, "findings": findings,
+                "least_separation_ratio": separation, "least_clearance_ratio": clearance,
+            })
+        )
+    } else if args.quiet {
+        String::new()
+    } else {
+        let mut text = format!("{} flights, {} kinds of failure\n", report.flights, report.findings.len());
+        for (finding, file) in findings {
+            let value = if finding.failure.value > 0.0 {
+                format!(", {:.3} of the distance to keep", finding.failure.value)
+            } else {
+                String::new()
+            };
+            text += &format!("\n  {}{value}\n  skein run {}\n", finding.failure.kind.words(), file.display());
+            text += &finding.command.iter().map(|command| format!("  found by: {command}\n")).collect::<String>();
+        }
+        let ratio = |name: &str, ratio: Option<f64>| {
+            ratio.map_or(String::new(), |ratio| {
+                format!("\n  least {name} of the others: {ratio:.3} of the distance to keep")
+            })
+        };
+        text + &ratio("separation", report.least_separation) + &ratio("clearance", report.least_clearance) + "\n"
+    };
+    // A closed pipe is the reader's choice.
+    let _ = out.write_all(text.as_bytes());
+}

@@ -1,0 +1,107 @@
+//! Small changes of a mission.
+
+use crate::splitmix::SplitMix64;
+use skein_scenario::{Obstacle, Scenario, ScenarioSource};
+
+/// Attempts to find a change that leaves the scenario valid.
+const ATTEMPTS: u64 = 20;
+/// Most changes of one neighbour.
+const MOST_CHANGES: u32 = 3;
+/// Longest shift of an obstacle or of the goal, in safe distances.
+const SHIFT: f64 = 1.0;
+
+/// A valid scenario that differs a little from `parent`. It depends on the two keys only. `None` if no attempt is valid.
+pub(super) fn neighbour(parent: &Scenario, seed: u64, number: u64) -> Option<Scenario> {
+    (0..ATTEMPTS).find_map(|attempt| {
+        let mut rng = SplitMix64::keyed(seed, number * ATTEMPTS + attempt);
+        let mut scenario = parent.clone();
+        for _ in 0..rng.integer(1, MOST_CHANGES) {
+            change(&mut scenario, &mut rng);
+        }
+        checked(&scenario)
+    })
+}
+
+/// The scenario, read again from its own text, if it is valid.
+fn checked(scenario: &Scenario) -> Option<Scenario> {
+    let text = scenario.to_toml().ok()?;
+    Scenario::parse(&text, ScenarioSource { name: "neighbour", stem: "neighbour" }, &[]).ok()
+}
+
+fn change(scenario: &mut Scenario, rng: &mut SplitMix64) {
+    let shift_m = SHIFT * scenario.drone.safe_distance_m;
+    let obstacles = scenario.obstacles.len() as u32;
+    match rng.integer(0, 11) {
+        0 => scenario.seed = u64::from(rng.integer(1, 1_000_000)),
+        1 => scenario.formation.drones = (scenario.formation.drones + rng.integer(0, 4)).saturating_sub(2).max(1),
+        2 => scale(&mut scenario.formation.spacing_m, rng),
+        3 => scale(&mut scenario.drone.speed_mps, rng),
+        4 => scale(&mut scenario.drone.acceleration_max_mps2, rng),
+        5 => scale(&mut scenario.sensors.detection_range_m, rng),
+        6 => {
+            scenario.formation.start_jitter_m =
+                rng.between(0.0, 0.5) * (scenario.formation.spacing_m - scenario.drone.safe_distance_m)
+        }
+        7 => scenario.radio.loss = rng.between(0.0, 0.6),
+        8 => shift_goal(scenario, rng, shift_m),
+        9 => shift_fault(scenario, rng),
+        _ if obstacles > 0 => {
+            let obstacle = &mut scenario.obstacles[rng.integer(0, obstacles - 1) as usize];
+            if rng.integer(0, 1) == 0 { shift(obstacle, rng, shift_m) } else { resize(obstacle, rng) }
+        }
+        _ => scale(&mut scenario.mission.reform_speed_max_mps, rng),
+    }
+}
+
+fn scale(value: &mut f64, rng: &mut SplitMix64) {
+    *value *= rng.between(0.8, 1.25);
+}
+
+fn shift_goal(scenario: &mut Scenario, rng: &mut SplitMix64, by_m: f64) {
+    for coordinate in scenario.mission.goal_m.iter_mut().flatten() {
+        *coordinate += rng.between(-by_m, by_m);
+    }
+}
+
+fn shift_fault(scenario: &mut Scenario, rng: &mut SplitMix64) {
+    let count = scenario.fault_plan.len() as u32;
+    if count > 0 {
+        let fault = &mut scenario.fault_plan[rng.integer(0, count - 1) as usize];
+        for time_s in [&mut fault.at_s, &mut fault.for_s].into_iter().flatten() {
+            *time_s = (*time_s + rng.between(-2.0, 2.0)).max(0.1);
+        }
+    }
+}
+
+fn shift(obstacle: &mut Obstacle, rng: &mut SplitMix64, by_m: f64) {
+    let offset = [rng.between(-by_m, by_m), rng.between(-by_m, by_m)];
+    let by_offset = |point: &mut [f64; 2]| *point = [point[0] + offset[0], point[1] + offset[1]];
+    match obstacle {
+        Obstacle::Rectangle { centre_m, .. }
+        | Obstacle::Circle { centre_m, .. }
+        | Obstacle::Ellipse { centre_m, .. } => {
+            by_offset(centre_m);
+        }
+        Obstacle::Polygon { vertices_m } => vertices_m.iter_mut().for_each(by_offset),
+    }
+}
+
+fn resize(obstacle: &mut Obstacle, rng: &mut SplitMix64) {
+    match obstacle {
+        Obstacle::Circle { radius_m, .. } => scale(radius_m, rng),
+        Obstacle::Rectangle { half_size_m: sizes_m, rotation_rad, .. }
+        | Obstacle::Ellipse { semi_axes_m: sizes_m, rotation_rad, .. } => {
+            scale(&mut sizes_m[0], rng);
+            scale(&mut sizes_m[1], rng);
+            *rotation_rad += rng.between(-0.2, 0.2);
+        }
+        Obstacle::Polygon { vertices_m } => {
+            let count = vertices_m.len().max(1) as f64;
+            let centre = vertices_m.iter().fold([0.0, 0.0], |c, v| [c[0] + v[0] / count, c[1] + v[1] / count]);
+            let factor = rng.between(0.8, 1.25);
+            for vertex in vertices_m {
+                *vertex = [0, 1].map(|axis| centre[axis] + (vertex[axis] - centre[axis]) * factor);
+            }
+        }
+    }
+}

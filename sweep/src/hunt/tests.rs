@@ -1,0 +1,43 @@
+use super::*;
+use crate::experiment::Experiment;
+use std::path::Path;
+
+/// Hunts in an experiment whose drones are all blind from the start: some fly into obstacles.
+fn hunted(text: &str, flights: usize, workers: usize) -> HuntReport {
+    let experiment = Experiment::parse(text, "test", Path::new("")).unwrap();
+    let blind = [("fault.0.kind", "blind"), ("fault.0.at_s", "0"), ("fault.0.target", "all")];
+    let overrides = blind.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let grid = Grid::new(&experiment, &overrides);
+    Hunt::new(&grid).flights(flights).shrink_flights(60).workers(workers).run(|_, _| {}).unwrap()
+}
+
+/// Small random scenes.
+const BLIND: &str = r#"
+    scenario = "random"
+    seeds = 6
+    [random]
+    drones = [2, 4]
+    obstacles = [1, 2]
+"#;
+
+#[test]
+fn a_hunt_finds_a_failure_and_makes_it_small() {
+    let report = hunted(BLIND, 12, 2);
+    let finding = report.findings.iter().find(|finding| finding.failure.kind == FailureKind::Clearance);
+    let finding = finding.expect("a blind swarm flies into an obstacle");
+    assert!(finding.failure.value < 1.0 && finding.toml.contains("blind"), "{}", finding.toml);
+    assert!(finding.toml.matches("[[obstacle]]").count() == 1 && finding.toml.len() < 1500, "{}", finding.toml);
+}
+
+#[test]
+fn the_number_of_workers_does_not_change_what_is_found() {
+    assert_eq!(hunted(BLIND, 10, 1), hunted(BLIND, 10, 2));
+}
+
+#[test]
+fn neighbours_are_valid_and_differ() {
+    let experiment = Experiment::parse("scenario = \"wide\"\nseeds = 1", "test", Path::new("")).unwrap();
+    let parent = Grid::new(&experiment, &[]).scenario(0).unwrap();
+    let near: Vec<Scenario> = (0..20).filter_map(|number| mutation::neighbour(&parent, 1, number)).collect();
+    assert!(near.len() >= 15 && near.iter().filter(|one| **one != parent).count() >= 12, "{}", near.len());
+}
