@@ -4,14 +4,14 @@
 use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::files::FORMATION;
+use crate::folder::RunFolder;
 use crate::formation::{centred, error, slots};
 use crate::tuning::{
     DEVIATION_DRONES_MAX, DEVIATION_LARGE_SWARM_PERIOD_S, DEVIATION_PERIOD_S, DEVIATION_SMALL_SWARM_MAX,
 };
 use skein_protocol::Vec2;
 use skein_protocol::thin_plate::ThinPlate;
-use std::fmt::Write as _;
-use std::path::Path;
+use std::io::{self, Write};
 
 const HEADER: &str = "t_s,disturbance_m,largest_m,bending";
 
@@ -36,19 +36,13 @@ pub(crate) struct DeviationSampler {
     plate: Option<(Vec<Vec2>, ThinPlate)>,
     /// Number of the period of the last sample.
     period: Option<i64>,
-    samples: Vec<ShapeDeviation>,
 }
 
 impl DeviationSampler {
-    /// The samples so far.
-    pub(crate) fn samples(&self) -> &[ShapeDeviation] {
-        &self.samples
-    }
-
     /// Takes the positions of the living drones in a tick, and makes a sample of them if one is due.
-    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
+    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> Option<ShapeDeviation> {
         if positions.len() < 2 || positions.len() > DEVIATION_DRONES_MAX {
-            return;
+            return None;
         }
         let every_s = if positions.len() > DEVIATION_SMALL_SWARM_MAX {
             DEVIATION_LARGE_SWARM_PERIOD_S
@@ -56,10 +50,7 @@ impl DeviationSampler {
             DEVIATION_PERIOD_S
         };
         let now = (t_s / every_s + 1e-6).floor() as i64;
-        if self.period.replace(now) != Some(now) {
-            let sample = self.measure(facts, t_s, positions);
-            self.samples.extend(sample);
-        }
+        if self.period.replace(now) == Some(now) { None } else { self.measure(facts, t_s, positions) }
     }
 
     fn measure(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> Option<ShapeDeviation> {
@@ -81,23 +72,30 @@ impl DeviationSampler {
 }
 
 /// Writes formation.csv, one line per sample.
-pub(crate) fn write(folder: &Path, samples: &[ShapeDeviation]) -> Result<(), ReportError> {
-    let mut csv = format!("{HEADER}\n");
-    for ShapeDeviation { t_s, disturbance_m, largest_m, bending } in samples {
-        // Writing to a string cannot fail.
-        let _ = writeln!(csv, "{t_s},{disturbance_m:.6},{largest_m:.6},{bending:.6}");
+pub(crate) struct DeviationWriter<W>(W);
+
+impl<W: Write> DeviationWriter<W> {
+    pub(crate) fn new(mut out: W) -> io::Result<Self> {
+        writeln!(out, "{HEADER}").map(|()| Self(out))
     }
-    let path = folder.join(FORMATION);
-    std::fs::write(&path, csv).map_err(ReportError::io(&path))
+
+    pub(crate) fn take(&mut self, deviation: &ShapeDeviation) -> io::Result<()> {
+        let ShapeDeviation { t_s, disturbance_m, largest_m, bending } = deviation;
+        writeln!(self.0, "{t_s},{disturbance_m:.6},{largest_m:.6},{bending:.6}")
+    }
+
+    pub(crate) fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// Reads formation.csv of a run's folder, which [`crate::plot::write`] writes.
 ///
 /// # Errors
 /// [`ReportError::Io`], or [`ReportError::Content`] if a line is not as expected.
-pub fn read(folder: &Path) -> Result<Vec<ShapeDeviation>, ReportError> {
-    let path = folder.join(FORMATION);
-    let text = std::fs::read_to_string(&path).map_err(ReportError::io(&path))?;
+pub fn read(folder: &RunFolder) -> Result<Vec<ShapeDeviation>, ReportError> {
+    let path = folder.path().join(FORMATION);
+    let text = io::read_to_string(folder.files().read(FORMATION)?).map_err(ReportError::io(&path))?;
     let content = |found: String| ReportError::Content { path: path.clone(), expected: HEADER, found };
     let mut lines = text.lines();
     match lines.next() {
@@ -124,8 +122,7 @@ mod tests {
 
     fn measured(positions: &[Vec2]) -> ShapeDeviation {
         let mut deviations = DeviationSampler::default();
-        deviations.take(&facts(8), 1.0, positions);
-        deviations.samples()[0]
+        deviations.take(&facts(8), 1.0, positions).unwrap()
     }
 
     #[test]
@@ -148,15 +145,18 @@ mod tests {
     fn large_swarms_are_sampled_less_often_and_samples_survive_the_file() {
         for (count, expected) in [(8, 10), (65, 2), (201, 0), (1, 0)] {
             let mut deviations = DeviationSampler::default();
-            (0..50).for_each(|tick| {
-                deviations.take(&facts(count as u32), 0.51 + f64::from(tick) * 0.02, &flown(count, |slot| slot * 1.5));
-            });
-            assert!(deviations.samples.len().abs_diff(expected) <= 1, "{count}: {}", deviations.samples.len());
-            let folder = tempfile::tempdir().unwrap();
-            write(folder.path(), &deviations.samples).unwrap();
-            let read = read(folder.path()).unwrap();
+            let take = |tick| {
+                deviations.take(&facts(count as u32), 0.51 + f64::from(tick) * 0.02, &flown(count, |slot| slot * 1.5))
+            };
+            let samples: Vec<ShapeDeviation> = (0..50).filter_map(take).collect();
+            assert!(samples.len().abs_diff(expected) <= 1, "{count}: {}", samples.len());
+            let root = tempfile::tempdir().unwrap();
+            let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+            let mut writer = DeviationWriter::new(folder.files().create(FORMATION).unwrap()).unwrap();
+            samples.iter().try_for_each(|sample| writer.take(sample)).unwrap();
+            let read = read(&folder).unwrap();
             let times = |samples: &[ShapeDeviation]| samples.iter().map(|sample| sample.t_s).collect::<Vec<_>>();
-            assert_eq!(times(&read), times(&deviations.samples));
+            assert_eq!(times(&read), times(&samples));
         }
     }
 }

@@ -12,6 +12,23 @@ pub enum ReportError {
     /// The folder holds something that is not a run.
     #[error("{0} is not the folder of a run (it has no manifest.json of a run); nothing in it was changed")]
     NotARun(PathBuf),
+    /// The run was recorded, but its summary was not written.
+    #[error("{0}: the run in it has no summary: it still flies, or it was killed; `skein report` then writes one")]
+    NoSummary(PathBuf),
+    /// Another process writes to the folder.
+    #[error("{0}: another process is at work in this folder; wait for its end, or name another folder")]
+    InUse(PathBuf),
+    /// The folder belongs to another user, who could lead files anywhere.
+    #[error("{path}: belongs to user {owner}; expected a folder of your own")]
+    Foreign {
+        /// The folder, or the link to it.
+        path: PathBuf,
+        /// Its owner.
+        owner: u32,
+    },
+    /// A signal came in while files were written.
+    #[error("interrupted while the files of the run were written")]
+    Interrupted,
     /// An operation of the file system failed.
     #[error("{path}: {source}")]
     Io {
@@ -49,6 +66,13 @@ pub enum ReportError {
 }
 
 impl ReportError {
+    /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        use ReportError::{Content, Exists, Foreign, InUse, NoSummary, NotARun};
+        matches!(self, Exists(_) | NotARun(_) | NoSummary(_) | InUse(_) | Foreign { .. } | Content { .. })
+    }
+
     /// For `map_err`: an I/O error at `path`.
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }

@@ -3,12 +3,15 @@
 use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::files::{self, MANIFEST, PLOTS, PROCESSES, SUMMARY};
+use crate::json_text::json;
+use crate::reserved_summary::ReservedSummary;
 use crate::summary::Summary;
+use crate::work_folder::{WorkFolder, part};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const MANIFEST_SCHEMA: &str = "skein-manifest/1";
 
@@ -74,9 +77,18 @@ pub struct ProcessEntry {
     pub pid: u32,
 }
 
-/// The folder of a run.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RunFolder(PathBuf);
+/// Greatest size of a JSON file that is read, bytes.
+const JSON_BYTES_MAX: u64 = 256 << 20;
+/// Room that is kept for the summary: bytes, and bytes for each drone.
+const SUMMARY_ROOM: [u64; 2] = [64 << 10, 512];
+
+/// The folder of a run. It is locked from the first write on, see [`WorkFolder`].
+#[derive(Clone, Debug)]
+pub struct RunFolder {
+    work: WorkFolder,
+    /// Whether this process has made it.
+    new: bool,
+}
 
 impl RunFolder {
     /// Creates `<root>/<scenario>-<number>` with the next free number, from 1. Concurrent runs get different folders.
@@ -90,38 +102,39 @@ impl RunFolder {
         let mut number = last_number(root, &stem)?;
         loop {
             number += 1;
-            let path = root.join(format!("{stem}-{number}"));
-            match fs::create_dir(&path) {
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                made => return made.map(|()| Self(path.clone())).map_err(ReportError::io(&path)),
+            match WorkFolder::make(&root.join(format!("{stem}-{number}"))) {
+                Ok((work, true)) => return Ok(Self { work, new: true }),
+                // Another run has just taken the number.
+                Ok((_, false)) | Err(ReportError::InUse(_) | ReportError::Foreign { .. }) => {}
+                Err(error) => return Err(error),
             }
         }
     }
 
-    /// Creates the folder `path`. An existing folder is refused; with `force`, the files of the run in it are removed
-    /// first, and no other files.
+    /// Creates the folder `path`. An existing folder is refused, unless `force` is set and it is empty or a run's.
+    /// [`RunFolder::begin`] then replaces the run in it.
     ///
     /// # Errors
-    /// [`ReportError::Exists`], [`ReportError::NotARun`] for a folder that is neither empty nor of a run, or
-    /// [`ReportError::Io`].
+    /// [`ReportError::Exists`], [`ReportError::InUse`], [`ReportError::Foreign`], [`ReportError::NotARun`] for a folder
+    /// that is neither empty nor of a run, or [`ReportError::Io`].
     pub fn at(path: &Path, force: bool) -> Result<Self, ReportError> {
-        if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-            fs::create_dir_all(parent).map_err(ReportError::io(parent))?;
-        }
-        match fs::create_dir(path) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            made => return made.map(|()| Self(path.to_owned())).map_err(ReportError::io(path)),
-        }
-        if !force {
+        if !force && path.symlink_metadata().is_ok() {
             return Err(ReportError::Exists(path.to_owned()));
         }
-        if !path.is_dir() {
+        if path.exists() && !path.is_dir() {
             return Err(ReportError::NotARun(path.to_owned()));
         }
-        let empty = fs::read_dir(path).map_err(ReportError::io(path))?.next().is_none();
-        let folder = if empty { Self(path.to_owned()) } else { Self::open(path)? };
-        folder.clear()?;
-        Ok(folder)
+        let (work, new) = WorkFolder::make(path)?;
+        // Another process may have made it since.
+        if !new && !force {
+            return Err(ReportError::Exists(path.to_owned()));
+        }
+        let folder = Self { work, new };
+        if new || folder.is_empty()? || folder.holds_a_run() {
+            Ok(folder)
+        } else {
+            Err(ReportError::NotARun(path.to_owned()))
+        }
     }
 
     /// Opens the folder of a recorded run.
@@ -129,28 +142,49 @@ impl RunFolder {
     /// # Errors
     /// [`ReportError::NotARun`] if it holds no manifest of a run.
     pub fn open(path: &Path) -> Result<Self, ReportError> {
-        let schema = fs::read(path.join(MANIFEST)).ok().and_then(|bytes| {
-            let manifest: serde_json::Value = serde_json::from_slice(&bytes).ok()?;
-            manifest.get("schema")?.as_str().map(str::to_owned)
-        });
-        match schema {
-            Some(schema) if schema.starts_with("skein-manifest/") => Ok(Self(path.to_owned())),
-            _ => Err(ReportError::NotARun(path.to_owned())),
+        let not_a_run = || ReportError::NotARun(path.to_owned());
+        let folder = Self { work: WorkFolder::open(path).map_err(|_| not_a_run())?, new: false };
+        if folder.holds_a_run() { Ok(folder) } else { Err(not_a_run()) }
+    }
+
+    /// Begins the run of this manifest: removes the files of an earlier run, and no other files, and writes manifest.json.
+    /// If the process is killed meanwhile, the folder still is a run's.
+    ///
+    /// # Errors
+    /// [`ReportError::Io`].
+    pub fn begin(&self, manifest: &Manifest) -> Result<(), ReportError> {
+        self.clear()?;
+        self.write_json(MANIFEST, manifest)
+    }
+
+    /// Undoes [`RunFolder::begin`] for a run that did not start. Removes the folder if this process has made it and no
+    /// other files are in it.
+    pub fn abandon(self) {
+        // What cannot be removed does no harm: the next run in this folder replaces it.
+        let _ = self.clear().and_then(|()| self.work.remove(MANIFEST));
+        if self.new {
+            let _ = fs::remove_dir(self.path());
         }
+    }
+
+    /// Keeps room on the disk for the summary of a run with so many drones, so that it can be written if the disk is full.
+    ///
+    /// # Errors
+    /// [`ReportError::Io`].
+    pub fn reserve_summary(&self, drones: u32) -> Result<ReservedSummary, ReportError> {
+        let room = SUMMARY_ROOM[0] + SUMMARY_ROOM[1] * u64::from(drones);
+        ReservedSummary::new(&self.work, room)
     }
 
     /// Path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
-        &self.0
+        self.work.path()
     }
 
-    /// Writes manifest.json.
-    ///
-    /// # Errors
-    /// [`ReportError::Io`].
-    pub fn write_manifest(&self, manifest: &Manifest) -> Result<(), ReportError> {
-        self.write_json(MANIFEST, manifest)
+    /// The files of the folder.
+    pub(crate) fn files(&self) -> &WorkFolder {
+        &self.work
     }
 
     /// Reads manifest.json.
@@ -177,51 +211,68 @@ impl RunFolder {
         self.write_json(SUMMARY, summary)
     }
 
+    /// Whether the run has a summary.
+    #[must_use]
+    pub fn has_summary(&self) -> bool {
+        self.work.read(SUMMARY).is_ok()
+    }
+
     /// Reads summary.json.
     ///
     /// # Errors
-    /// [`ReportError::Io`] or [`ReportError::Content`].
+    /// [`ReportError::NoSummary`] if the run has none, [`ReportError::Io`] or [`ReportError::Content`].
     pub fn read_summary(&self) -> Result<Summary, ReportError> {
-        self.read_json(SUMMARY, "the summary of a run by this version of Skein")
+        match self.read_json(SUMMARY, "the summary of a run by this version of Skein") {
+            Err(ReportError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {
+                Err(ReportError::NoSummary(self.path().to_owned()))
+            }
+            read => read,
+        }
     }
 
-    /// Path of the folder for plots, which is created if it is missing.
-    pub(crate) fn plots(&self) -> Result<PathBuf, ReportError> {
-        let path = self.0.join(PLOTS);
-        fs::create_dir_all(&path).map_err(ReportError::io(&path))?;
-        Ok(path)
+    /// Whether manifest.json is that of a run.
+    fn holds_a_run(&self) -> bool {
+        let Ok(bytes) = self.work.read_whole(MANIFEST, JSON_BYTES_MAX) else { return false };
+        let schema = serde_json::from_slice::<serde_json::Value>(&bytes).ok();
+        let schema = schema.as_ref().and_then(|manifest| manifest.get("schema")?.as_str());
+        schema.is_some_and(|schema| schema.starts_with("skein-manifest/"))
     }
 
-    /// Writes a file under another name and renames it, so that a reader finds the whole file or none.
+    /// Whether it holds nothing, except provisional files of a run that was killed before it began.
+    fn is_empty(&self) -> Result<bool, ReportError> {
+        Ok(self.work.names()?.iter().all(|name| files::ALL.iter().any(|file| *name == part(file))))
+    }
+
     fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), ReportError> {
-        let (path, beside) = (self.0.join(name), self.0.join(format!(".{name}.part")));
-        let mut bytes = serde_json::to_vec_pretty(value).map_err(|error| ReportError::io(&path)(error.into()))?;
-        bytes.push(b'\n');
-        fs::write(&beside, bytes).map_err(ReportError::io(&beside))?;
-        fs::rename(&beside, &path).map_err(ReportError::io(&path))
+        self.work.write(name, &json(value).map_err(ReportError::io(&self.path().join(name)))?)
     }
 
     fn read_json<T: DeserializeOwned>(&self, name: &str, expected: &'static str) -> Result<T, ReportError> {
-        let path = self.0.join(name);
-        let bytes = fs::read(&path).map_err(ReportError::io(&path))?;
+        let bytes = self.work.read_whole(name, JSON_BYTES_MAX)?;
         serde_json::from_slice(&bytes).map_err(|error| ReportError::Content {
-            path,
+            path: self.path().join(name),
             expected,
             found: error.to_string(),
         })
     }
 
-    /// Removes the files of the run.
+    /// Removes the files of the run, except for its manifest: a folder without it is not a run's.
     fn clear(&self) -> Result<(), ReportError> {
-        let plots = self.0.join(PLOTS);
-        // If `plots` were a symbolic link, this would remove files outside of the run.
-        let own_plots = fs::symlink_metadata(&plots).is_ok_and(|meta| meta.is_dir());
-        let plot_files = files::PLOT_FILES.iter().filter(|_| own_plots).map(|name| plots.join(name));
-        for path in files::ALL.iter().map(|name| self.0.join(name)).chain(plot_files) {
-            match fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => return Err(ReportError::io(&path)(error)),
-                _ => {}
+        for name in files::ALL {
+            if name != MANIFEST {
+                self.work.remove(name)?;
             }
+            self.work.remove(&part(name))?;
+        }
+        let Ok(plots) = self.path().join(PLOTS).symlink_metadata() else { return Ok(()) };
+        // If `plots` were a symbolic link, this would remove files outside of the run.
+        if plots.is_dir() {
+            let plots = self.work.subfolder(PLOTS)?;
+            for name in files::PLOT_FILES {
+                plots.remove(name)?;
+            }
+            // It stays if it holds other files.
+            let _ = fs::remove_dir(plots.path());
         }
         Ok(())
     }
@@ -272,15 +323,16 @@ mod tests {
     fn an_existing_folder_is_refused_without_force() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("deep").join("run");
-        RunFolder::at(&path, false).unwrap().write_manifest(&manifest()).unwrap();
+        RunFolder::at(&path, false).unwrap().begin(&manifest()).unwrap();
         fs::write(path.join("notes.txt"), "mine").unwrap();
+        fs::write(path.join(SUMMARY), "old").unwrap();
         fs::create_dir(path.join(PLOTS)).unwrap();
         fs::write(path.join(PLOTS).join("trace.svg"), "old").unwrap();
         fs::write(path.join(PLOTS).join("own.svg"), "mine").unwrap();
         assert!(matches!(RunFolder::at(&path, false), Err(ReportError::Exists(_))));
         assert!(path.join(MANIFEST).exists());
-        RunFolder::at(&path, true).unwrap();
-        assert!(!path.join(MANIFEST).exists() && !path.join(PLOTS).join("trace.svg").exists());
+        RunFolder::at(&path, true).unwrap().begin(&manifest()).unwrap();
+        assert!(!path.join(SUMMARY).exists() && !path.join(PLOTS).join("trace.svg").exists());
         assert!(path.join("notes.txt").exists() && path.join(PLOTS).join("own.svg").exists());
     }
 
@@ -301,10 +353,52 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_does_not_start_leaves_no_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("run");
+        let begin = |force| {
+            let folder = RunFolder::at(&path, force).unwrap();
+            folder.begin(&manifest()).unwrap();
+            folder
+        };
+        begin(false).abandon();
+        assert!(!path.exists());
+        let folder = begin(false);
+        fs::write(path.join("notes.txt"), "mine").unwrap();
+        folder.abandon();
+        assert!(path.join("notes.txt").exists() && !path.join(MANIFEST).exists());
+    }
+
+    #[test]
+    fn a_folder_whose_run_was_killed_at_its_beginning_is_replaced() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("run");
+        RunFolder::at(&path, false).unwrap();
+        fs::write(path.join(part(MANIFEST)), "{").unwrap();
+        let folder = RunFolder::at(&path, true).unwrap();
+        folder.begin(&manifest()).unwrap();
+        folder.clear().unwrap();
+        drop(folder);
+        assert!(RunFolder::at(&path, true).is_ok(), "the manifest goes last");
+    }
+
+    #[test]
+    fn two_runs_do_not_share_a_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("run");
+        let first = RunFolder::at(&path, false).unwrap();
+        first.begin(&manifest()).unwrap();
+        assert!(matches!(RunFolder::at(&path, true), Err(ReportError::InUse(_))));
+        assert!(matches!(RunFolder::open(&path).unwrap().begin(&manifest()), Err(ReportError::InUse(_))));
+        drop(first);
+        RunFolder::at(&path, true).unwrap();
+    }
+
+    #[test]
     fn written_files_read_back() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        folder.write_manifest(&manifest()).unwrap();
+        folder.begin(&manifest()).unwrap();
         assert_eq!(RunFolder::open(folder.path()).unwrap().read_manifest().unwrap(), manifest());
         folder.write_processes(&[ProcessEntry { role: Role::Drone, id: Some(3), pid: 7 }]).unwrap();
         let text = fs::read_to_string(folder.path().join(PROCESSES)).unwrap();

@@ -3,7 +3,8 @@
 //! A run gives a [record](skein_protocol::record) per tick. [`Recorder`] takes the records in order and makes
 //!
 //! - the [`Summary`]: the result of the run in one object, summary.json;
-//! - trace.csv, events.jsonl and run.mcap in a [`RunFolder`], if the run has one.
+//! - a [`FlightRecord`] in a [`RunFolder`], if the run has one. From it, [`FlightRecord::write_files`] makes trace.csv,
+//!   events.jsonl and run.mcap.
 //!
 //! From a recorded folder, [`plot::write`] draws the plots and [`page::write`] makes report.html. [`text::summary`]
 //! formats a summary for a terminal. [`scene::Observer`] makes the samples from which the recording, the page and the
@@ -49,8 +50,8 @@
 //! recorder.take(RecordView { head: &head, rows: &[row], frames: &[], events: b"" }).unwrap();
 //!
 //! let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: None };
-//! let (summary, files) = recorder.finish(&completion);
-//! assert!(files.is_ok());
+//! let (summary, record) = recorder.finish(&completion);
+//! assert!(record.is_none());
 //! assert_eq!((summary.ticks, summary.energy_j.total), (1, 12.5));
 //! assert_eq!(summary.digest.as_deref(), Some("0000000000000abc"));
 //! ```
@@ -63,9 +64,12 @@ mod energy;
 mod error;
 mod facts;
 mod files;
+mod flight_record;
 mod folder;
 mod formation;
 mod geometry;
+mod interruption;
+mod json_text;
 mod leading;
 mod markup;
 mod mcap;
@@ -73,7 +77,10 @@ mod metrics;
 pub mod page;
 mod palette;
 pub mod plot;
+mod record_events;
+mod record_files;
 mod recorder;
+mod reserved_summary;
 pub mod scene;
 mod scene_facts;
 mod spool;
@@ -86,10 +93,15 @@ pub mod text;
 mod trace;
 mod tuning;
 mod vicinity;
+mod work_folder;
 
 pub use completion::RunCompletion;
 pub use error::{DrawError, ReportError};
 pub use facts::{MissionEnd, RunFacts};
+pub use flight_record::FlightRecord;
 pub use folder::{Manifest, ProcessEntry, Role, RunFolder};
+pub use interruption::Interrupted;
 pub use recorder::Recorder;
+pub use reserved_summary::ReservedSummary;
 pub use summary::*;
+pub use work_folder::WorkFolder;

@@ -7,10 +7,9 @@
 use crate::error::ReportError;
 use crate::tuning::{SPOOL_BLOCK_BYTES, SPOOL_BLOCKS, SPOOL_PIECE_BYTES};
 use crossbeam_channel::{Receiver, Sender, bounded};
-use rustix::fs::{FallocateFlags, fallocate};
 use skein_protocol::record::RecordView;
 use std::fs::File;
-use std::io::{self, BufReader, ErrorKind, Read, Write};
+use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::mem;
 use std::path::Path;
 use std::thread::JoinHandle;
@@ -27,9 +26,9 @@ pub(crate) struct Spool {
 }
 
 impl Spool {
-    /// Creates the file and starts the thread.
-    pub(crate) fn create(path: &Path) -> io::Result<Self> {
-        Self::start(File::create(path)?, SPOOL_BLOCK_BYTES)
+    /// Starts the thread, which writes to a new file.
+    pub(crate) fn new(file: File) -> io::Result<Self> {
+        Self::start(file, SPOOL_BLOCK_BYTES)
     }
 
     fn start(mut out: impl Write + Send + 'static, block_len: usize) -> io::Result<Self> {
@@ -86,34 +85,30 @@ impl Spool {
     }
 }
 
-/// Reads the records of a file in order. Frees the disk space of what was read, because the files made from it may need
-/// the space. Stops before a record that was cut short.
+/// Reads the records of a file in order, from its beginning. Stops before a record that was cut short. `path` names the file
+/// in errors.
 ///
 /// # Errors
-/// The error of `take`, or [`ReportError::Io`].
-pub(crate) fn consume(
+/// The error of `take`, [`ReportError::Io`], or [`ReportError::Content`] for bytes that are not a record.
+pub(crate) fn read(
+    mut file: &File,
     path: &Path,
     mut take: impl FnMut(RecordView<'_>) -> Result<(), ReportError>,
 ) -> Result<(), ReportError> {
-    let open = || {
-        let file = File::options().read(true).write(true).open(path)?;
-        let left = file.metadata()?.len();
-        io::Result::Ok((file, left))
-    };
-    let (file, left) = open().map_err(ReportError::io(path))?;
-    let mut records = Records { input: BufReader::with_capacity(SPOOL_PIECE_BYTES, &file), left, words: Vec::new() };
-    let mut freed = 0;
-    while let Some(record) = records.next().map_err(ReportError::io(path))? {
-        take(record)?;
-        let read = left - records.left;
-        let past = read - read % SPOOL_PIECE_BYTES as u64;
-        if past > freed {
-            // A file system without this operation keeps the space until the file is removed.
-            let _ = fallocate(&file, FallocateFlags::PUNCH_HOLE | FallocateFlags::KEEP_SIZE, freed, past - freed);
-            freed = past;
+    let begin = file.seek(SeekFrom::Start(0)).and_then(|_| file.metadata());
+    let left = begin.map_err(ReportError::io(path))?.len();
+    let mut records = Records { input: BufReader::with_capacity(SPOOL_PIECE_BYTES, file), left, words: Vec::new() };
+    loop {
+        match records.next() {
+            Ok(Some(record)) => take(record)?,
+            Ok(None) => return Ok(()),
+            Err(error) if error.kind() == ErrorKind::InvalidData => {
+                let (path, found) = (path.to_owned(), error.to_string());
+                return Err(ReportError::Content { path, expected: "the records of a run", found });
+            }
+            Err(error) => return Err(ReportError::io(path)(error)),
         }
     }
-    Ok(())
 }
 
 /// Reads records one after the other.
@@ -198,7 +193,7 @@ mod tests {
             ticks.push(record.head.tick);
             Ok(())
         };
-        consume(path, take).unwrap();
+        read(&File::open(path).unwrap(), path, take).unwrap();
         ticks
     }
 
@@ -233,37 +228,17 @@ mod tests {
     }
 
     #[test]
-    fn records_that_were_read_free_their_disk_space() {
-        use std::os::unix::fs::MetadataExt;
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(SPOOL);
-        let mut spool = Spool::create(&path).unwrap();
-        for tick in 0..4000 {
-            assert!(give(&mut spool, tick));
-        }
-        spool.finish().unwrap();
-        let blocks = || std::fs::metadata(&path).unwrap().blocks() * 512;
-        let (whole, mut left) = (blocks(), 0);
-        let take = |_: RecordView<'_>| {
-            left = blocks();
-            Ok(())
-        };
-        consume(&path, take).unwrap();
-        assert!(whole > 2 << 20 && left < whole / 2, "{whole} bytes, {left} while the last record is read");
-    }
-
-    #[test]
     fn invalid_records_are_refused_and_a_truncated_one_ends_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(SPOOL);
-        let read = |words: &[u64]| {
+        let read_words = |words: &[u64]| {
             std::fs::write(&path, bytemuck::cast_slice(words)).unwrap();
-            consume(&path, |_| panic!("{words:?} is no record"))
+            read(&File::open(&path).unwrap(), &path, |_| panic!("{words:?} is no record"))
         };
-        let error = read(&[16, 7, 7]).unwrap_err().to_string();
+        let error = read_words(&[16, 7, 7]).unwrap_err().to_string();
         assert!(error.contains(SPOOL) && error.contains("16 bytes"), "{error}");
         for cut in [&[][..], &[24, 7, 7], &[u64::MAX, 7]] {
-            read(cut).unwrap();
+            read_words(cut).unwrap();
         }
     }
 }

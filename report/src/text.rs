@@ -2,30 +2,52 @@
 
 use crate::summary::{Stage, Summary};
 use skein_protocol::record::{Outcome, Percentiles};
+use std::borrow::Cow;
 use std::fmt::Write;
 
 /// The summary of a run in several lines. `colour` prints the outcome with ANSI colours.
 #[must_use]
 pub fn summary(summary: &Summary, colour: bool) -> String {
-    let mut text = outcome(summary, colour);
+    let plain = outcome(summary);
+    let mut text = printable(&plain).into_owned();
+    if colour {
+        let word = text.find(' ').unwrap_or(text.len());
+        text.replace_range(..word, &format!("\x1b[1;{}m{}\x1b[0m", shade(summary.outcome), &text[..word]));
+    }
     text.push_str("\n\n");
     for (label, line) in lines(summary) {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "  {label:<14}{line}");
+        let _ = writeln!(text, "  {label:<14}{}", printable(&line));
     }
     text
 }
 
+/// The text with its control characters replaced, except for line feeds and tabs. A text from a file may hold sequences that
+/// steer a terminal.
+#[must_use]
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let steers = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if text.contains(steers) { text.replace(steers, "\u{fffd}").into() } else { text.into() }
+}
+
+/// The ANSI colour of an outcome.
+fn shade(outcome: Outcome) -> u8 {
+    match outcome {
+        Outcome::Reached => 32,
+        Outcome::Timeout | Outcome::Stuck => 33,
+        Outcome::Unsafe | Outcome::Aborted => 31,
+    }
+}
+
 /// The outcome in one line.
-pub(crate) fn outcome(summary: &Summary, colour: bool) -> String {
-    let (word, shade, why) = match summary.outcome {
-        Outcome::Reached => ("reached", 32, "the formation is closed and every invariant held".to_owned()),
-        Outcome::Timeout => ("timeout", 33, "the goal was not reached".to_owned()),
-        Outcome::Stuck => ("stuck", 33, "some drones have no way to the goal".to_owned()),
-        Outcome::Unsafe => ("unsafe", 31, violations(summary)),
-        Outcome::Aborted => ("aborted", 31, "the mission did not reach its end".to_owned()),
+pub(crate) fn outcome(summary: &Summary) -> String {
+    let (word, why) = match summary.outcome {
+        Outcome::Reached => ("reached", "the formation is closed and every invariant held".to_owned()),
+        Outcome::Timeout => ("timeout", "the goal was not reached".to_owned()),
+        Outcome::Stuck => ("stuck", "some drones have no way to the goal".to_owned()),
+        Outcome::Unsafe => ("unsafe", violations(summary)),
+        Outcome::Aborted => ("aborted", "the mission did not reach its end".to_owned()),
     };
-    let word = if colour { format!("\x1b[1;{shade}m{word}\x1b[0m") } else { word.to_owned() };
     let reason = summary.reason.as_ref().filter(|reason| summary.outcome != Outcome::Reached && !reason.is_empty());
     let reason = reason.map_or(String::new(), |reason| format!(" ({reason})"));
     format!("{word} after {:.2} s: {why}{reason}", summary.mission_s)

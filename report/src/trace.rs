@@ -1,11 +1,12 @@
 //! trace.csv: the state of each living drone in each tick.
 
 use crate::error::ReportError;
+use crate::files::TRACE;
+use crate::folder::RunFolder;
+use crate::interruption::Interrupted;
 use skein_protocol::Vec2;
 use skein_protocol::record::DroneRow;
-use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Write};
-use std::path::Path;
+use std::io::{BufRead, BufReader, Write};
 
 const HEADER: &str = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j";
 
@@ -16,15 +17,9 @@ pub(crate) struct TraceWriter<W: Write> {
     number: zmij::Buffer,
 }
 
-impl TraceWriter<BufWriter<File>> {
-    /// Creates the file.
-    pub(crate) fn create(path: &Path) -> std::io::Result<Self> {
-        Self::new(BufWriter::with_capacity(1 << 18, File::create(path)?))
-    }
-}
-
 impl<W: Write> TraceWriter<W> {
-    fn new(mut out: W) -> std::io::Result<Self> {
+    /// Writes the header.
+    pub(crate) fn new(mut out: W) -> std::io::Result<Self> {
         writeln!(out, "{HEADER}")?;
         Ok(Self { out, lines: Vec::new(), number: zmij::Buffer::new() })
     }
@@ -71,28 +66,31 @@ pub(crate) struct TraceRow {
     pub energy_j: f64,
 }
 
-/// Reads a trace, and calls `tick` with the rows of each tick.
-pub(crate) fn read(path: &Path, mut tick: impl FnMut(&[TraceRow])) -> Result<(), ReportError> {
-    let mut lines = BufReader::new(File::open(path).map_err(ReportError::io(path))?).lines();
-    let content = |found: String| ReportError::Content { path: path.to_owned(), expected: HEADER, found };
-    let header = lines.next().transpose().map_err(ReportError::io(path))?.unwrap_or_default();
+/// Reads the trace of a run, and calls `tick` with the rows of each tick.
+pub(crate) fn read(
+    folder: &RunFolder,
+    interrupted: &Interrupted<'_>,
+    mut tick: impl FnMut(&[TraceRow]) -> Result<(), ReportError>,
+) -> Result<(), ReportError> {
+    let path = folder.path().join(TRACE);
+    let mut lines = BufReader::new(folder.files().read(TRACE)?).lines();
+    let content = |found: String| ReportError::Content { path: path.clone(), expected: HEADER, found };
+    let header = lines.next().transpose().map_err(ReportError::io(&path))?.unwrap_or_default();
     if header != HEADER {
         return Err(content(format!("line 1 is \"{header}\"")));
     }
     let mut rows: Vec<TraceRow> = Vec::new();
     for (number, line) in lines.enumerate() {
-        let line = line.map_err(ReportError::io(path))?;
+        let line = line.map_err(ReportError::io(&path))?;
         let row = parse(&line).ok_or_else(|| content(format!("line {} is \"{line}\"", number + 2)))?;
         if rows.first().is_some_and(|first| first.t_s != row.t_s) {
-            tick(&rows);
+            interrupted.check()?;
+            tick(&rows)?;
             rows.clear();
         }
         rows.push(row);
     }
-    if !rows.is_empty() {
-        tick(&rows);
-    }
-    Ok(())
+    if rows.is_empty() { Ok(()) } else { tick(&rows) }
 }
 
 fn parse(line: &str) -> Option<TraceRow> {
@@ -108,7 +106,6 @@ fn parse(line: &str) -> Option<TraceRow> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::TRACE;
     use skein_protocol::record::ROW_ALIVE;
     use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp};
 
@@ -137,26 +134,32 @@ mod tests {
 
     #[test]
     fn a_written_trace_is_read_tick_by_tick() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(TRACE);
-        let mut writer = TraceWriter::create(&path).unwrap();
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+        let mut writer = TraceWriter::new(folder.files().create(TRACE).unwrap()).unwrap();
         writer.tick(0.02, &rows()).unwrap();
         writer.tick(0.04, &rows()).unwrap();
         writer.flush().unwrap();
         let mut ticks = Vec::new();
-        read(&path, |rows| ticks.push(rows.to_vec())).unwrap();
+        let take = |rows: &[TraceRow]| {
+            ticks.push(rows.to_vec());
+            Ok(())
+        };
+        read(&folder, &Interrupted::never(), take).unwrap();
         assert_eq!(ticks.len(), 2);
         assert_eq!((ticks[1][1].t_s, ticks[1][1].drone, ticks[1][1].group.as_str()), (0.04, 2, "N12"));
         assert_eq!(ticks[0][0].velocity_mps, Vec2::new(10.0, 1e-7));
+        let stop = read(&folder, &Interrupted::when(&|| true), |_| Ok(()));
+        assert!(matches!(stop, Err(ReportError::Interrupted)));
     }
 
     #[test]
     fn an_invalid_line_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(TRACE);
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
         for (text, place) in [("x\n", "line 1"), (&format!("{HEADER}\n0.0,0,1,1,1,1,N,,0\n0.0,x\n"), "line 3")] {
-            std::fs::write(&path, text).unwrap();
-            let error = read(&path, |_| {}).unwrap_err().to_string();
+            folder.files().write(TRACE, text.as_bytes()).unwrap();
+            let error = read(&folder, &Interrupted::never(), |_| Ok(())).unwrap_err().to_string();
             assert!(error.contains(place), "{error}");
         }
     }

@@ -36,6 +36,8 @@ pub(crate) const SAMPLE_FRAMES_MAX: usize = 4096;
 
 /// Time between two samples of a plot, s. Chosen by hand.
 pub(crate) const PLOT_PERIOD_S: f64 = 0.1;
+/// Largest number of samples in a plot of a quantity over time: those of half an hour. Chosen by hand; it must be even.
+pub(crate) const PLOT_SAMPLES_MAX: usize = 20_000;
 /// Largest number of points of all tracks in a plot, so that a plot of a thousand drones can still be opened. Chosen by
 /// hand.
 pub(crate) const PLOT_POINTS_MAX: usize = 60_000;
@@ -50,5 +52,5 @@ pub(crate) const PAGE_POSITIONS_MAX: usize = 300_000;
 pub(crate) const SPOOL_BLOCK_BYTES: usize = 64 << 10;
 /// Number of blocks, by which a slow disk may lag behind. They bound the memory used. Chosen by hand.
 pub(crate) const SPOOL_BLOCKS: usize = 128;
-/// Size of the pieces in which the spool is read and its disk space is freed, bytes. Chosen by hand.
+/// Size of the pieces in which the spool is read, bytes. Chosen by hand.
 pub(crate) const SPOOL_PIECE_BYTES: usize = 1 << 20;

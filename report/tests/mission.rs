@@ -8,7 +8,9 @@ use skein_protocol::payload::{Assignment, MAX_SET, Plan};
 use skein_protocol::record::*;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
-use skein_report::{Manifest, MissionEnd, Recorder, RunCompletion, RunFacts, RunFolder, Summary};
+use skein_report::{
+    FlightRecord, Interrupted, Manifest, MissionEnd, Recorder, RunCompletion, RunFacts, RunFolder, Summary,
+};
 
 /// Last tick; a tick is 0.1 s.
 const LAST: u64 = 99;
@@ -200,8 +202,8 @@ fn flown() -> Summary {
     fly(&mut recorder, 0..=LAST);
     // The record with the end event repeats the rows of the last tick.
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
-    let (summary, files) = recorder.finish(&completion());
-    files.unwrap();
+    let (summary, record) = recorder.finish(&completion());
+    assert!(record.is_none(), "a run without a folder keeps no record");
     summary
 }
 
@@ -336,18 +338,31 @@ fn every_key_is_in_the_summary_and_in_the_schema() {
     assert_eq!(back, flown());
 }
 
-#[test]
-fn the_folder_of_a_run_holds_trace_and_events() {
+/// A recorded flight in a folder of its own.
+fn recorded() -> (tempfile::TempDir, RunFolder, Manifest, Summary, FlightRecord) {
     let root = tempfile::tempdir().unwrap();
     let folder = RunFolder::numbered(root.path(), "disc").unwrap();
-    folder.write_manifest(&Manifest::new(facts(), serde_json::json!({}), "0.1.0", None)).unwrap();
-    let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
+    let manifest = Manifest::new(facts(), serde_json::json!({}), "0", None);
+    folder.begin(&manifest).unwrap();
+    let mut recorder = Recorder::in_folder(facts(), &folder).unwrap();
     fly(&mut recorder, 0..=LAST);
     give(&mut recorder, LAST, &[], &[end()]).unwrap();
-    let (summary, files) = recorder.finish(&completion());
-    files.unwrap();
-    folder.write_summary(&summary).unwrap();
+    let (summary, record) = recorder.finish(&completion());
+    (root, folder, manifest, summary, record.unwrap())
+}
+
+fn never() -> Interrupted<'static> {
+    Interrupted::never()
+}
+
+#[test]
+fn a_folder_holds_summary_trace_events_recording_and_plots() {
+    let (_root, folder, manifest, summary, record) = recorded();
+    folder.reserve_summary(4).unwrap().write(&summary).unwrap();
     assert_eq!(folder.read_summary().unwrap(), summary);
+    record.write_files(&manifest, &never()).unwrap();
+    record.remove().unwrap();
+    assert!(!folder.path().join("flight.spool").exists());
     let read = |name| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let trace = read("trace.csv");
     assert_eq!(trace.lines().count() as u64, 1 + 4 * (LAST + 1) - (LAST + 1 - DEATH));
@@ -357,23 +372,46 @@ fn the_folder_of_a_run_holds_trace_and_events() {
     let parsed: Vec<RunEvent> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((parsed.len(), parsed.last()), (8, Some(&end())));
     let manifest = RunFolder::open(folder.path()).unwrap().read_manifest().unwrap();
-    assert_eq!(skein_report::plot::write(&folder, &manifest.facts).unwrap().len(), skein_report::plot::FILES.len());
+    let plots = skein_report::plot::write(&folder, &manifest.facts, &never()).unwrap();
+    assert_eq!(plots.len(), skein_report::plot::FILES.len());
 }
 
 #[test]
-fn the_summary_is_complete_if_files_cannot_be_written() {
-    for name in ["trace.csv", "flight.spool"] {
-        let root = tempfile::tempdir().unwrap();
-        let folder = RunFolder::numbered(root.path(), "disc").unwrap();
-        std::os::unix::fs::symlink("/dev/full", folder.path().join(name)).unwrap();
-        let mut recorder = Recorder::in_folder(facts(), &folder, &serde_json::json!({})).unwrap();
-        fly(&mut recorder, 0..=LAST);
-        assert!(recorder.ready());
-        let (summary, files) = recorder.finish(&completion());
-        assert_eq!(summary.ticks, 100);
-        assert!(files.unwrap_err().to_string().contains(name), "{name} is not named");
-        assert!(!folder.path().join("flight.spool").exists());
-    }
+fn a_record_stays_until_its_files_are_written() {
+    let (_root, folder, manifest, _, record) = recorded();
+    let path = |name| folder.path().join(name);
+    // No file can be made under the name of a folder.
+    std::fs::create_dir(path(".trace.csv.part")).unwrap();
+    let error = record.write_files(&manifest, &never()).unwrap_err().to_string();
+    assert!(error.contains("trace.csv"), "{error}");
+    let stopped = record.write_files(&manifest, &Interrupted::when(&|| true));
+    assert!(stopped.is_err() && path("flight.spool").exists());
+    drop(record);
+    std::fs::remove_dir(path(".trace.csv.part")).unwrap();
+    let left = FlightRecord::left_in(&folder).unwrap().unwrap();
+    left.write_files(&manifest, &never()).unwrap();
+    assert_eq!(std::fs::read_to_string(path("trace.csv")).unwrap().lines().count() as u64, 401 - (LAST + 1 - DEATH));
+    left.remove().unwrap();
+    assert!(FlightRecord::left_in(&folder).unwrap().is_none());
+}
+
+#[test]
+fn a_killed_run_gets_the_summary_of_its_record() {
+    let (_root, folder, manifest, summary, _) = recorded();
+    let spool = folder.path().join("flight.spool");
+    let bytes = std::fs::read(&spool).unwrap();
+    let of = |bytes: &[u8]| {
+        std::fs::write(&spool, bytes).unwrap();
+        FlightRecord::left_in(&folder).unwrap().unwrap().summary(&manifest.facts, &never()).unwrap()
+    };
+    let whole = of(&bytes);
+    assert_eq!((whole.digest, whole.outcome, whole.ticks), (summary.digest, Outcome::Reached, 100));
+    let cut = of(&bytes[..bytes.len() / 2]);
+    assert!(cut.outcome == Outcome::Aborted && (20..80).contains(&cut.ticks) && cut.reason.is_some(), "{cut:?}");
+    // After a power failure, the end of the file may hold anything.
+    let foreign = of(&[&bytes[..bytes.len() / 2], &[0; 4096]].concat());
+    assert!(foreign.ticks >= cut.ticks, "{foreign:?}");
+    assert_eq!(of(&[]).ticks, 0);
 }
 
 #[test]

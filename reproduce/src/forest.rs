@@ -48,19 +48,24 @@ impl Forest {
         let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
         let resolved = serde_json::to_value(&scenario)?;
         let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
-        folder.write_manifest(&manifest)?;
-        let mut recorder = Recorder::in_folder(facts.clone(), &folder, &manifest.scenario)?;
+        folder.begin(&manifest)?;
+        let mut recorder = Recorder::in_folder(facts.clone(), &folder)?;
         let end = inline::run(&scenario, &mut recorder, interrupted)?;
         let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-        let (summary, recorded) = recorder.finish(&completion);
-        recorded?;
+        let (summary, record) = recorder.finish(&completion);
+        folder.write_summary(&summary)?;
+        let stop = || interrupted().is_some();
+        let stop = skein_report::Interrupted::when(&stop);
+        if let Some(record) = record {
+            record.write_files(&manifest, &stop)?;
+            record.remove()?;
+        }
         if let Some(error) = end.sink_error {
             return Err(ReproduceError::Record(error.to_string()));
         }
-        folder.write_summary(&summary)?;
-        let plots = plots(&folder, &facts)?;
+        let plots = plots(&folder, &facts, &stop)?;
         let snapshots = Snapshots::read(&folder, &MOMENTS_S)?;
-        let deviations = deviation::read(folder.path())?;
+        let deviations = deviation::read(&folder)?;
         Ok(Self { facts, summary, snapshots, deviations, plots })
     }
 
@@ -71,10 +76,14 @@ impl Forest {
     }
 }
 
-fn plots(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<NamedPlot>, ReproduceError> {
+fn plots(
+    folder: &RunFolder,
+    facts: &RunFacts,
+    stop: &skein_report::Interrupted<'_>,
+) -> Result<Vec<NamedPlot>, ReproduceError> {
     let read = |path: PathBuf| {
         let svg = std::fs::read_to_string(&path).map_err(ReproduceError::io(&path))?;
         Ok(NamedPlot { file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(), svg })
     };
-    plot::write(folder, facts)?.into_iter().map(read).collect()
+    plot::write(folder, facts, stop)?.into_iter().map(read).collect()
 }

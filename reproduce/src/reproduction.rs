@@ -12,9 +12,9 @@ use crate::results::Results;
 use crate::row::Row;
 use crate::rows::rows;
 use crate::table::shown;
-use skein_report::RunFolder;
+use skein_report::{RunFolder, WorkFolder};
 use skein_sweep::{Interrupted, Progress};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Name of the recorded mission in a report's folder. A folder that holds it is recognised as a report's.
 const FOREST: &str = "forest";
@@ -45,36 +45,45 @@ impl Reproduction {
         interrupted: &Interrupted<'_>,
     ) -> Result<Option<Vec<Row>>, ReproduceError> {
         self.check_folder()?;
+        let (folder, new) = WorkFolder::make(&self.folder).map_err(ReproduceError::Folder)?;
         let flown = Results::fly(&flights(self.quick), self.workers, progress, interrupted)?;
-        let Some(results) = flown else { return Ok(None) };
-        clear_figures(&self.folder.join("figures"))?;
+        let Some(results) = flown else {
+            if new {
+                // It is still empty. What remains does no harm.
+                let _ = std::fs::remove_dir(&self.folder);
+            }
+            return Ok(None);
+        };
+        let figures = folder.subfolder("figures")?;
+        clear(&figures)?;
         let forest = Forest::record(&self.folder.join(FOREST), interrupted)?;
         if interrupted().is_some() {
             return Ok(None);
         }
         let rows = rows(&results, &forest, self.quick);
-        self.write_all(&results, &forest, &rows)?;
+        self.write_all(&results, &forest, &rows, [&folder, &figures])?;
         Ok(Some(rows))
     }
 
-    fn write_all(&self, results: &Results, forest: &Forest, rows: &[Row]) -> Result<(), ReproduceError> {
+    fn write_all(
+        &self,
+        results: &Results,
+        forest: &Forest,
+        rows: &[Row],
+        [folder, drawings]: [&WorkFolder; 2],
+    ) -> Result<(), ReproduceError> {
         let figures = figures(results, forest)?;
         let blocks = content(results, forest, rows, figures, self.quick);
         for block in &blocks {
             if let Block::Figure(figure) = block {
-                self.write(&format!("figures/{}", figure.file), &figure.svg)?;
+                drawings.write(&figure.file, figure.svg.as_bytes())?;
             }
         }
-        self.write("report.md", &markdown(TITLE, &blocks))?;
-        self.write("report.html", &html(TITLE, &blocks))?;
-        self.write("results.csv", &results.csv())?;
-        self.write("gain.csv", &gain::csv(results, self.quick))?;
-        self.write("reproduction.json", &(serde_json::to_string_pretty(rows)? + "\n"))
-    }
-
-    fn write(&self, name: &str, text: &str) -> Result<(), ReproduceError> {
-        let path = self.folder.join(name);
-        std::fs::write(&path, text).map_err(ReproduceError::io(&path))
+        folder.write("report.md", markdown(TITLE, &blocks).as_bytes())?;
+        folder.write("report.html", html(TITLE, &blocks).as_bytes())?;
+        folder.write("results.csv", results.csv().as_bytes())?;
+        folder.write("gain.csv", gain::csv(results, self.quick).as_bytes())?;
+        Ok(folder.write("reproduction.json", (serde_json::to_string_pretty(rows)? + "\n").as_bytes())?)
     }
 
     /// Refuses an existing folder, unless it is empty or a report's and may be replaced.
@@ -94,15 +103,11 @@ impl Reproduction {
     }
 }
 
-/// Makes the folder, or removes an earlier report's figures from it, because this report may have fewer.
-fn clear_figures(folder: &Path) -> Result<(), ReproduceError> {
-    let io = ReproduceError::io(folder);
-    std::fs::create_dir_all(folder).map_err(&io)?;
-    for entry in std::fs::read_dir(folder).map_err(&io)? {
-        let path = entry.map_err(&io)?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
+/// Removes an earlier report's figures from a folder, because this report may have fewer.
+fn clear(folder: &WorkFolder) -> Result<(), ReproduceError> {
+    for name in folder.names()? {
         if FIGURES.iter().any(|figure| name.starts_with(figure)) && name.ends_with(".svg") {
-            std::fs::remove_file(&path).map_err(ReproduceError::io(&path))?;
+            folder.remove(&name)?;
         }
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::output::{print, print_line};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use skein_bench::clock::{self, ClockBench};
@@ -124,9 +125,10 @@ pub(crate) fn peer(peer: &BaselinePeer) -> Result<Exit, Failure> {
 fn runtime(args: &RuntimeArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
     let report = args.bench.run(context, |progress| {
         let skein_bench::runtime::Progress { drones, round, rounds, case } = progress;
-        eprint!("\r{drones} drones, round {round} of {rounds}: {:<24}", case.name());
+        // Without a reader, there is no progress to show.
+        let _ = write!(std::io::stderr(), "\r{drones} drones, round {round} of {rounds}: {:<24}", case.name());
     });
-    eprintln!();
+    let _ = writeln!(std::io::stderr());
     let Some(report) = report.map_err(failure)? else { return Ok(None) };
     let json = serde_json::to_string_pretty(&report).map_err(Failure::environment)?;
     if let Some(path) = &args.out {
@@ -135,7 +137,7 @@ fn runtime(args: &RuntimeArgs, context: &Context<'_>) -> Result<Option<Exit>, Fa
     if let Some(path) = &args.plot {
         write(path, &report.plot().map_err(failure)?)?;
     }
-    print(&if args.json { json + "\n" } else { report.table() + "\n" });
+    print(if args.json { json + "\n" } else { report.table() + "\n" })?;
     Ok(Some(Exit::Reached))
 }
 
@@ -145,9 +147,9 @@ fn failover(args: &FailoverArgs, context: &Context<'_>) -> Result<Option<Exit>, 
         write(path, &(serde_json::to_string_pretty(&report).map_err(Failure::environment)? + "\n"))?;
     }
     if args.json {
-        print(&(serde_json::to_string(&report).map_err(Failure::environment)? + "\n"));
+        print_line(serde_json::to_string(&report).map_err(Failure::environment)?)?;
     } else {
-        print(&report.table());
+        print(report.table())?;
     }
     Ok(Some(if report.is_unsafe() { Exit::Unsafe } else { Exit::Reached }))
 }
@@ -164,16 +166,11 @@ fn part(part: Part, args: &PartArgs, context: &Context<'_>) -> Result<Option<Exi
 
 fn print_rows<T: Serialize>(json: bool, rows: &[T], table: fn(&[T]) -> String) -> Result<Option<Exit>, Failure> {
     if json {
-        print(&(serde_json::to_string_pretty(rows).map_err(Failure::environment)? + "\n"));
+        print_line(serde_json::to_string_pretty(rows).map_err(Failure::environment)?)?;
     } else {
-        print(&table(rows));
+        print(table(rows))?;
     }
     Ok(Some(Exit::Reached))
-}
-
-fn print(text: &str) {
-    // A closed pipe is the reader's choice.
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

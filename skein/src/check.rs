@@ -3,9 +3,9 @@
 use crate::cli::CheckArgs;
 use crate::exit::{Exit, Failure};
 use crate::input;
+use crate::output::{print, print_line};
 use serde_json::json;
 use skein_runtime::{advice, mission, run_facts};
-use std::io::Write;
 
 /// Prints the processes, services and routes of a mission.
 pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
@@ -15,9 +15,7 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
     let shards = skein_bus::shards(drones);
     let on_sight_mps = advice::speed_on_sight_mps(&scenario);
     let warnings = advice::warnings(&scenario).map_err(Failure::usage)?;
-    let mut out = std::io::stdout().lock();
-    // A closed pipe is the reader's choice.
-    let _ = if args.json {
+    if args.json {
         let sets: Vec<_> = sets
             .iter()
             .map(|set| json!({ "obstacles": set.obstacles, "routes": set.routes.count(), "gate_x_m": set.routes.gate_x_m() }))
@@ -28,7 +26,7 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
             "drones": drones, "processes": drones + 2, "services": services, "sets": sets,
             "speed_on_sight_mps": on_sight_mps, "warnings": warnings,
         });
-        writeln!(out, "{plan}")
+        print_line(plan)?;
     } else {
         let mut text = format!("{}: valid, {} with seed {}\n", scenario.name, scenario.strategy, scenario.seed);
         text += &format!("processes  launcher, world, {drones} drones\n");
@@ -44,8 +42,8 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
         for warning in &warnings {
             text += &format!("warning    {warning}\n");
         }
-        write!(out, "{text}")
-    };
+        print(text)?;
+    }
     Ok(Exit::Reached)
 }
 

@@ -17,7 +17,7 @@ use std::path::PathBuf;
   skein check my-scenario.toml --set formation.drones=12
 
 Exit codes: 0 goal reached, 1 not reached, 2 bad usage or scenario, 3 environment failed,
-4 invariant broken, 130/143 interrupted by SIGINT/SIGTERM."
+4 invariant broken, 129/130/143 interrupted by SIGHUP/SIGINT/SIGTERM."
 )]
 pub(crate) struct Cli {
     /// What to do.

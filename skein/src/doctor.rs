@@ -1,11 +1,11 @@
 //! `skein doctor`: shows which limits of this machine restrict a swarm, and how many drones fit.
 
 use crate::exit::{Exit, Failure};
+use crate::output::{print, print_line};
 use clap::Args;
 use rustix::process::{Resource, getrlimit};
 use serde_json::json;
 use std::fs;
-use std::io::Write;
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
@@ -29,6 +29,8 @@ const DRONE_FILES: u64 = 5;
 const OTHER_FILES: u64 = 64;
 /// Processes of a run besides the drones: launcher and world.
 const OTHER_PROCESSES: u64 = 2;
+/// Threads of a run besides the first ones of its processes: the one that writes the record. The limits count threads.
+const OTHER_THREADS: u64 = 1;
 
 /// A limit of the machine.
 struct Limit {
@@ -45,14 +47,12 @@ struct Limit {
 pub(crate) fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
     let limits = [files(), processes(), memory(), shared_memory()?, cores()?, governor()];
     let fits = limits.iter().filter_map(|limit| limit.drones).min().unwrap_or(0);
-    let mut out = std::io::stdout().lock();
-    // A closed pipe is the reader's choice.
-    let _ = if args.json {
+    if args.json {
         let lines: Vec<_> = limits
             .iter()
             .map(|limit| json!({ "limit": limit.name, "has": limit.has, "drones": limit.drones, "hint": limit.hint }))
             .collect();
-        writeln!(out, "{}", json!({ "drones": fits, "limits": lines }))
+        print_line(json!({ "drones": fits, "limits": lines }))?;
     } else {
         let tight = limits.iter().find(|limit| limit.drones == Some(fits));
         let first = tight.map_or(String::new(), |limit| format!(", limited by {}: {}", limit.name, limit.hint));
@@ -61,8 +61,8 @@ pub(crate) fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
             let drones = limit.drones.map_or("-".to_owned(), |drones| drones.to_string());
             text += &format!("  {:<15}{:<42}{drones:>9}  {}\n", limit.name, limit.has, limit.hint);
         }
-        write!(out, "{text}")
-    };
+        print(text)?;
+    }
     Ok(Exit::Reached)
 }
 
@@ -98,16 +98,47 @@ fn number(path: &str) -> Option<u64> {
 }
 
 fn processes() -> Limit {
-    let user = getrlimit(Resource::Nproc).current;
-    let bounds = [user, number("/sys/fs/cgroup/pids.max"), number("/proc/sys/kernel/pid_max")];
-    let least = bounds.into_iter().flatten().min().unwrap_or(u64::MAX);
-    let taken = number("/sys/fs/cgroup/pids.current").unwrap_or(0);
+    // This process becomes the launcher, and is among those in use.
+    let others = OTHER_PROCESSES + OTHER_THREADS - 1;
+    let all = number("/proc/sys/kernel/pid_max");
+    let group = number("/sys/fs/cgroup/pids.max");
+    let bounds = [
+        getrlimit(Resource::Nproc).current.map(|most| (most, threads_of_user())),
+        group.map(|most| (most, number("/sys/fs/cgroup/pids.current").unwrap_or(0))),
+        all.map(|most| (most, threads_of_machine())),
+    ];
+    let room = |(most, taken): &(u64, u64)| most.saturating_sub(*taken);
+    let (least, taken) = bounds.into_iter().flatten().min_by_key(room).unwrap_or((u64::MAX, 0));
     Limit {
         name: "processes",
         has: format!("{least}, {taken} of them in use"),
-        drones: Some(least.saturating_sub(taken + OTHER_PROCESSES)),
+        drones: Some(room(&(least, taken)).saturating_sub(others)),
         hint: "`ulimit -u`, pids.max of the control group",
     }
+}
+
+/// Number of threads of this user.
+fn threads_of_user() -> u64 {
+    use std::os::unix::fs::MetadataExt;
+    let user = rustix::process::getuid().as_raw();
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let own = processes.filter(|process| {
+        let name = process.file_name();
+        name.to_string_lossy().parse::<u32>().is_ok() && process.metadata().is_ok_and(|meta| meta.uid() == user)
+    });
+    own.map(|process| {
+        let status = fs::read_to_string(process.path().join("status")).unwrap_or_default();
+        let threads = status.lines().find_map(|line| line.strip_prefix("Threads:")?.trim().parse::<u64>().ok());
+        threads.unwrap_or(0)
+    })
+    .sum()
+}
+
+/// Number of threads of all users.
+fn threads_of_machine() -> u64 {
+    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let threads = load.split(' ').nth(3).and_then(|field| field.split('/').nth(1)?.parse().ok());
+    threads.unwrap_or(0)
 }
 
 fn memory() -> Limit {

@@ -7,10 +7,12 @@
 //! | 2 | bad usage or a bad scenario; nothing was started |
 //! | 3 | the environment failed: shared memory, limits, a process that could not be started, a killed world |
 //! | 4 | an invariant was broken |
-//! | 130, 143 | interrupted by SIGINT or SIGTERM, after a clean shutdown |
+//! | 129, 130, 143 | interrupted by SIGHUP, SIGINT or SIGTERM, after a clean shutdown |
 //!
-//! If several apply: 130 and 143 come before 3, 3 before 4, 4 before 1.
+//! If several apply: these come before 3, 3 before 4, 4 before 1.
 
+use crate::output::complain;
+use std::fmt;
 use std::process::ExitCode;
 
 /// An exit code.
@@ -67,6 +69,11 @@ impl Failure {
         Self { exit: Exit::Environment, report: Report::Text(message.to_string()) }
     }
 
+    /// A failure with a run's folder.
+    pub(crate) fn report(error: skein_report::ReportError) -> Self {
+        if error.is_usage() { Self::usage(error) } else { Self::environment(error) }
+    }
+
     /// A failure because of bad input, which can be shown in its file.
     pub(crate) fn diagnostic(diagnostic: impl miette::Diagnostic + Send + Sync + 'static) -> Self {
         Self { exit: Exit::Usage, report: Report::Diagnostic(Box::new(diagnostic)) }
@@ -74,9 +81,8 @@ impl Failure {
 
     /// Prints the message to stderr. On a terminal it shows the place in the file; otherwise one line per error.
     pub(crate) fn print(&self) {
-        use std::io::IsTerminal;
+        use std::io::{IsTerminal, Write};
         match &self.report {
-            Report::Text(text) => eprintln!("skein: {text}"),
             Report::Diagnostic(diagnostic) if std::io::stderr().is_terminal() => {
                 let theme = match std::env::var_os("NO_COLOR") {
                     None => miette::GraphicalTheme::unicode(),
@@ -85,11 +91,21 @@ impl Failure {
                 let mut shown = String::new();
                 let handler = miette::GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
                 match handler.render_report(&mut shown, diagnostic.as_ref()) {
-                    Ok(()) => eprint!("{shown}"),
-                    Err(_) => eprintln!("skein: {diagnostic}"),
+                    // If this fails, nobody is there to be told.
+                    Ok(()) => drop(write!(std::io::stderr().lock(), "{shown}")),
+                    Err(_) => complain(self),
                 }
             }
-            Report::Diagnostic(diagnostic) => eprintln!("skein: {diagnostic}"),
+            Report::Text(_) | Report::Diagnostic(_) => complain(self),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.report {
+            Report::Text(text) => f.write_str(text),
+            Report::Diagnostic(diagnostic) => write!(f, "{diagnostic}"),
         }
     }
 }

@@ -15,6 +15,7 @@ mod hunt;
 mod input;
 mod interrupt;
 mod options;
+mod output;
 mod progress;
 mod replay;
 mod report;
@@ -37,8 +38,12 @@ fn main() -> std::process::ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // clap prints help to stdout and errors to stderr. A closed pipe is not an error.
-            let _ = error.print();
-            return if error.use_stderr() { Exit::Usage.into() } else { Exit::Reached.into() };
+            let printed = error.print().is_ok_and(|()| std::io::Write::flush(&mut std::io::stdout()).is_ok());
+            return match (error.use_stderr(), printed) {
+                (true, _) => Exit::Usage.into(),
+                (false, true) => Exit::Reached.into(),
+                (false, false) => Exit::Environment.into(),
+            };
         }
     };
     start_logging();
@@ -85,5 +90,10 @@ fn start_logging() {
         .with_default_directive(tracing::Level::WARN.into())
         .from_env_lossy();
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colour).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colour)
+        .log_internal_errors(false)
+        .init();
 }

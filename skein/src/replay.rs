@@ -3,6 +3,7 @@
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::options::{PinChoice, RuntimeChoice, WaitChoice};
+use crate::output::print_line;
 use clap::Args;
 use serde_json::json;
 use skein_protocol::record::Outcome;
@@ -10,7 +11,6 @@ use skein_report::{Recorder, RunCompletion, RunFolder, Summary};
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{Clock, Launch, PilotKind, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments of `replay`.
@@ -33,9 +33,9 @@ pub(crate) struct ReplayArgs {
 
 /// Flies the run again in lockstep, and compares the digests. Writes nothing.
 pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
-    let folder = RunFolder::open(&args.run_dir).map_err(Failure::usage)?;
-    let manifest = folder.read_manifest().map_err(Failure::usage)?;
-    let recorded = folder.read_summary().map_err(Failure::usage)?;
+    let folder = RunFolder::open(&args.run_dir).map_err(Failure::report)?;
+    let manifest = folder.read_manifest().map_err(Failure::report)?;
+    let recorded = folder.read_summary().map_err(Failure::report)?;
     let scenario: Scenario = serde_json::from_value(manifest.scenario).map_err(|error| {
         let path = args.run_dir.join("manifest.json");
         Failure::usage(format!("{}: expected the scenario of a run by this version of Skein: {error}", path.display()))
@@ -57,7 +57,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
         return Err(Failure::environment(trouble));
     }
     let equal = recorded.digest.is_some() && recorded.digest == flown.digest;
-    print(args, &recorded, &flown, equal);
+    print(args, &recorded, &flown, equal)?;
     Ok(if equal { Exit::Reached } else { Exit::NotReached })
 }
 
@@ -96,23 +96,17 @@ fn reasons(recorded: &Summary) -> Vec<String> {
     reasons.into_iter().flatten().collect()
 }
 
-fn print(args: &ReplayArgs, recorded: &Summary, flown: &Summary, equal: bool) {
+fn print(args: &ReplayArgs, recorded: &Summary, flown: &Summary, equal: bool) -> Result<bool, Failure> {
     let reasons = if equal { Vec::new() } else { reasons(recorded) };
     let (was, is) = (recorded.digest.as_deref(), flown.digest.as_deref());
-    let mut out = std::io::stdout().lock();
-    // A closed pipe is the reader's choice.
-    let _ = if args.json {
+    if args.json {
         let ticks = [recorded.ticks, flown.ticks];
-        writeln!(
-            out,
-            "{}",
-            json!({ "equal": equal, "recorded": was, "replayed": is, "ticks": ticks, "reasons": reasons })
-        )
+        print_line(json!({ "equal": equal, "recorded": was, "replayed": is, "ticks": ticks, "reasons": reasons }))
     } else {
         let result = if equal { "equal" } else { "different" };
         let why = if reasons.is_empty() { String::new() } else { format!("\nbecause   {}", reasons.join("; ")) };
         let (was, is) = (was.unwrap_or("none"), is.unwrap_or("none"));
         let (before, after) = (recorded.ticks, flown.ticks);
-        writeln!(out, "{result}\nrecorded  {was} after {before} ticks\nreplayed  {is} after {after} ticks{why}")
-    };
+        print_line(format!("{result}\nrecorded  {was} after {before} ticks\nreplayed  {is} after {after} ticks{why}"))
+    }
 }

@@ -1,21 +1,53 @@
-//! `skein report`: writes report.html and the plots of a recorded run, and prints its summary.
+//! `skein report`: writes report.html and the plots of a recorded run, and prints its summary. A run that was killed first
+//! gets its other files from its record.
 
 use crate::cli::ReportArgs;
 use crate::exit::{Exit, Failure};
-use skein_report::{RunFolder, page, text};
-use std::io::{IsTerminal, Write};
+use crate::interrupt::Interrupt;
+use crate::output;
+use skein_report::ReportError::{self, Content, NoSummary};
+use skein_report::{FlightRecord, Interrupted, Manifest, RunFolder, Summary, page, text};
+use std::io::IsTerminal;
+use std::path::PathBuf;
 
-/// Writes report.html and the plots again, and prints the summary.
+/// Writes the files of the run again, and prints the summary.
 pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
-    let folder = RunFolder::open(&args.run_dir).map_err(Failure::usage)?;
-    let manifest = folder.read_manifest().map_err(Failure::usage)?;
-    let summary = folder.read_summary().map_err(Failure::usage)?;
-    let written = page::write(&folder, &manifest, &summary).map_err(Failure::usage)?;
-    let mut out = std::io::stdout().lock();
-    let colour = out.is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    let _ = writeln!(out, "{}", text::summary(&summary, colour));
-    for file in written {
-        let _ = writeln!(out, "{}", file.display());
+    let interrupt = Interrupt::watch()?;
+    let folder = RunFolder::open(&args.run_dir).map_err(Failure::report)?;
+    let manifest = folder.read_manifest().map_err(Failure::report)?;
+    let stop = || interrupt.signal().is_some();
+    match write(&folder, &manifest, &Interrupted::when(&stop)) {
+        Ok((summary, written)) => print(&summary, &written).map(|_| Exit::Reached),
+        Err(ReportError::Interrupted) => Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default())),
+        Err(error) => Err(Failure::report(error)),
     }
-    Ok(Exit::Reached)
+}
+
+/// Writes the files. The record goes last.
+fn write(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    interrupted: &Interrupted<'_>,
+) -> Result<(Summary, Vec<PathBuf>), ReportError> {
+    let record = FlightRecord::left_in(folder)?;
+    let summary = match (folder.read_summary(), &record) {
+        (Err(NoSummary(_) | Content { .. }), Some(record)) => {
+            let summary = record.summary(&manifest.facts, interrupted)?;
+            folder.write_summary(&summary)?;
+            summary
+        }
+        (read, _) => read?,
+    };
+    if let Some(record) = &record {
+        record.write_files(manifest, interrupted)?;
+    }
+    let written = page::write(folder, manifest, &summary, interrupted)?;
+    record.map_or(Ok(()), FlightRecord::remove)?;
+    Ok((summary, written))
+}
+
+fn print(summary: &Summary, written: &[PathBuf]) -> Result<bool, Failure> {
+    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let files: String = written.iter().map(|file| format!("{}\n", file.display())).collect();
+    output::print(format!("{}\n{files}", text::summary(summary, colour)))
 }

@@ -2,11 +2,11 @@
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::output::print_line;
 use crate::progress::RunsBar;
 use crate::sweep::jobs;
 use clap::Args;
 use skein_reproduce::{Reproduction, table};
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments of `reproduce`.
@@ -49,8 +49,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<Exit, Failure> {
     let Some(rows) = rows? else { return Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default())) };
     if !args.quiet {
         let report = args.out.join("report.html");
-        // A closed pipe is the reader's choice.
-        let _ = writeln!(std::io::stdout().lock(), "{}report  {}", table(&rows), report.display());
+        print_line(format!("{}report  {}", table(&rows), report.display()))?;
     }
     Ok(Exit::Reached)
 }

@@ -6,14 +6,20 @@ use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::options::RuntimeChoice;
+use crate::output::{self, complain};
 use crate::progress::MissionBar;
 use skein_protocol::record::{Outcome, RecordSink};
-use skein_report::{Manifest, ProcessEntry, Recorder, Role, RunCompletion, RunFacts, RunFolder, Summary, page, text};
+use skein_report::{
+    FlightRecord, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary, Role, RunCompletion,
+    RunFacts, RunFolder, Summary, page, text,
+};
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, inline, supervisor};
+use skein_runtime::{
+    Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, inline, supervisor,
+};
 use skein_scenario::Scenario;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::time::Instant;
 
@@ -32,37 +38,67 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
     if !args.quiet {
         for warning in advice::warnings(&scenario).map_err(Failure::usage)? {
-            eprintln!("skein: warning: {warning}");
+            complain(format!("warning: {warning}"));
         }
     }
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
-    let manifest = write_manifest(&folder, &facts, &scenario)?;
-    let recorder = match args.no_record {
-        true => Recorder::in_memory(facts.clone()),
-        false => Recorder::in_folder(facts.clone(), &folder, &manifest.scenario).map_err(Failure::environment)?,
-    };
+    let manifest = manifest(&facts, &scenario)?;
     let ticks = (scenario.timeout_s() / scenario.time.dt_s).ceil() as u64;
-    let mut sink = MissionBar::new(recorder, args.quiet || args.json, ticks);
-    let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
+    let flown = begin(args, &folder, &manifest, ticks).and_then(|Begun { reserved, mut sink }| {
+        let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
+        Ok((end, reserved, sink.finish()))
+    });
+    let (end, reserved, recorder) = match flown {
+        Ok(flown) => flown,
+        Err(failure) => {
+            folder.abandon();
+            return Err(failure);
+        }
+    };
+    // A signal from now on stops the writing of files.
+    let late_signal = interrupt.take().filter(|_| end.signal.is_none());
     let wall_s = started.elapsed().as_secs_f64() - end.startup_s;
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
     let reporting = Instant::now();
-    let (mut summary, recorded) = sink.finish().finish(&completion);
+    let (mut summary, record) = recorder.finish(&completion);
     if let (None, Some(signal)) = (&summary.reason, end.signal) {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
-    // The summary is written even if the report cannot be written.
-    let reported = if args.no_record { Ok(Vec::new()) } else { page::write(&folder, &manifest, &summary) };
+    let mut trouble: Vec<String> = end.failure.iter().chain(&end.sink_error).cloned().collect();
+    // The summary comes first: it is there even if nothing else can be written.
+    trouble.extend(reserved.write(&summary).err().map(|error| error.to_string()));
+    trouble.extend(print(args, &summary, &folder).err().map(|failure| failure.to_string()));
+    let stop = || late_signal.or(interrupt.signal());
+    let written = record.map_or(Ok(()), |record| write_files(&folder, &manifest, &summary, record, &stop));
     summary.report_s = Some(reporting.elapsed().as_secs_f64());
-    folder.write_summary(&summary).map_err(Failure::environment)?;
-    print(args, &summary, &folder);
-    let files = recorded.and(reported.map(|_| ())).err().map(|error| error.to_string());
-    let trouble = end.failure.clone().or(end.sink_error.clone()).or(files);
-    if let Some(trouble) = &trouble {
-        eprintln!("skein: {trouble}");
+    let written = written.and_then(|()| folder.write_summary(&summary));
+    let stopped = matches!(written, Err(ReportError::Interrupted)).then(stop).flatten();
+    trouble.extend(written.err().map(|error| error.to_string()));
+    trouble.iter().for_each(complain);
+    if FlightRecord::is_left_in(&folder) {
+        let folder = folder.path().display();
+        complain(format!("the record is kept in {folder}; `skein report {folder}` writes its files"));
     }
-    Ok(exit(&end, trouble.is_some(), &summary))
+    Ok(exit(end.signal.or(stopped), !trouble.is_empty(), &summary))
+}
+
+/// What a flight writes to.
+struct Begun {
+    reserved: ReservedSummary,
+    sink: MissionBar<Recorder>,
+}
+
+/// Makes the files that the flight needs. From here on, the folder is this run's.
+fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, ticks: u64) -> Result<Begun, Failure> {
+    folder.begin(manifest).map_err(Failure::environment)?;
+    let facts = manifest.facts.clone();
+    let reserved = folder.reserve_summary(facts.drones).map_err(Failure::environment)?;
+    let recorder = match args.no_record {
+        true => Recorder::in_memory(facts),
+        false => Recorder::in_folder(facts, folder).map_err(Failure::environment)?,
+    };
+    Ok(Begun { reserved, sink: MissionBar::new(recorder, args.quiet || args.json, ticks) })
 }
 
 /// Refuses process faults if drones share processes: the fault would hit all drones of the process.
@@ -77,24 +113,33 @@ fn check_packing(args: &RunArgs, scenario: &Scenario) -> Result<(), Failure> {
 }
 
 fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure> {
-    use skein_report::ReportError::{Exists, NotARun};
     let folder = match &args.out {
         Some(path) => RunFolder::at(path, args.force),
         None => RunFolder::numbered(Path::new("runs"), &scenario.name),
     };
-    folder.map_err(|error| match error {
-        Exists(_) | NotARun(_) => Failure::usage(error),
-        other => Failure::environment(other),
-    })
+    folder.map_err(Failure::report)
 }
 
-/// Writes the manifest, which says what is flown, into the run's folder.
-fn write_manifest(folder: &RunFolder, facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> {
+/// The manifest, which says what is flown.
+fn manifest(facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> {
     let resolved = serde_json::to_value(scenario).map_err(Failure::environment)?;
     let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
-    let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
-    folder.write_manifest(&manifest).map_err(Failure::environment)?;
-    Ok(manifest)
+    Ok(Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit))
+}
+
+/// Writes everything that is made from the record, and removes the record once all is written.
+fn write_files(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    summary: &Summary,
+    record: FlightRecord,
+    stop: &(dyn Fn() -> Option<i32> + Sync),
+) -> Result<(), ReportError> {
+    let stop = || stop().is_some();
+    let interrupted = Interrupted::when(&stop);
+    record.write_files(manifest, &interrupted)?;
+    page::write(folder, manifest, summary, &interrupted)?;
+    record.remove()
 }
 
 fn fly(
@@ -142,21 +187,19 @@ fn entry(process: &ProcessInfo) -> ProcessEntry {
     ProcessEntry { role, id: process.id, pid: process.pid }
 }
 
-fn print(args: &RunArgs, summary: &Summary, folder: &RunFolder) {
-    let mut out = std::io::stdout().lock();
-    // A closed pipe is the reader's choice.
-    let _ = if args.json {
-        serde_json::to_string(summary).map_err(std::io::Error::from).and_then(|json| writeln!(out, "{json}"))
+fn print(args: &RunArgs, summary: &Summary, folder: &RunFolder) -> Result<bool, Failure> {
+    if args.json {
+        output::print_line(serde_json::to_string(summary).map_err(Failure::environment)?)
     } else if args.quiet {
-        Ok(())
+        Ok(true)
     } else {
-        let colour = out.is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        writeln!(out, "{}\nfolder  {}", text::summary(summary, colour), folder.path().display())
-    };
+        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        output::print_line(format!("{}\nfolder  {}", text::summary(summary, colour), folder.path().display()))
+    }
 }
 
-fn exit(end: &RunEnd, trouble: bool, summary: &Summary) -> Exit {
-    match (end.signal, summary.outcome) {
+fn exit(signal: Option<i32>, trouble: bool, summary: &Summary) -> Exit {
+    match (signal, summary.outcome) {
         (Some(signal), _) => Exit::Interrupted(signal),
         _ if trouble => Exit::Environment,
         (None, Outcome::Aborted) => Exit::Environment,

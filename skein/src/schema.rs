@@ -2,8 +2,8 @@
 
 use crate::cli::{Cli, SchemaOf};
 use crate::exit::{Exit, Failure};
+use crate::output;
 use clap::CommandFactory;
-use std::io::Write;
 
 /// Prints a JSON schema.
 pub(crate) fn schema(of: SchemaOf) -> Result<Exit, Failure> {
@@ -12,7 +12,7 @@ pub(crate) fn schema(of: SchemaOf) -> Result<Exit, Failure> {
         SchemaOf::Scenario => skein_scenario::schema(),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(Failure::environment)?;
-    print(format!("{text}\n").as_bytes())
+    print(format!("{text}\n"))
 }
 
 /// Prints completions for a shell.
@@ -29,8 +29,6 @@ pub(crate) fn man() -> Result<Exit, Failure> {
     print(&text)
 }
 
-fn print(text: &[u8]) -> Result<Exit, Failure> {
-    // A closed pipe is the reader's choice.
-    let _ = std::io::stdout().write_all(text);
-    Ok(Exit::Reached)
+fn print(text: impl AsRef<[u8]>) -> Result<Exit, Failure> {
+    output::print(text).map(|_| Exit::Reached)
 }

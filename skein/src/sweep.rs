@@ -3,10 +3,10 @@
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
+use crate::output::{self, complain};
 use crate::progress::RunsBar;
 use clap::Args;
 use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `sweep`.
@@ -80,8 +80,7 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
         bounds.checked().and_then(|bounds| scene_toml(args.seed, bounds))
     };
     let text = drawn.map_err(Failure::usage)?;
-    // A closed pipe is the reader's choice.
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+    output::print(text)?;
     Ok(Exit::Reached)
 }
 
@@ -105,22 +104,16 @@ pub(crate) fn sweep(args: &SweepArgs) -> Result<Exit, Failure> {
     bar.finish();
     match end? {
         SweepEnd::Interrupted(progress) => {
-            eprintln!(
-                "skein: {} of {} runs are done; the same command resumes the sweep",
-                progress.done, progress.runs
-            );
+            let (done, runs) = (progress.done, progress.runs);
+            complain(format!("{done} of {runs} runs are done; the same command resumes the sweep"));
             Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default()))
         }
         SweepEnd::Complete(report) => {
-            let mut out = std::io::stdout().lock();
-            // A closed pipe is the reader's choice.
-            let _ = if args.json {
-                writeln!(out, "{}", report.summary())
-            } else if args.quiet {
-                Ok(())
-            } else {
-                writeln!(out, "{}folder  {}", report.table(), folder.join("").display())
-            };
+            if args.json {
+                output::print_line(report.summary())?;
+            } else if !args.quiet {
+                output::print_line(format!("{}folder  {}", report.table(), folder.join("").display()))?;
+            }
             Ok(Exit::Reached)
         }
     }

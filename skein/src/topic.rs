@@ -2,6 +2,7 @@
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::output::print_line;
 use crate::tap::{RunningSwarm, SwarmTap, no_swarm, running};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
@@ -12,7 +13,6 @@ use skein_protocol::message::Topic;
 use skein_protocol::record::RecordView;
 use skein_protocol::{Message, SimTime};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::time::{Duration, Instant};
 
 /// Time between two looks for new samples.
@@ -118,10 +118,9 @@ pub(crate) fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
         Action::Echo(filter) => {
             let mut left = filter.count.unwrap_or(u64::MAX);
             listen(first, filter, |line| {
-                let Some(line) = line else { return true };
+                let Some(line) = line else { return Ok(true) };
                 left -= 1;
-                // A closed pipe ends the output.
-                writeln!(std::io::stdout().lock(), "{line}").is_ok() && left > 0
+                Ok(print_line(line)? && left > 0)
             })
         }
         Action::Hz(filter) => hz(first, filter),
@@ -132,7 +131,7 @@ fn list(found: &[RunningSwarm]) -> Result<Exit, Failure> {
     for run in found {
         let drones = SwarmTap::attach(&run.path)?.facts.drones;
         for (_, name, service) in Name::ALL {
-            println!("{}", json!({ "run": run.name(), "topic": name, "service": service, "drones": drones }));
+            print_line(json!({ "run": run.name(), "topic": name, "service": service, "drones": drones }))?;
         }
     }
     Ok(Exit::Reached)
@@ -148,20 +147,24 @@ fn hz(run: &RunningSwarm, filter: &Filter) -> Result<Exit, Failure> {
         }
         let passed = since.elapsed();
         if passed < WINDOW {
-            return true;
+            return Ok(true);
         }
         let rate = |count: &u64| (*count as f64 / passed.as_secs_f64() * 10.0).round() / 10.0;
         let rates: BTreeMap<&String, f64> = counts.iter().map(|(kind, count)| (kind, rate(count))).collect();
-        let written = writeln!(std::io::stdout().lock(), "{}", json!({ "hz": rates })).is_ok();
+        let read = print_line(json!({ "hz": rates }))?;
         (counts, since) = (BTreeMap::new(), Instant::now());
         left -= 1;
-        written && left > 0
+        Ok(read && left > 0)
     })
 }
 
 /// Passes each line that matches the filter to `take`, and `None` when there are no new samples. Ends when the swarm has
 /// ended or `take` returns false.
-fn listen(run: &RunningSwarm, filter: &Filter, mut take: impl FnMut(Option<Value>) -> bool) -> Result<Exit, Failure> {
+fn listen(
+    run: &RunningSwarm,
+    filter: &Filter,
+    mut take: impl FnMut(Option<Value>) -> Result<bool, Failure>,
+) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let tap = SwarmTap::attach(&run.path)?;
     let dt_s = tap.facts.dt_s;
@@ -184,7 +187,7 @@ fn listen(run: &RunningSwarm, filter: &Filter, mut take: impl FnMut(Option<Value
         }
         let idle = lines.is_none();
         for line in lines.into_iter().flatten().map(Some).chain(idle.then_some(None)) {
-            if !take(line) {
+            if !take(line)? {
                 return Ok(Exit::Reached);
             }
         }

@@ -1,6 +1,6 @@
 //! What can go wrong in a sweep.
 
-use skein_report::DrawError;
+use skein_report::{DrawError, ReportError};
 use skein_runtime::RuntimeError;
 use skein_scenario::{ScenarioErrors, StrategyError};
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ pub enum SweepError {
     /// A combination of the grid is not a valid scenario.
     #[error(transparent)]
     Scenario(#[from] JobError),
-    /// Another process sweeps in this folder.
-    #[error("{}: another sweep is at work in this folder", .0.display())]
-    Locked(PathBuf),
+    /// The folder cannot be used, or a file in it not be written.
+    #[error(transparent)]
+    Folder(#[from] ReportError),
     /// The folder holds the same experiment, but something in it has changed since.
     #[error(
         "{}: holds experiment {name:?}, but the experiment file, a scenario, an override or the program has changed \
@@ -80,8 +80,11 @@ impl SweepError {
     /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        use SweepError::{Changed, Locked, NotASweep, OtherExperiment, Scenario};
-        matches!(self, Scenario(_) | Locked(_) | Changed { .. } | OtherExperiment { .. } | NotASweep(_))
+        use SweepError::{Changed, Folder, NotASweep, OtherExperiment, Scenario};
+        match self {
+            Folder(error) => error.is_usage(),
+            _ => matches!(self, Scenario(_) | Changed { .. } | OtherExperiment { .. } | NotASweep(_)),
+        }
     }
 
     /// For `map_err`: an I/O error at `path`.

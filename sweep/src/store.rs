@@ -3,13 +3,16 @@
 use crate::error::SweepError;
 use crate::row::Row;
 use serde::{Deserialize, Serialize};
-use std::fs::{File, OpenOptions, TryLockError};
+use skein_report::WorkFolder;
+use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const IDENTITY: &str = "experiment.json";
-const PART: &str = "experiment.json.part";
+const PART: &str = ".experiment.json.part";
 const ROWS: &str = "rows.jsonl";
+/// Greatest size of the file with the identity, bytes.
+const IDENTITY_BYTES_MAX: u64 = 1 << 20;
 
 /// Which experiment a folder belongs to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,84 +27,63 @@ pub(crate) struct Identity {
     pub(crate) runs: usize,
 }
 
-/// An open folder. It is locked against a second sweep.
+/// An open folder. It is locked against other processes that write to it.
 #[derive(Debug)]
 pub(crate) struct Store {
-    folder: PathBuf,
+    folder: WorkFolder,
     rows: File,
 }
 
 impl Store {
     /// Opens the folder, or makes it. Returns the rows that it already holds; an incomplete last line is dropped.
-    pub(crate) fn open(folder: &Path, identity: &Identity) -> Result<(Self, Vec<Row>), SweepError> {
-        identify(folder, identity)?;
-        let path = folder.join(ROWS);
-        let file = OpenOptions::new().read(true).append(true).create(true).open(&path);
-        let mut file = file.map_err(SweepError::io(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(SweepError::Locked(folder.to_owned())),
-            Err(TryLockError::Error(error)) => return Err(SweepError::io(&path)(error)),
+    pub(crate) fn open(path: &Path, identity: &Identity) -> Result<(Self, Vec<Row>), SweepError> {
+        check_identity(path, identity)?;
+        let (folder, _) = WorkFolder::make(path)?;
+        // Another sweep may have made it since.
+        if !check_identity(path, identity)? {
+            folder.write(IDENTITY, &serde_json::to_vec_pretty(identity)?)?;
         }
-        let (rows, complete) = read(&mut file, &path, identity.runs)?;
-        file.set_len(complete).map_err(SweepError::io(&path))?;
-        Ok((Self { folder: folder.to_owned(), rows: file }, rows))
+        let mut file = folder.append(ROWS)?;
+        let (rows, complete) = read(&mut file, &folder.path().join(ROWS), identity.runs)?;
+        file.set_len(complete).map_err(SweepError::io(&folder.path().join(ROWS)))?;
+        Ok((Self { folder, rows: file }, rows))
     }
 
     /// Appends a row. When this returns, the line is in the file even if the process is killed right after.
     pub(crate) fn keep(&mut self, row: &Row) -> Result<(), SweepError> {
         let mut line = serde_json::to_vec(row)?;
         line.push(b'\n');
-        self.rows.write_all(&line).map_err(SweepError::io(&self.folder.join(ROWS)))
+        self.rows.write_all(&line).map_err(SweepError::io(&self.folder.path().join(ROWS)))
     }
 
-    /// Path of a file in the folder.
-    pub(crate) fn path(&self, name: &str) -> PathBuf {
-        self.folder.join(name)
-    }
-
-    /// Writes a file of the folder atomically.
-    pub(crate) fn write(&self, name: &str, content: &[u8]) -> Result<(), SweepError> {
-        let (path, part) = (self.path(name), self.path(&format!("{name}.part")));
-        let folder = path.parent().unwrap_or(&self.folder);
-        let written = std::fs::create_dir_all(folder)
-            .and_then(|()| std::fs::write(&part, content))
-            .and_then(|()| std::fs::rename(&part, &path));
-        written.map_err(SweepError::io(&path))
+    /// The sweep's folder.
+    pub(crate) fn folder(&self) -> &WorkFolder {
+        &self.folder
     }
 }
 
-/// Makes sure that the folder belongs to this experiment. Makes the folder if it does not exist or is empty.
-fn identify(folder: &Path, identity: &Identity) -> Result<(), SweepError> {
-    let path = folder.join(IDENTITY);
-    let found = match std::fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice::<Identity>(&bytes).ok(),
-        Err(_) if !folder.exists() => return create(folder, &path, identity),
-        Err(_) => None,
-    };
-    let folder = folder.to_owned();
+/// Makes sure that the folder belongs to this experiment, or to none. Returns whether it says so.
+fn check_identity(path: &Path, identity: &Identity) -> Result<bool, SweepError> {
+    if !path.exists() {
+        return Ok(false);
+    }
+    let not_a_sweep = || SweepError::NotASweep(path.to_owned());
+    let folder = WorkFolder::open(path).map_err(|_| not_a_sweep())?;
+    let found = folder.read_whole(IDENTITY, IDENTITY_BYTES_MAX).ok();
+    let found = found.and_then(|bytes| serde_json::from_slice::<Identity>(&bytes).ok());
+    let folder_path = path.to_owned();
     match found {
-        Some(found) if found == *identity => Ok(()),
-        Some(Identity { name, .. }) if name == identity.name => Err(SweepError::Changed { folder, name }),
-        Some(Identity { name, .. }) => Err(SweepError::OtherExperiment { folder, name }),
-        None if is_empty(&folder) => create(&folder, &path, identity),
-        None => Err(SweepError::NotASweep(folder)),
+        Some(found) if found == *identity => Ok(true),
+        Some(Identity { name, .. }) if name == identity.name => Err(SweepError::Changed { folder: folder_path, name }),
+        Some(Identity { name, .. }) => Err(SweepError::OtherExperiment { folder: folder_path, name }),
+        None if is_empty(&folder)? => Ok(false),
+        None => Err(not_a_sweep()),
     }
 }
 
 /// Whether the folder holds nothing, except the file of a sweep that was killed while it made the folder.
-fn is_empty(folder: &Path) -> bool {
-    let Ok(entries) = std::fs::read_dir(folder) else { return false };
-    entries.flatten().all(|entry| entry.file_name() == PART)
-}
-
-fn create(folder: &Path, path: &Path, identity: &Identity) -> Result<(), SweepError> {
-    let text = serde_json::to_vec_pretty(identity)?;
-    let part = folder.join(PART);
-    let made = std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(&part, text))
-        .and_then(|()| std::fs::rename(&part, path));
-    made.map_err(SweepError::io(folder))
+fn is_empty(folder: &WorkFolder) -> Result<bool, SweepError> {
+    Ok(folder.names()?.iter().all(|name| name == PART))
 }
 
 /// The rows of the file, and the number of bytes up to the end of the last complete line.
@@ -128,6 +110,7 @@ fn read(file: &mut File, path: &Path, runs: usize) -> Result<(Vec<Row>, u64), Sw
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_report::ReportError;
 
     fn identity(hash: &str) -> Identity {
         Identity { schema: "s".to_owned(), name: "e".to_owned(), hash: hash.to_owned(), runs: 3 }
@@ -160,7 +143,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("out");
         let (store, _) = Store::open(&folder, &identity("1")).unwrap();
-        assert!(matches!(Store::open(&folder, &identity("1")), Err(SweepError::Locked(_))));
+        assert!(matches!(Store::open(&folder, &identity("1")), Err(SweepError::Folder(ReportError::InUse(_)))));
         drop(store);
         assert!(matches!(Store::open(&folder, &identity("2")), Err(SweepError::Changed { .. })));
         std::fs::write(folder.join(ROWS), "{}\n").unwrap();

@@ -10,6 +10,7 @@ use crate::store::{Identity, Store};
 use crate::worker_pool::WorkerPool;
 use skein_bus::{PinMode, pin_to_core};
 use skein_protocol::digest::Digest;
+use skein_report::WorkFolder;
 use std::path::{Path, PathBuf};
 
 /// How far a sweep is.
@@ -101,15 +102,17 @@ impl<'g, 'c> Sweep<'g, 'c> {
     pub fn run_in_folder(mut self, folder: &Path) -> Result<SweepEnd<'g>, SweepError> {
         self.grid.check()?;
         let (mut store, mut rows) = Store::open(folder, &identity(self.grid))?;
-        let flights = store.path("flights");
+        let flights = folder.join("flights");
+        // Left behind by a sweep that was killed.
+        let _ = std::fs::remove_dir_all(&flights);
         let mode = self.mode(&flights)?;
         let ended = self.fly_missing(&mode, &mut rows, |row| store.keep(row));
-        // Empty by now, or left behind by a sweep that was killed.
+        // Empty by now.
         let _ = std::fs::remove_dir_all(flights);
         ended?;
         let end = self.end(rows)?;
         if let SweepEnd::Complete(report) = &end {
-            write(&store, report)?;
+            write(store.folder(), report)?;
         }
         Ok(end)
     }
@@ -196,14 +199,15 @@ fn identity(grid: &Grid<'_>) -> Identity {
     }
 }
 
-fn write(store: &Store, report: &SweepReport<'_>) -> Result<(), SweepError> {
-    store.write("runs.csv", &report.csv())?;
-    store.write("summary.json", &serde_json::to_vec_pretty(&report.summary())?)?;
+fn write(folder: &WorkFolder, report: &SweepReport<'_>) -> Result<(), SweepError> {
+    folder.write("runs.csv", &report.csv())?;
+    folder.write("summary.json", &serde_json::to_vec_pretty(&report.summary())?)?;
+    let plots = folder.subfolder("plots")?;
     for plot in report.plots()? {
-        store.write(&format!("plots/{}", plot.file), plot.svg.as_bytes())?;
+        plots.write(&plot.file, plot.svg.as_bytes())?;
     }
     if let Some(csv) = report.ratios_csv() {
-        store.write("ratios.csv", csv.as_bytes())?;
+        folder.write("ratios.csv", csv.as_bytes())?;
     }
     Ok(())
 }

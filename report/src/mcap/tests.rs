@@ -6,7 +6,9 @@ use super::writer::{TOPICS, Topic};
 use super::{McapWriter, read};
 use crate::facts::RunFacts;
 use crate::files::RECORDING;
-use crate::scene::State;
+use crate::folder::RunFolder;
+use crate::interruption::Interrupted;
+use crate::scene::{Sample, State};
 use crate::testing::{facts, row};
 use skein_protocol::DroneId;
 use skein_protocol::SimTime;
@@ -25,7 +27,9 @@ fn facts_with_obstacle() -> RunFacts {
 
 /// Records two seconds of three drones. All wall times are `wall`.
 fn record(folder: &Path, wall: u32) -> PathBuf {
-    let mut writer = McapWriter::create(folder, &facts_with_obstacle(), &serde_json::json!({"name": "s1"})).unwrap();
+    let path = folder.join(RECORDING);
+    let (file, scenario) = (std::fs::File::create(&path).unwrap(), serde_json::json!({"name": "s1"}));
+    let mut writer = McapWriter::new(file, path.clone(), &facts_with_obstacle(), &scenario).unwrap();
     for tick in 0..100u64 {
         let rows: Vec<DroneRow> = (0..3)
             .map(|drone| {
@@ -39,7 +43,7 @@ fn record(folder: &Path, wall: u32) -> PathBuf {
         writer.take(RecordView { head: &head, rows: &rows, frames: &[], events: &[] }, &events).unwrap();
     }
     writer.finish().unwrap();
-    folder.join(RECORDING)
+    path
 }
 
 fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
@@ -111,11 +115,16 @@ fn messages_hold_the_positions_of_the_drones() {
 
 #[test]
 fn a_truncated_recording_reads_back() {
-    let folder = tempfile::tempdir().unwrap();
+    let root = tempfile::tempdir().unwrap();
+    let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
     let path = record(folder.path(), 1);
     let read_back = || {
         let (mut times, mut events) = (Vec::new(), Vec::new());
-        read(folder.path(), |sample| times.push(sample.state.t_s), |event| events.push(event)).unwrap();
+        let sample = |sample: Sample| {
+            times.push(sample.state.t_s);
+            Ok(())
+        };
+        read(&folder, &Interrupted::never(), sample, |event| events.push(event)).unwrap();
         (times, events)
     };
     let (times, events) = read_back();

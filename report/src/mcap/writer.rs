@@ -2,7 +2,6 @@
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
-use crate::files::RECORDING;
 use crate::mcap::draw::{self, Drones};
 use crate::mcap::foxglove::{
     FrameTransform, FrameTransforms, Log, Pose, PosesInFrame, Quaternion, SceneUpdate, Time, Vector3, WORLD,
@@ -18,9 +17,8 @@ use skein_protocol::SimTime;
 use skein_protocol::record::{EventKind, RecordView, RunEvent};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::io::{Seek, Write};
+use std::path::PathBuf;
 
 /// Compression level of zstd: the fastest, because a run must not wait for its recording.
 const COMPRESSION_LEVEL: u32 = 1;
@@ -57,9 +55,9 @@ pub(super) enum Topic {
 }
 
 /// Writes run.mcap.
-pub(crate) struct McapWriter {
+pub(crate) struct McapWriter<W: Write + Seek> {
     path: PathBuf,
-    out: Writer<BufWriter<File>>,
+    out: Writer<W>,
     /// The channel of each topic.
     channels: Vec<u16>,
     /// Number of messages on each topic so far.
@@ -81,18 +79,21 @@ fn stride(facts: &RunFacts) -> u64 {
     (rarer / SAMPLE_RATE_HZ / facts.dt_s).round().max(1.0) as u64
 }
 
-impl McapWriter {
-    /// Creates the file in a run's folder. `scenario` is the resolved scenario.
-    pub(crate) fn create(folder: &Path, facts: &RunFacts, scenario: &serde_json::Value) -> Result<Self, ReportError> {
-        let path = folder.join(RECORDING);
-        let file = File::create(&path).map_err(ReportError::io(&path))?;
+impl<W: Write + Seek> McapWriter<W> {
+    /// Begins a recording. `path` names its file in errors, `scenario` is the resolved scenario.
+    pub(crate) fn new(
+        out: W,
+        path: PathBuf,
+        facts: &RunFacts,
+        scenario: &serde_json::Value,
+    ) -> Result<Self, ReportError> {
         // With one thread, the bytes do not depend on the number of cores.
         let options = WriteOptions::new()
             .profile("skein")
             .chunk_size(Some(CHUNK_BYTES))
             .compression_level(COMPRESSION_LEVEL)
             .compression_threads(0);
-        let out = options.create(BufWriter::with_capacity(1 << 18, file)).map_err(ReportError::recording(&path))?;
+        let out = options.create(out).map_err(ReportError::recording(&path))?;
         let mut writer = Self {
             out,
             channels: Vec::new(),

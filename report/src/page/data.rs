@@ -4,6 +4,7 @@ use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
 use crate::geometry::outline;
+use crate::interruption::Interrupted;
 use crate::mcap;
 use crate::scene::{Sample, event_text};
 use crate::tuning::PAGE_POSITIONS_MAX;
@@ -14,7 +15,7 @@ use flate2::write::ZlibEncoder;
 use serde::Serialize;
 use serde_json::json;
 use skein_protocol::record::{EventKind, RunEvent};
-use std::io::Write;
+use std::io::{self, Write};
 
 /// The first line of a run: its facts, and the outlines of the obstacles.
 #[must_use]
@@ -56,15 +57,45 @@ pub fn status_line(status: &str) -> String {
     json!({ "status": status }).to_string()
 }
 
-/// The recording of a run: lines of JSON, deflated, in Base64.
-pub(super) fn packed(folder: &RunFolder, facts: &RunFacts) -> Result<String, ReportError> {
-    let (mut samples, mut lines) = (Vec::new(), vec![facts_line(facts)]);
-    mcap::read(folder.path(), |sample| samples.push(sample), |event| lines.extend(event_line(&event)))?;
-    let step = (samples.len() * facts.drones as usize).div_ceil(PAGE_POSITIONS_MAX).max(1);
-    let last = samples.len().saturating_sub(1);
-    let kept = samples.iter().enumerate().filter(|(place, _)| place % step == 0 || *place == last);
-    lines.extend(kept.map(|(_, sample)| sample_line(sample)));
-    let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
-    let packed = out.write_all(lines.join("\n").as_bytes()).and_then(|()| out.finish());
-    packed.map(|bytes| STANDARD.encode(bytes)).map_err(ReportError::io(folder.path()))
+/// The recording of a run: lines of JSON, deflated, in Base64. It is read twice, so that it never has to be in memory: the
+/// first time for its length and its events.
+pub(super) fn packed(
+    folder: &RunFolder,
+    facts: &RunFacts,
+    interrupted: &Interrupted<'_>,
+) -> Result<String, ReportError> {
+    let mut out = LineWriter(ZlibEncoder::new(Vec::new(), Compression::default()));
+    let io = |result: io::Result<()>| result.map_err(ReportError::io(folder.path()));
+    io(out.line(&facts_line(facts)))?;
+    let (mut samples, mut events) = (0, Vec::new());
+    let count = |_| {
+        samples += 1;
+        Ok(())
+    };
+    mcap::read(folder, interrupted, count, |event| events.extend(event_line(&event)))?;
+    io(events.iter().try_for_each(|line| out.line(line)))?;
+    let (step, last) = (step(samples, facts.drones as usize), samples.saturating_sub(1));
+    let mut place = 0;
+    let keep = |sample| {
+        let kept = place % step == 0 || place == last;
+        place += 1;
+        if kept { io(out.line(&sample_line(&sample))) } else { Ok(()) }
+    };
+    mcap::read(folder, interrupted, keep, |_| {})?;
+    out.0.finish().map(|bytes| STANDARD.encode(bytes)).map_err(ReportError::io(folder.path()))
+}
+
+/// Samples from one that the page holds to the next.
+fn step(samples: usize, drones: usize) -> usize {
+    (samples * drones).div_ceil(PAGE_POSITIONS_MAX).max(1)
+}
+
+/// Deflates lines.
+struct LineWriter(ZlibEncoder<Vec<u8>>);
+
+impl LineWriter {
+    fn line(&mut self, line: &str) -> io::Result<()> {
+        self.0.write_all(line.as_bytes())?;
+        self.0.write_all(b"\n")
+    }
 }

@@ -1,7 +1,6 @@
 //! The plots of a run inside the page, in the colours of the page.
 
-use crate::error::ReportError;
-use std::path::PathBuf;
+use crate::plot::Plot;
 
 /// The colours of the plots that depend on the page's theme, and their CSS variables.
 const THEMED: [(&str, &str); 6] = [
@@ -14,15 +13,14 @@ const THEMED: [(&str, &str); 6] = [
 ];
 
 /// The figures of the page.
-pub(super) fn all(plots: &[PathBuf]) -> Result<String, ReportError> {
+pub(super) fn all(plots: &[Plot]) -> String {
     let mut html = "<h2>Figures</h2>".to_owned();
     // The replay shows more than the animation, which is left out.
-    for path in plots.iter().filter(|path| !path.ends_with("flight.svg")) {
-        let svg = std::fs::read_to_string(path).map_err(ReportError::io(path))?;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        html += &format!("<figure id=\"{name}\">{}</figure>", themed(&svg));
+    for Plot { file, svg } in plots.iter().filter(|plot| plot.file != "flight.svg") {
+        let name = file.trim_end_matches(".svg");
+        html += &format!("<figure id=\"{name}\">{}</figure>", themed(svg));
     }
-    Ok(html)
+    html
 }
 
 /// Replaces colours only where they are a whole attribute, so that text in a plot does not change.

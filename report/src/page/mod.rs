@@ -7,10 +7,11 @@ mod tables;
 
 use crate::error::ReportError;
 use crate::facts::RunFacts;
-use crate::files::{PAGE, PLOT_FILES, PLOTS};
+use crate::files::{PAGE, PLOTS};
 use crate::folder::{Manifest, RunFolder};
+use crate::interruption::Interrupted;
 use crate::markup::escaped;
-use crate::plot;
+use crate::plot::{self, Plot};
 use crate::summary::Summary;
 use crate::text;
 use std::path::PathBuf;
@@ -38,41 +39,62 @@ pub fn live(port: u16) -> String {
     ])
 }
 
-/// The page of a recorded run. Also writes the plots.
+/// The page of a recorded run. Writes nothing.
 ///
 /// # Errors
-/// [`ReportError`] if a file of the recording is missing or invalid, or a plot cannot be drawn.
-pub fn report(folder: &RunFolder, manifest: &Manifest, summary: &Summary) -> Result<String, ReportError> {
-    let facts = &manifest.facts;
-    // Another thread packs the recording while this one draws the plots.
-    let (plots, data) = std::thread::scope(|scope| {
-        let data = scope.spawn(|| data::packed(folder, facts));
-        (plot::write(folder, facts), data.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    });
-    let plots = plots?;
-    let title = format!("{}: {} drones, {}, seed {}", facts.scenario, facts.drones, facts.strategy, facts.seed);
-    let outcome = tables::outcome(summary);
-    let outcome_line = format!("<span class=\"outcome {outcome}\">{}</span>", escaped(&text::outcome(summary, false)));
-    let body = format!("{}{}", tables::all(summary), figures::all(&plots)?);
-    let data = format!("<script id=\"data\" type=\"text/plain\">{}</script>", data?);
-    Ok(fill(&[
-        ("connect", "'none'"),
-        ("title", &escaped(&title)),
-        ("status", &outcome_line),
-        ("report", &format!("<section class=\"report\">{body}</section>")),
-        ("data", &data),
-    ]))
+/// [`ReportError`] if a file of the recording is missing or invalid, or a plot cannot be drawn; [`ReportError::Interrupted`].
+pub fn report(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    summary: &Summary,
+    interrupted: &Interrupted<'_>,
+) -> Result<String, ReportError> {
+    let draw = || plot::draw(folder, &manifest.facts, interrupted, std::io::sink());
+    let (plots, data) = beside(draw, || data::packed(folder, &manifest.facts, interrupted));
+    Ok(recorded(manifest, summary, &plots?, &data?))
 }
 
 /// Writes report.html and the plots of a recorded run, and returns their paths, report.html first.
 ///
 /// # Errors
 /// Those of [`report`], and [`ReportError::Io`].
-pub fn write(folder: &RunFolder, manifest: &Manifest, summary: &Summary) -> Result<Vec<PathBuf>, ReportError> {
-    let path = folder.path().join(PAGE);
-    std::fs::write(&path, report(folder, manifest, summary)?).map_err(ReportError::io(&path))?;
-    let plots = PLOT_FILES.iter().map(|name| folder.path().join(PLOTS).join(name)).filter(|path| path.exists());
-    Ok(std::iter::once(path.clone()).chain(plots).collect())
+pub fn write(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    summary: &Summary,
+    interrupted: &Interrupted<'_>,
+) -> Result<Vec<PathBuf>, ReportError> {
+    let draw = || plot::draw_and_write(folder, &manifest.facts, interrupted);
+    let (plots, data) = beside(draw, || data::packed(folder, &manifest.facts, interrupted));
+    let plots = plots?;
+    folder.files().write(PAGE, recorded(manifest, summary, &plots, &data?).as_bytes())?;
+    let paths = plots.iter().map(|plot| folder.path().join(PLOTS).join(plot.file));
+    Ok(std::iter::once(folder.path().join(PAGE)).chain(paths).collect())
+}
+
+/// Does both at the same time, the second one in another thread.
+fn beside<A, B: Send>(first: impl FnOnce() -> A, second: impl FnOnce() -> B + Send) -> (A, B) {
+    std::thread::scope(|scope| {
+        let second = scope.spawn(second);
+        (first(), second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
+}
+
+/// The page of a run with its plots and its packed recording.
+fn recorded(manifest: &Manifest, summary: &Summary, plots: &[Plot], data: &str) -> String {
+    let facts = &manifest.facts;
+    let title = format!("{}: {} drones, {}, seed {}", facts.scenario, facts.drones, facts.strategy, facts.seed);
+    let outcome = tables::outcome(summary);
+    let outcome_line = format!("<span class=\"outcome {outcome}\">{}</span>", escaped(&text::outcome(summary)));
+    let body = format!("{}{}", tables::all(summary), figures::all(plots));
+    let data = format!("<script id=\"data\" type=\"text/plain\">{data}</script>");
+    fill(&[
+        ("connect", "'none'"),
+        ("title", &escaped(&title)),
+        ("status", &outcome_line),
+        ("report", &format!("<section class=\"report\">{body}</section>")),
+        ("data", &data),
+    ])
 }
 
 /// The page with its places filled in. Places in the inserted text are not filled in.

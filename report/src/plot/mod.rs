@@ -8,121 +8,173 @@ mod lines;
 mod recording;
 pub mod reproduce;
 mod samples;
+mod series;
 mod style;
 pub mod surface;
 pub mod sweep;
 mod timeline;
 mod tracks;
 
-use crate::deviation::{self, ShapeDeviation};
+use crate::deviation::{DeviationWriter, ShapeDeviation};
 use crate::error::{DrawError, ReportError};
 use crate::facts::RunFacts;
 pub use crate::files::PLOT_FILES as FILES;
-use crate::files::TRACE;
+use crate::files::{FORMATION, PLOTS};
 use crate::folder::RunFolder;
+use crate::interruption::Interrupted;
 use curves::{Band, Figure, Level};
 use recording::Recording;
 use samples::Samples;
+use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 use style::{BLUE, RED};
+
+/// A plot of a run.
+pub(crate) struct Plot {
+    /// Name of its file, one of [`FILES`].
+    pub file: &'static str,
+    /// The drawing.
+    pub svg: String,
+}
 
 /// Draws the plots of a run from its trace.csv and run.mcap into its folder `plots`, and writes formation.csv, the
 /// deviation from the target shape over time. Returns the paths of the plots. Plots without data are left out: all plots
 /// if the trace is empty, those of distances for a single drone, those of the shape for a very large swarm.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Content`] for an invalid trace, [`ReportError::Recording`], [`ReportError::Plot`].
-pub fn write(folder: &RunFolder, facts: &RunFacts) -> Result<Vec<PathBuf>, ReportError> {
-    let samples = Samples::read(&folder.path().join(TRACE), facts)?;
-    deviation::write(folder.path(), samples.deviations.samples())?;
-    let recording = Recording::read(folder)?;
-    let plots = folder.plots()?;
-    let mut written = Vec::new();
-    for (name, svg) in FILES.iter().zip(draw(&samples, &recording, facts)) {
-        let path = plots.join(name);
-        if let Some(svg) = svg {
-            let svg = svg.map_err(|source| ReportError::Plot { path: path.clone(), source })?;
-            std::fs::write(&path, svg).map_err(ReportError::io(&path))?;
-            written.push(path);
+/// [`ReportError::Io`], [`ReportError::Content`] for an invalid trace, [`ReportError::Recording`], [`ReportError::Plot`],
+/// [`ReportError::Interrupted`].
+pub fn write(folder: &RunFolder, facts: &RunFacts, interrupted: &Interrupted<'_>) -> Result<Vec<PathBuf>, ReportError> {
+    let plots = draw_and_write(folder, facts, interrupted)?;
+    Ok(plots.iter().map(|plot| folder.path().join(PLOTS).join(plot.file)).collect())
+}
+
+/// As [`write`]; returns the plots.
+pub(crate) fn draw_and_write(
+    folder: &RunFolder,
+    facts: &RunFacts,
+    interrupted: &Interrupted<'_>,
+) -> Result<Vec<Plot>, ReportError> {
+    let deviations = BufWriter::new(folder.files().begin(FORMATION)?);
+    let plots = draw(folder, facts, interrupted, deviations).inspect_err(|_| folder.files().give_up(FORMATION))?;
+    folder.files().keep(FORMATION)?;
+    let subfolder = folder.files().subfolder(PLOTS)?;
+    plots.iter().try_for_each(|plot| subfolder.write(plot.file, plot.svg.as_bytes()))?;
+    Ok(plots)
+}
+
+/// Draws the plots, and writes the deviation from the target shape to `deviations`.
+pub(crate) fn draw(
+    folder: &RunFolder,
+    facts: &RunFacts,
+    interrupted: &Interrupted<'_>,
+    deviations: impl Write,
+) -> Result<Vec<Plot>, ReportError> {
+    let path = folder.path().join(FORMATION);
+    let io = |result: std::io::Result<()>| result.map_err(ReportError::io(&path));
+    let mut deviations = DeviationWriter::new(deviations).map_err(ReportError::io(&path))?;
+    let samples = Samples::read(folder, facts, interrupted, |deviation| io(deviations.take(deviation)))?;
+    io(deviations.flush())?;
+    let recording = Recording::read(folder, interrupted)?;
+    let mut plots = Vec::new();
+    for (file, draw) in FILES.into_iter().zip(DRAWINGS) {
+        interrupted.check()?;
+        if let Some(svg) = draw(&samples, &recording, facts) {
+            let path = || folder.path().join(PLOTS).join(file);
+            plots.push(Plot { file, svg: svg.map_err(|source| ReportError::Plot { path: path(), source })? });
         }
     }
-    Ok(written)
+    Ok(plots)
 }
 
 /// The SVG of a plot, or the error; `None` without data.
 type Drawn = Option<Result<String, DrawError>>;
 
-/// Draws the plots in the order of [`FILES`].
-fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -> [Drawn; FILES.len()] {
-    let run = format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy);
-    let curve = |figure: Figure| (!figure.band.is_empty()).then(|| figure.draw(BLUE));
-    let tracks = (!samples.speed.is_empty()).then(|| tracks::draw(samples, facts, &format!("Tracks: {run}")));
-    let terms = timeline::terms(recording.events(), samples.end_s);
-    let leaders = (!terms.is_empty()).then(|| timeline::draw(&terms, recording.events(), facts, samples.end_s));
-    let messages = recording
-        .has_messages()
-        .then(|| lines::draw(&format!("Messages: {run}"), "messages per second", &recording.lines()));
-    [
-        tracks,
-        curve(separation(samples, facts, &run)),
-        curve(speed(samples, &run)),
-        curve(distance(samples, facts, &run)),
-        curve(energy(samples, &run)),
-        curve(slot_error(samples, facts, &run)),
-        leaders,
-        messages,
-        flight::draw(samples, facts).map(Ok),
-        curve(disturbance(samples, &run)),
-        curve(bending(samples, &run)),
-    ]
+/// The drawings in the order of [`FILES`].
+const DRAWINGS: [fn(&Samples, &Recording, &RunFacts) -> Drawn; FILES.len()] = [
+    draw_tracks,
+    |samples, _, facts| curve(separation(samples, facts)),
+    |samples, _, facts| curve(speed(samples, facts)),
+    |samples, _, facts| curve(distance(samples, facts)),
+    |samples, _, facts| curve(energy(samples, facts)),
+    |samples, _, facts| curve(slot_error(samples, facts)),
+    draw_leaders,
+    draw_messages,
+    |samples, _, facts| flight::draw(samples, facts).map(Ok),
+    |samples, _, facts| curve(disturbance(samples, facts)),
+    |samples, _, facts| curve(bending(samples, facts)),
+];
+
+fn curve(figure: Figure) -> Drawn {
+    (!figure.band.is_empty()).then(|| figure.draw(BLUE))
 }
 
-fn separation(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+/// The run as the titles name it.
+fn run(facts: &RunFacts) -> String {
+    format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy)
+}
+
+fn draw_tracks(samples: &Samples, _: &Recording, facts: &RunFacts) -> Drawn {
+    let any = !samples.speed.samples().is_empty();
+    any.then(|| tracks::draw(samples, facts, &format!("Tracks: {}", run(facts))))
+}
+
+fn draw_leaders(samples: &Samples, recording: &Recording, facts: &RunFacts) -> Drawn {
+    let terms = timeline::terms(recording.events(), samples.end_s);
+    (!terms.is_empty()).then(|| timeline::draw(&terms, recording.events(), facts, samples.end_s))
+}
+
+fn draw_messages(_: &Samples, recording: &Recording, facts: &RunFacts) -> Drawn {
+    let title = format!("Messages: {}", run(facts));
+    recording.has_messages().then(|| lines::draw(&title, "messages per second", &recording.lines()))
+}
+
+fn separation(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Least separation: {run}"),
+        title: format!("Least separation: {}", run(facts)),
         y_label: "distance between the two nearest drones (m)",
         line_label: "least separation",
-        band: without_deviation(samples.separation.iter().copied()),
+        band: without_deviation(samples.separation.samples().iter().copied()),
         level: Some(safe_distance(facts)),
     }
 }
 
-fn speed(samples: &Samples, run: &str) -> Figure {
+fn speed(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Speed: {run}"),
+        title: format!("Speed: {}", run(facts)),
         y_label: "speed (m/s)",
         line_label: "mean over drones",
-        band: samples.speed.clone(),
+        band: samples.speed.samples().to_vec(),
         level: None,
     }
 }
 
-fn distance(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+fn distance(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Distance between drones: {run}"),
+        title: format!("Distance between drones: {}", run(facts)),
         y_label: "distance between drones (m)",
         line_label: "mean over pairs",
-        band: samples.distance.clone(),
+        band: samples.distance.samples().to_vec(),
         level: Some(safe_distance(facts)),
     }
 }
 
-fn energy(samples: &Samples, run: &str) -> Figure {
+fn energy(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Energy: {run}"),
+        title: format!("Energy: {}", run(facts)),
         y_label: "energy used by a drone (J)",
         line_label: "mean over drones",
-        band: samples.energy.clone(),
+        band: samples.energy.samples().to_vec(),
         level: None,
     }
 }
 
-fn slot_error(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
+fn slot_error(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Largest slot error after the best translation: {run}"),
+        title: format!("Largest slot error after the best translation: {}", run(facts)),
         y_label: "distance from the slot (m)",
         line_label: "drone farthest from its slot",
-        band: without_deviation(samples.formation.iter().copied()),
+        band: without_deviation(samples.formation.samples().iter().copied()),
         level: Some(Level {
             label: format!("limit of a closed formation, {} m", facts.arrival_error_m),
             colour: RED,
@@ -131,9 +183,9 @@ fn slot_error(samples: &Samples, facts: &RunFacts, run: &str) -> Figure {
     }
 }
 
-fn disturbance(samples: &Samples, run: &str) -> Figure {
+fn disturbance(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Disturbance of the formation: {run}"),
+        title: format!("Disturbance of the formation: {}", run(facts)),
         y_label: "distance from the target shape (m)",
         line_label: "root mean square over drones, after the best translation and assignment",
         band: of_deviations(samples, |deviation| deviation.disturbance_m),
@@ -141,9 +193,9 @@ fn disturbance(samples: &Samples, run: &str) -> Figure {
     }
 }
 
-fn bending(samples: &Samples, run: &str) -> Figure {
+fn bending(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
-        title: format!("Bending energy: {run}"),
+        title: format!("Bending energy: {}", run(facts)),
         y_label: "bending energy (1)",
         line_label: "of the thin-plate spline from the target shape to the drones",
         band: of_deviations(samples, |deviation| deviation.bending),
@@ -170,7 +222,7 @@ mod tests {
     use crate::testing::facts;
     use skein_protocol::Vec2;
     use skein_protocol::shape::ConvexShape;
-    use std::fmt::Write;
+    use std::fmt::Write as _;
 
     fn recorded(drones: u32, ticks: u32) -> (tempfile::TempDir, RunFolder) {
         let root = tempfile::tempdir().unwrap();
@@ -185,7 +237,9 @@ mod tests {
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
         // A recording without messages.
         let scenario = serde_json::json!({});
-        crate::mcap::McapWriter::create(folder.path(), &facts(drones), &scenario).unwrap().finish().unwrap();
+        let file = folder.files().create("run.mcap").unwrap();
+        let path = folder.path().join("run.mcap");
+        crate::mcap::McapWriter::new(file, path, &facts(drones), &scenario).unwrap().finish().unwrap();
         (root, folder)
     }
 
@@ -193,7 +247,7 @@ mod tests {
     fn every_plot_has_labels() {
         let (_root, folder) = recorded(3, 500);
         let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
-        let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }).unwrap();
+        let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }, &Interrupted::never()).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
         let drawn = |name: &&str| !["leaders.svg", "messages.svg"].contains(name);
         assert_eq!(names, FILES.into_iter().filter(drawn).collect::<Vec<_>>());
@@ -210,9 +264,9 @@ mod tests {
     #[test]
     fn plots_without_data_are_left_out() {
         let (_root, folder) = recorded(0, 0);
-        assert_eq!(write(&folder, &facts(3)).unwrap(), Vec::<PathBuf>::new());
+        assert_eq!(write(&folder, &facts(3), &Interrupted::never()).unwrap(), Vec::<PathBuf>::new());
         let (_root, folder) = recorded(1, 10);
-        let written = write(&folder, &facts(1)).unwrap();
+        let written = write(&folder, &facts(1), &Interrupted::never()).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(names, ["trace.svg", "speed.svg", "energy.svg", "formation.svg", "flight.svg"]);
     }
@@ -221,7 +275,7 @@ mod tests {
     fn a_missing_trace_is_named() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        let error = write(&folder, &facts(3)).unwrap_err().to_string();
+        let error = write(&folder, &facts(3), &Interrupted::never()).unwrap_err().to_string();
         assert!(error.contains("trace.csv"), "{error}");
     }
 }

@@ -3,6 +3,7 @@
 use super::lines::Line;
 use crate::error::ReportError;
 use crate::folder::RunFolder;
+use crate::interruption::Interrupted;
 use crate::mcap;
 use skein_protocol::record::RunEvent;
 
@@ -28,10 +29,11 @@ pub(super) struct Recording {
 
 impl Recording {
     /// Reads run.mcap.
-    pub(crate) fn read(folder: &RunFolder) -> Result<Self, ReportError> {
+    pub(crate) fn read(folder: &RunFolder, interrupted: &Interrupted<'_>) -> Result<Self, ReportError> {
         let (mut recording, mut events) = (Self::default(), Vec::new());
         mcap::read(
-            folder.path(),
+            folder,
+            interrupted,
             |sample| {
                 let sum = |counts: &mut dyn Iterator<Item = &u32>| counts.map(|&count| f64::from(count)).sum::<f64>();
                 let radio = &sample.radio;
@@ -41,6 +43,7 @@ impl Recording {
                     sum(&mut radio.heard.iter()),
                     sum(&mut radio.dropped.values()),
                 );
+                Ok(())
             },
             |event| events.push(event),
         )?;

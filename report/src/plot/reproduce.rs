@@ -3,10 +3,10 @@
 use super::style::{PALETTE, hex};
 use crate::error::ReportError;
 use crate::facts::RunFacts;
-use crate::files::TRACE;
 use crate::folder::RunFolder;
 use crate::formation::mean_distance;
 use crate::geometry::outline;
+use crate::interruption::Interrupted;
 use crate::markup::escaped;
 use crate::trace;
 use plotters::style::RGBColor;
@@ -71,7 +71,7 @@ impl Snapshots {
             extents: Vec::new(),
         };
         let mut last: Vec<trace::TraceRow> = Vec::new();
-        trace::read(&folder.path().join(TRACE), |rows| {
+        trace::read(folder, &Interrupted::never(), |rows| {
             found.measure(rows);
             for row in rows {
                 let tail = tails.entry(row.drone).or_default();
@@ -83,6 +83,7 @@ impl Snapshots {
                 found.snapshots.push(snapshot(rows, &tails));
             }
             last = rows.to_vec();
+            Ok(())
         })?;
         if !last.is_empty() {
             let missing = times_s.len().saturating_sub(found.snapshots.len());

@@ -1,36 +1,41 @@
 //! The data of the plots: a trace, reduced to what a plot can show.
 
 use super::curves::Band;
+use super::series::Series;
 use crate::close::Sweep;
-use crate::deviation::DeviationSampler;
+use crate::deviation::{DeviationSampler, ShapeDeviation};
 use crate::error::ReportError;
 use crate::facts::RunFacts;
+use crate::folder::RunFolder;
 use crate::formation;
+use crate::interruption::Interrupted;
 use crate::trace::{self, TraceRow};
 use crate::tuning::{PLOT_PERIOD_S, PLOT_POINTS_MAX, PLOT_SLOT_ERROR_DRONES_MAX};
 use skein_protocol::Vec2;
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// The data of the plots.
-#[derive(Default)]
 pub(super) struct Samples {
     /// Time, s, and least separation since the previous sample, m, so that no short dip is lost.
-    pub separation: Vec<(f64, f64)>,
+    pub separation: Series<(f64, f64)>,
     /// Speeds of the drones, m/s.
-    pub speed: Vec<Band>,
+    pub speed: Series<Band>,
     /// Distances of all pairs of drones, m.
-    pub distance: Vec<Band>,
+    pub distance: Series<Band>,
     /// Deviation of the swarm from its target shape.
-    pub deviations: DeviationSampler,
+    pub deviations: Series<ShapeDeviation>,
     /// Energies used by the drones, J.
-    pub energy: Vec<Band>,
+    pub energy: Series<Band>,
     /// Time, s, and largest slot error, m.
-    pub formation: Vec<(f64, f64)>,
+    pub formation: Series<(f64, f64)>,
     /// Tracks by drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
     pub end_s: f64,
+    /// Samples from one point of a track to the next.
+    pub(super) stride: usize,
+    /// Samples so far.
+    pub(super) taken: usize,
 }
 
 /// The track of a drone.
@@ -46,16 +51,47 @@ pub(super) struct Track {
     pub last_m: Vec2,
 }
 
+impl Default for Samples {
+    fn default() -> Self {
+        let first = |_: &mut Band, _| {};
+        Self {
+            separation: Series::new(|(_, least), (_, other)| *least = least.min(other)),
+            speed: Series::new(first),
+            distance: Series::new(first),
+            deviations: Series::new(|_, _| {}),
+            energy: Series::new(first),
+            formation: Series::new(|(_, most), (_, other)| *most = most.max(other)),
+            tracks: BTreeMap::new(),
+            end_s: 0.0,
+            stride: 1,
+            taken: 0,
+        }
+    }
+}
+
 impl Samples {
-    /// Reads trace.csv.
+    /// Reads trace.csv. Calls `deviated` with each deviation from the target shape.
     ///
     /// # Errors
-    /// [`ReportError::Io`], or [`ReportError::Content`] for an invalid line.
-    pub(crate) fn read(path: &Path, facts: &RunFacts) -> Result<Self, ReportError> {
+    /// The error of `deviated`; [`ReportError::Io`], [`ReportError::Interrupted`], or [`ReportError::Content`] for an
+    /// invalid line.
+    pub(crate) fn read(
+        folder: &RunFolder,
+        facts: &RunFacts,
+        interrupted: &Interrupted<'_>,
+        mut deviated: impl FnMut(&ShapeDeviation) -> Result<(), ReportError>,
+    ) -> Result<Self, ReportError> {
         let (mut samples, mut sweep, mut period) = (Self::default(), Sweep::default(), None);
-        trace::read(path, |rows| {
+        let mut sampler = DeviationSampler::default();
+        trace::read(folder, interrupted, |rows| {
+            let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
+            if let Some(deviation) = sampler.take(facts, rows[0].t_s, &positions) {
+                deviated(&deviation)?;
+                samples.deviations.push(deviation);
+            }
             let now = (rows[0].t_s / PLOT_PERIOD_S + 1e-6).floor() as i64;
-            samples.take(facts, rows, period.replace(now) != Some(now), &mut sweep);
+            samples.take(facts, rows, &positions, period.replace(now) != Some(now), &mut sweep);
+            Ok(())
         })?;
         for track in samples.tracks.values_mut() {
             track.points.push(track.last_m);
@@ -65,20 +101,20 @@ impl Samples {
     }
 
     /// Takes the rows of a tick.
-    fn take(&mut self, facts: &RunFacts, rows: &[TraceRow], sampled: bool, sweep: &mut Sweep) {
+    fn take(&mut self, facts: &RunFacts, rows: &[TraceRow], positions: &[Vec2], sampled: bool, sweep: &mut Sweep) {
         let t_s = rows[0].t_s;
         self.end_s = t_s;
-        let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
-        self.deviations.take(facts, t_s, &positions);
-        match (sweep.least_distance(&positions), self.separation.last_mut()) {
+        match (sweep.least_distance(positions), self.separation.last_mut()) {
             (Some(least), Some(last)) if !sampled => last.1 = last.1.min(least),
             (Some(least), _) => self.separation.push((t_s, least)),
             (None, _) => {}
         }
+        let drawn = sampled && self.taken.is_multiple_of(self.stride);
+        self.taken += usize::from(sampled);
         for row in rows {
             let track = self.tracks.entry(row.drone).or_default();
             (track.last_s, track.last_m) = (t_s, row.position_m);
-            if sampled || track.points.is_empty() {
+            if drawn || track.points.is_empty() {
                 track.points.push(row.position_m);
             }
             if track.group != row.group {
@@ -86,14 +122,37 @@ impl Samples {
             }
         }
         if sampled {
-            self.speed.extend(band(t_s, rows.iter().map(|row| row.velocity_mps.norm())));
+            band(t_s, rows.iter().map(|row| row.velocity_mps.norm()))
+                .into_iter()
+                .for_each(|band| self.speed.push(band));
             let pair = |i: usize| positions[..i].iter().map(move |other| (i, other));
             let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
-            self.distance.extend(band(t_s, distances));
-            self.energy.extend(band(t_s, rows.iter().map(|row| row.energy_j)));
-            if rows.len() <= PLOT_SLOT_ERROR_DRONES_MAX {
-                self.formation.extend(formation::error(facts, &positions).map(|error| (t_s, error.largest_m)));
+            band(t_s, distances).into_iter().for_each(|band| self.distance.push(band));
+            band(t_s, rows.iter().map(|row| row.energy_j)).into_iter().for_each(|band| self.energy.push(band));
+            if let Some(error) = formation::error(facts, positions).filter(|_| rows.len() <= PLOT_SLOT_ERROR_DRONES_MAX)
+            {
+                self.formation.push((t_s, error.largest_m));
             }
+        }
+        if self.points() > 2 * PLOT_POINTS_MAX {
+            self.halve_tracks();
+        }
+    }
+
+    /// Number of points of all tracks.
+    fn points(&self) -> usize {
+        self.tracks.values().map(|track| track.points.len()).sum()
+    }
+
+    /// Removes every second point of each track, so that tracks take no more memory in a long flight.
+    fn halve_tracks(&mut self) {
+        self.stride *= 2;
+        for track in self.tracks.values_mut() {
+            let mut place = 0;
+            track.points.retain(|_| {
+                place += 1;
+                place % 2 == 1
+            });
         }
     }
 
@@ -104,8 +163,7 @@ impl Samples {
 
     /// Removes points evenly until no more than [`PLOT_POINTS_MAX`] are left.
     fn thin(&mut self) {
-        let points: usize = self.tracks.values().map(|track| track.points.len()).sum();
-        let step = points.div_ceil(PLOT_POINTS_MAX).max(1);
+        let step = self.points().div_ceil(PLOT_POINTS_MAX).max(1);
         for track in self.tracks.values_mut() {
             let last = track.points.len() - 1;
             let mut place = 0;
@@ -136,8 +194,8 @@ mod tests {
 
     #[test]
     fn a_dip_between_samples_is_kept_and_tracks_end_at_their_last_positions() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trace.csv");
+        let root = tempfile::tempdir().unwrap();
+        let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
         let header = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n";
         let line = |tick: u32, drone, x: f64, v: f64, group| {
             format!("{},{drone},{x},0,{v},0,{group},,0\n", f64::from(tick) * 0.02)
@@ -149,13 +207,13 @@ mod tests {
                 csv += &line(tick, 4, if tick == 7 { 30.0 } else { 40.0 }, 5.0, "N");
             }
         }
-        std::fs::write(&path, csv).unwrap();
-        let samples = Samples::read(&path, &facts(8)).unwrap();
-        let least: Vec<f64> = samples.separation.iter().map(|&(_, m)| m).collect();
+        folder.files().write("trace.csv", csv.as_bytes()).unwrap();
+        let samples = Samples::read(&folder, &facts(8), &Interrupted::never(), |_| Ok(())).unwrap();
+        let least: Vec<f64> = samples.separation.samples().iter().map(|&(_, m)| m).collect();
         assert_eq!(least, [40.0, 30.0]);
-        let (mean, deviation) = (samples.speed[0].mean, samples.speed[0].deviation);
-        assert_eq!((samples.speed.len(), mean, deviation), (3, 4.0, 1.0));
-        assert_eq!((samples.distance.len(), samples.distance[0].mean), (2, 40.0));
+        let (speed, distance) = (samples.speed.samples(), samples.distance.samples());
+        assert_eq!((speed.len(), speed[0].mean, speed[0].deviation), (3, 4.0, 1.0));
+        assert_eq!((distance.len(), distance[0].mean), (2, 40.0));
         let tracks: Vec<_> = samples.tracks.iter().map(|(&id, t)| (id, t.group.as_str(), t.last_s)).collect();
         assert_eq!(tracks, [(0, "N1", 0.26), (4, "N", 0.16)]);
     }

@@ -6,12 +6,13 @@ mod swarm_view;
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::output;
 use crate::tap::running;
 use clap::Args;
 use crossterm::event::{Event, KeyCode, KeyModifiers, poll, read};
 use display_state::DisplayState;
 use screen::{Screen, page};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 use swarm_view::SwarmView;
 
@@ -82,8 +83,7 @@ fn once(interrupt: &Interrupt) -> Result<Exit, Failure> {
     }
     let lines = page(&swarms, DisplayState { drones: true, ..DisplayState::default() });
     let text: String = lines.iter().map(|line| format!("{}\n", line.text)).collect();
-    // A closed pipe is the reader's choice.
-    let _ = std::io::stdout().write_all(text.as_bytes());
+    output::print(text)?;
     Ok(Exit::Reached)
 }
 

@@ -6,10 +6,11 @@ mod server;
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::output::{complain, print_line};
 use clap::Args;
 use live_feed::LiveFeed;
 use server::Content;
-use skein_report::{RunFolder, page};
+use skein_report::{Interrupted, RunFolder, page};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -53,7 +54,7 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
         None => Content::Live { page: page::live(port), feed: Arc::new(LiveFeed::start(args.run.clone())) },
     };
     let url = format!("http://127.0.0.1:{port}/");
-    println!("{url}");
+    print_line(&url)?;
     if args.open {
         open(&url);
     }
@@ -62,10 +63,10 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
 }
 
 fn recorded(path: &std::path::Path) -> Result<String, Failure> {
-    let folder = RunFolder::open(path).map_err(Failure::usage)?;
-    let manifest = folder.read_manifest().map_err(Failure::usage)?;
-    let summary = folder.read_summary().map_err(Failure::usage)?;
-    page::report(&folder, &manifest, &summary).map_err(Failure::usage)
+    let folder = RunFolder::open(path).map_err(Failure::report)?;
+    let manifest = folder.read_manifest().map_err(Failure::report)?;
+    let summary = folder.read_summary().map_err(Failure::report)?;
+    page::report(&folder, &manifest, &summary, &Interrupted::never()).map_err(Failure::report)
 }
 
 /// Opens the address with the desktop's browser. Without a desktop, the address is on stdout.
@@ -73,6 +74,6 @@ fn open(url: &str) {
     let mut command = Command::new("xdg-open");
     command.arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     if let Err(error) = command.spawn() {
-        eprintln!("skein: xdg-open: {error}; open {url} yourself");
+        complain(format!("xdg-open: {error}; open {url} yourself"));
     }
 }

@@ -1,0 +1,233 @@
+//! Nothing of a flight is lost: not if the disk is full, the launcher is killed, two runs want one folder, or links are laid.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod support;
+
+use serde_json::Value;
+use std::fs::{self, File};
+use std::os::unix::fs::{chown, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use support::process::signal;
+use support::{Place, json, names, number, paper};
+
+/// Flies in one thread.
+const INLINE: [&str; 2] = ["--runtime", "inline"];
+/// Short ticks: the record is large, and its files take some seconds to write.
+const SHORT_TICKS: [&str; 4] = ["--runtime", "inline", "--set", "time.dt_s=0.002"];
+/// A wall clock by which the flight takes about three seconds.
+const REALTIME: [&str; 2] = ["--clock", "realtime:20"];
+
+/// A small disk, mounted on a folder of a test.
+struct Disk(PathBuf);
+
+impl Disk {
+    /// `None`, with the reason printed, if this user may not mount one.
+    fn mount(place: &Place, size: &str) -> Option<Self> {
+        let path = place.join("disk");
+        fs::create_dir(&path).unwrap();
+        let mount =
+            Command::new("mount").args(["-t", "tmpfs", "-o", &format!("size={size}"), "skein"]).arg(&path).output();
+        if mount.as_ref().is_ok_and(|done| done.status.success()) {
+            return Some(Self(path));
+        }
+        eprintln!("skipped: a disk cannot be mounted: {mount:?}");
+        None
+    }
+
+    fn resize(&self, size: &str) {
+        let options = format!("remount,size={size}");
+        assert!(Command::new("mount").args(["-o", &options]).arg(&self.0).status().unwrap().success());
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// The last time in a trace, s.
+fn traced_s(folder: &Path) -> f64 {
+    let trace = fs::read_to_string(folder.join("trace.csv")).unwrap();
+    trace.lines().last().unwrap().split(',').next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_full_disk_costs_no_record_that_it_holds() {
+    let place = Place::new();
+    let Some(disk) = Disk::mount(&place, "2m") else { return };
+    let out = disk.0.join("out");
+    let run = ["run", &paper("s2-right"), "--json", "--out", out.to_str().unwrap()];
+    let done = place.run(&[&run[..], &INLINE].concat());
+    assert_eq!(done.code, Some(3), "{done:?}");
+    assert!(done.stderr.contains("skein report"), "{done:?}");
+    assert_eq!(done.summary()["outcome"], "reached");
+    let mut kept = json(out.join("summary.json"));
+    kept["report_s"] = Value::Null;
+    assert_eq!(kept, done.summary(), "the summary is in the folder as well");
+    let held = fs::metadata(out.join("flight.spool")).unwrap().len();
+    assert!(held > 1_700_000, "the disk had room for more than {held} bytes of the record");
+    disk.resize("64m");
+    let report = place.run(&["report", out.to_str().unwrap()]);
+    assert_eq!(report.code, Some(0), "{report:?}");
+    // A tick of eight drones takes about 3300 bytes.
+    let wanted_s = held as f64 / 4000.0 * 0.02;
+    assert!(traced_s(&out) > wanted_s, "{} s of {wanted_s} s", traced_s(&out));
+    assert!(out.join("report.html").exists() && !out.join("flight.spool").exists(), "{:?}", names(&out));
+}
+
+#[test]
+fn a_record_that_was_cut_short_is_written_up() {
+    let place = Place::new();
+    // A limit of 1 MiB per file, in blocks of 512 bytes. The page would be larger.
+    let flown = place.command(&["run", &paper("s2-right"), "--json", "--out", "out", "--runtime", "inline"]);
+    let words = flown.get_args().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" ");
+    let script = format!("trap '' XFSZ; ulimit -f 2048; exec {} {words}", env!("CARGO_BIN_EXE_skein"));
+    let done = Command::new("sh").args(["-c", &script]).current_dir(place.join("")).output().unwrap();
+    assert_eq!(done.status.code(), Some(3), "{done:?}");
+    let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(
+        (summary["outcome"].as_str(), json(place.join("out/summary.json"))["digest"].clone()),
+        (Some("reached"), summary["digest"].clone())
+    );
+    assert!(place.join("out/trace.csv").exists() || place.join("out/flight.spool").exists());
+}
+
+#[test]
+fn the_record_of_a_killed_launcher_is_written_up() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &REALTIME);
+    flight.wait_until(5.0);
+    let busy = place.run(&["report", "out"]);
+    assert!(busy.code == Some(2) && busy.stderr.contains("at work"), "{busy:?}");
+    signal("KILL", flight.pid());
+    let pid = flight.pid();
+    assert_eq!(flight.end().code, None);
+    let early = place.run(&["replay", "out"]);
+    assert!(early.code == Some(2) && early.stderr.contains("skein report"), "{early:?}");
+    let report = place.run(&["report", "out"]);
+    assert_eq!(report.code, Some(0), "{report:?}");
+    let summary = json(place.join("out/summary.json"));
+    assert_eq!(summary["outcome"], "aborted");
+    assert!(number(&summary, "/sim_s") >= 5.0 && traced_s(&place.join("out")) >= 5.0, "{summary}");
+    assert!(place.join("out/run.mcap").exists() && !place.join("out/flight.spool").exists());
+    assert_eq!(place.run(&["clean"]).code, Some(0));
+    assert_eq!(support::process::shared_files(pid), Vec::<String>::new());
+}
+
+#[test]
+fn a_lost_terminal_ends_the_run_as_an_interruption_does() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &REALTIME);
+    flight.wait_until(1.0);
+    signal("HUP", flight.pid());
+    let done = flight.finish();
+    assert_eq!(done.code, Some(129), "{done:?}");
+    assert_eq!(json(place.join("out/summary.json"))["outcome"], "aborted");
+    assert!(traced_s(&place.join("out")) >= 1.0);
+}
+
+#[test]
+fn an_interruption_stops_the_writing_and_keeps_the_record() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &SHORT_TICKS);
+    // The summary comes first, then the other files.
+    flight.wait_for(&place.join("out/summary.json"));
+    let asked = Instant::now();
+    signal("INT", flight.pid());
+    let done = flight.finish();
+    assert!(asked.elapsed() < Duration::from_secs(2), "{:?}", asked.elapsed());
+    assert_eq!(done.code, Some(130), "{done:?}");
+    assert_eq!(done.summary()["outcome"], "reached");
+    assert_eq!(names(place.join("out")), ["flight.spool", "manifest.json", "processes.json", "summary.json"]);
+    let report = place.run(&["report", "out"]);
+    assert_eq!(report.code, Some(0), "{report:?}");
+    assert!(place.join("out/report.html").exists() && !place.join("out/flight.spool").exists());
+}
+
+#[test]
+fn a_folder_in_use_is_refused() {
+    let place = Place::new();
+    let mut first = place.take_off("s2-right", &REALTIME);
+    first.processes();
+    let second = place.run(&["run", &paper("s1-left"), "--json", "--out", "./out", "--force", "--runtime", "inline"]);
+    assert!(second.code == Some(2) && second.stderr.contains("at work"), "{second:?}");
+    let done = first.finish();
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(traced_s(&place.join("out")) > 40.0);
+    let third = place.run(&["run", &paper("s1-left"), "--json", "--out", "out", "--force", "--runtime", "inline"]);
+    assert_eq!(third.code, Some(0), "{third:?}");
+}
+
+#[test]
+fn nothing_is_written_through_links() {
+    let place = Place::new();
+    let mine = place.join("mine.txt");
+    fs::write(&mine, "mine").unwrap();
+    place.fly("s1-left", &["--runtime", "inline", "--out", "out"]);
+    let laid = [
+        ".summary.json.part",
+        ".manifest.json.part",
+        "summary.json",
+        "trace.csv",
+        "run.mcap",
+        "report.html",
+        "flight.spool",
+    ];
+    for name in laid {
+        let _ = fs::remove_file(place.join("out").join(name));
+        symlink(&mine, place.join("out").join(name)).unwrap();
+    }
+    place.fly("s1-left", &["--runtime", "inline", "--out", "out", "--force"]);
+    assert_eq!(fs::read_to_string(&mine).unwrap(), "mine");
+    assert!(!fs::symlink_metadata(place.join("out/summary.json")).unwrap().is_symlink());
+}
+
+#[test]
+fn the_folder_of_another_user_is_refused() {
+    let place = Place::new();
+    place.fly("s1-left", &["--runtime", "inline", "--out", "out"]);
+    if chown(place.join("out"), Some(12345), None).is_err() {
+        eprintln!("skipped: this user cannot give a folder away");
+        return;
+    }
+    let sweep = format!("{}/../experiments/faults.toml", env!("CARGO_MANIFEST_DIR"));
+    let run = ["run", &paper("s1-left"), "--runtime", "inline", "--out", "out", "--force"];
+    fs::create_dir(place.join("empty")).unwrap();
+    chown(place.join("empty"), Some(12345), None).unwrap();
+    for args in [&run[..], &["report", "out"], &["sweep", &sweep, "--out", "empty"]] {
+        let refused = place.run(args);
+        assert!(refused.code == Some(2) && refused.stderr.contains("user 12345"), "{refused:?}");
+    }
+}
+
+#[test]
+fn a_full_stdout_is_a_failure_and_costs_no_file() {
+    let place = Place::new();
+    let full = || Stdio::from(File::options().write(true).open("/dev/full").unwrap());
+    let scenario = paper("s1-left");
+    let run = [&["run", &scenario, "--json", "--out", "out"], &INLINE[..]].concat();
+    let done = place.command(&run).stdout(full()).output().unwrap();
+    assert_eq!(done.status.code(), Some(3), "{done:?}");
+    assert!(place.join("out/report.html").exists());
+    assert_eq!(json(place.join("out/summary.json"))["outcome"], "reached");
+    for args in [&["report", "out"][..], &["doctor"], &["schema", "summary"], &["check", &scenario], &["--help"]] {
+        let done = place.command(args).stdout(full()).output().unwrap();
+        assert_eq!(done.status.code(), Some(3), "{args:?}: {done:?}");
+        let done = place.command(args).stdout(full()).stderr(full()).output().unwrap();
+        assert_eq!(done.status.code(), Some(3), "{args:?} without stderr: {done:?}");
+    }
+}
+
+#[test]
+fn a_start_that_fails_leaves_no_folder() {
+    let place = Place::new();
+    let long = place.join(&"x".repeat(120));
+    fs::create_dir(&long).unwrap();
+    let done =
+        place.command(&["run", &paper("s1-left"), "--out", "out"]).env("XDG_RUNTIME_DIR", &long).output().unwrap();
+    assert_eq!(done.status.code(), Some(3), "{done:?}");
+    assert!(!place.join("out").exists());
+}
