@@ -86,7 +86,7 @@ fn arguments_without_a_meaning_are_refused() {
         (&["--strategy", "fixed:5/5"], &["fixed:5/5, 10 drones", "8"]),
         (&["--strategy", "fixed:4"], &["fixed:4", "fixed:L/R"]),
         (&["--clock", "fast"], &["`fast` is no clock", "`realtime:SPEED`"]),
-        (&["--clock", "realtime:-1"], &["--clock", "SPEED > 0"]),
+        (&["--clock", "realtime:-1"], &["--clock", "SPEED from"]),
         (&["--seed", "many"], &["seed", "expected"]),
         (&["--runtime", "threads"], &["threads", "inline"]),
         (&["--force"], &["--out"]),

@@ -4,10 +4,10 @@ use crate::error::BusError;
 use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
 use rustix::fs::{FlockOperation, flock};
 use std::ffi::OsStr;
-use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::fs::{self, DirBuilder, File, OpenOptions, Permissions};
 use std::io::ErrorKind;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -150,6 +150,18 @@ impl Domain {
     #[must_use]
     pub fn prefix(&self) -> &str {
         &self.prefix
+    }
+
+    /// Takes from other users every right to the run's files in shared memory.
+    pub(crate) fn make_private(&self) -> Result<(), BusError> {
+        for path in shared_files(&self.prefix)? {
+            let meta = fs::symlink_metadata(&path).map_err(BusError::io("look at", &path))?;
+            if meta.is_file() && meta.mode() & 0o077 != 0 {
+                let private = Permissions::from_mode(meta.mode() & 0o700);
+                fs::set_permissions(&path, private).map_err(BusError::io("change the mode of", &path))?;
+            }
+        }
+        Ok(())
     }
 
     pub(crate) fn config(&self) -> &Config {
@@ -303,17 +315,25 @@ fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
 
 /// Removes a run's files in shared memory, then its folder. If this is interrupted, the folder still tells the prefix.
 fn remove_run(path: &Path, prefix: &str) -> Result<usize, BusError> {
+    let files = shared_files(prefix)?;
+    for file in &files {
+        gone(fs::remove_file(file)).map_err(BusError::io("remove", file))?;
+    }
+    gone(fs::remove_dir_all(path)).map_err(BusError::io("remove", path))?;
+    Ok(files.len())
+}
+
+/// The files of this user in shared memory whose names begin with `prefix`.
+fn shared_files(prefix: &str) -> Result<Vec<PathBuf>, BusError> {
     let shared = Path::new(SHARED_MEMORY);
     let uid = rustix::process::geteuid().as_raw();
-    let mut files = 0;
+    let mut files = Vec::new();
     for entry in fs::read_dir(shared).map_err(BusError::io("list", shared))? {
         let entry = entry.map_err(BusError::io("list", shared))?;
         if begins_with(&entry.file_name(), prefix) && entry.metadata().is_ok_and(|meta| meta.uid() == uid) {
-            gone(fs::remove_file(entry.path())).map_err(BusError::io("remove", &entry.path()))?;
-            files += 1;
+            files.push(entry.path());
         }
     }
-    gone(fs::remove_dir_all(path)).map_err(BusError::io("remove", path))?;
     Ok(files)
 }
 

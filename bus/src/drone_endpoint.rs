@@ -183,6 +183,12 @@ impl DroneEndpoint {
         unsafe { self.control.barrier().stats_pointer(self.drone).as_mut() }
     }
 
+    /// The newest tick that the world has opened.
+    #[must_use]
+    pub fn newest_tick(&self) -> Tick {
+        Tick::from(self.tick_word().load(Ordering::Acquire)).saturating_sub(1)
+    }
+
     /// The first tick that this drone may read and answer.
     #[must_use]
     pub fn resume_from(&self) -> Tick {

@@ -21,6 +21,7 @@ use std::fmt::Debug;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 
 /// Sends the downlink of a tick from the world to all drones.
 pub type DownlinkPublisher = StreamPublisher<DownWord>;
@@ -31,8 +32,9 @@ pub type RecordSubscriber = StreamSubscriber<RecordWord>;
 
 /// What the world does when the recorder's buffer is full.
 pub enum RecordPolicy {
-    /// Waits for the recorder as long as the function returns true (the recorder is alive). For lockstep.
-    Wait(Box<dyn Fn() -> bool + Send>),
+    /// Waits for the recorder as long as the function of the time waited returns true. Then it drops the sample, as below. For
+    /// lockstep.
+    Wait(Box<dyn Fn(Duration) -> bool + Send>),
     /// Drops the sample and counts it, see [`RecordPublisher::dropped`]. For the wall clock.
     Drop,
 }

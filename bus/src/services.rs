@@ -101,6 +101,8 @@ impl Services {
             _record: create(&node, RECORD, record_limits(drones))?,
             _watch: create(&node, WATCH, watch_limits())?,
         };
+        // iceoryx2 makes one of its files open to all users.
+        domain.make_private()?;
         Ok(Self { node, drones, _kept: Some(kept) })
     }
 
@@ -256,30 +258,30 @@ fn uplink_name(shard: usize) -> String {
 
 fn downlink_limits(drones: usize) -> Limits {
     let subscribers = drones + SPARE;
-    Limits { publishers: 1 + 1, subscribers, nodes: subscribers + 2, buffer: BUFFER, overflow: true }
+    Limits { publishers: 1, subscribers, nodes: subscribers + 2, buffer: BUFFER, overflow: true }
 }
 
-/// The second subscriber is for a second world; observers do not subscribe here.
+/// Only the world subscribes: a subscriber that does not read would hold up the drones.
 fn uplink_limits(per_process: usize) -> Limits {
     let publishers = SHARD_DRONES + SPARE;
     let buffer = BUFFER * per_process.clamp(1, SHARD_DRONES);
-    Limits { publishers, subscribers: 1 + 1, nodes: publishers + 3, buffer, overflow: false }
+    Limits { publishers, subscribers: 1, nodes: publishers + 2, buffer, overflow: false }
 }
 
-/// The second subscriber is for a second launcher.
+/// Only the launcher subscribes: in lockstep, a subscriber that does not read would hold up the swarm.
 fn record_limits(drones: usize) -> Limits {
     let buffer = (RECORD_ROWS / drones.max(1)).clamp(RECORD_BUFFER[0], RECORD_BUFFER[1]);
-    Limits { publishers: 1 + 1, subscribers: 1 + 1, nodes: 4, buffer, overflow: false }
+    Limits { publishers: 1, subscribers: 1, nodes: 2, buffer, overflow: false }
 }
 
 fn watch_limits() -> Limits {
-    Limits { publishers: 1 + 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: WATCH_BUFFER, overflow: true }
+    Limits { publishers: 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: WATCH_BUFFER, overflow: true }
 }
 
 /// Decides what to do when the recorder's buffer is full.
 fn record_handler(policy: RecordPolicy, dropped: Arc<AtomicU64>) -> impl Fn(&BackpressureInfo) -> BackpressureAction {
-    move |_| match &policy {
-        RecordPolicy::Wait(alive) if alive() => BackpressureAction::Retry,
+    move |info| match &policy {
+        RecordPolicy::Wait(goes_on) if goes_on(info.elapsed_time) => BackpressureAction::Retry,
         _ => {
             dropped.fetch_add(1, Ordering::Relaxed);
             BackpressureAction::DiscardData
@@ -387,5 +389,37 @@ mod tests {
             assert!(error.contains("IncompatibleTypes") && error.contains("one build"), "{error}");
         }
         assert!(open::<DownWord, StreamHeader>(&services.node, DOWNLINK).is_ok());
+    }
+
+    #[test]
+    fn services_have_one_writer_and_no_second_reader_where_it_could_hold_up_the_swarm() {
+        let mode = std::fs::Permissions::from_mode(0o700);
+        let root = tempfile::Builder::new().permissions(mode).tempdir().unwrap();
+        let domain = Domain::create_in(root.path(), "one").unwrap();
+        let launcher = Services::create(&domain, 1, 1, "launcher").unwrap();
+        let world = Services::open(&domain, 1, "world").unwrap();
+        let _world = (
+            world.downlink_publisher().unwrap(),
+            world.record_publisher(RecordPolicy::Drop).unwrap(),
+            world.watch_publisher().unwrap(),
+            world.uplink_subscriber(0).unwrap(),
+        );
+        let _record = launcher.record_subscriber().unwrap();
+        let refused = [
+            launcher.downlink_publisher().map(|_| ()),
+            launcher.record_publisher(RecordPolicy::Drop).map(|_| ()),
+            launcher.watch_publisher().map(|_| ()),
+            launcher.uplink_subscriber(0).map(|_| ()),
+            launcher.record_subscriber().map(|_| ()),
+        ];
+        for error in refused.map(Result::unwrap_err) {
+            assert!(error.to_string().contains("Exceeds"), "{error}");
+        }
+        for file in std::fs::read_dir("/dev/shm").unwrap().map(Result::unwrap) {
+            if file.file_name().to_string_lossy().starts_with(domain.prefix()) {
+                let mode = file.metadata().unwrap().permissions().mode();
+                assert_eq!(mode & 0o077, 0, "{:?} is open to others: {mode:o}", file.file_name());
+            }
+        }
     }
 }

@@ -148,7 +148,7 @@ fn in_lockstep_the_record_waits_for_the_recorder() {
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let alive = Arc::new(AtomicBool::new(true));
     let recorder_alive = Arc::clone(&alive);
-    let policy = RecordPolicy::Wait(Box::new(move || recorder_alive.load(Ordering::Relaxed)));
+    let policy = RecordPolicy::Wait(Box::new(move |_| recorder_alive.load(Ordering::Relaxed)));
     let world = services.record_publisher(policy).unwrap();
     let domain = run.domain.path().to_owned();
     let (done, wait_done) = channel();

@@ -2,6 +2,7 @@
 
 use crate::error::RuntimeError;
 use crate::scenario_file;
+use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use skein_bus::PinMode;
 use skein_scenario::Scenario;
 use std::os::fd::RawFd;
@@ -35,14 +36,13 @@ impl ChildArgs {
     /// # Errors
     /// [`RuntimeError::LauncherGone`] if the launcher has ended already, [`RuntimeError::System`] if the kernel refuses.
     pub fn bind_to_parent(&self) -> Result<(), RuntimeError> {
-        use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-        set_parent_process_death_signal(Some(Signal::KILL))
-            .map_err(|error| RuntimeError::system("asking to be killed when the launcher ends")(error.into()))?;
-        // The launcher may have died before that call.
-        if getppid().map(|pid| pid.as_raw_nonzero().get().unsigned_abs()) != Some(self.parent) {
-            return Err(RuntimeError::LauncherGone { pid: self.parent });
-        }
-        Ok(())
+        end_with_parent(self.parent, Signal::KILL)
+    }
+
+    /// Whether the launcher is stopped, as by Ctrl-Z or a debugger.
+    pub(crate) fn launcher_is_stopped(&self) -> bool {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.parent)).unwrap_or_default();
+        stat.rsplit_once(") ").is_some_and(|(_, fields)| fields.starts_with(['T', 't']))
     }
 
     /// The scenario as the launcher resolved it.
@@ -52,6 +52,20 @@ impl ChildArgs {
     pub fn scenario(&self) -> Result<Scenario, RuntimeError> {
         scenario_file::read(&self.domain)
     }
+}
+
+/// Has the kernel send this process a signal when its parent ends. `parent` is the process that it was started by.
+///
+/// # Errors
+/// [`RuntimeError::LauncherGone`] if the parent has ended already, [`RuntimeError::System`] if the kernel refuses.
+pub fn end_with_parent(parent: u32, signal: Signal) -> Result<(), RuntimeError> {
+    set_parent_process_death_signal(Some(signal))
+        .map_err(|error| RuntimeError::system("asking for a signal when the parent process ends")(error.into()))?;
+    // The parent may have died before that call.
+    if getppid().map(|pid| pid.as_raw_nonzero().get().unsigned_abs()) != Some(parent) {
+        return Err(RuntimeError::LauncherGone { pid: parent });
+    }
+    Ok(())
 }
 
 /// Environment variable with settings of the C library.

@@ -4,6 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
+/// Least and greatest speed of a wall clock.
+const SPEEDS: [f64; 2] = [1e-6, 1e6];
+
 /// What paces the ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Clock {
@@ -12,14 +15,14 @@ pub enum Clock {
     Lockstep,
     /// The wall clock. A drone that is late keeps its last command.
     Realtime {
-        /// Simulated seconds per second of wall time, above 0.
+        /// Simulated seconds per second of wall time, from 1e-6 to 1e6.
         speed: f64,
     },
 }
 
 /// A text that does not name a clock.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{text}` is no clock: expected `lockstep`, `realtime` or `realtime:SPEED` with SPEED > 0")]
+#[error("`{text}` is no clock: expected `lockstep`, `realtime` or `realtime:SPEED` with SPEED from 1e-6 to 1e6")]
 pub struct ClockError {
     text: String,
 }
@@ -33,7 +36,7 @@ impl FromStr for Clock {
             None if text == "lockstep" => Ok(Self::Lockstep),
             None if text == "realtime" => Ok(Self::Realtime { speed: 1.0 }),
             Some(("realtime", speed)) => match speed.parse::<f64>() {
-                Ok(speed) if speed > 0.0 && speed.is_finite() => Ok(Self::Realtime { speed }),
+                Ok(speed) if (SPEEDS[0]..=SPEEDS[1]).contains(&speed) => Ok(Self::Realtime { speed }),
                 _ => Err(error()),
             },
             _ => Err(error()),
@@ -60,8 +63,18 @@ mod tests {
         for text in ["lockstep", "realtime", "realtime:2.5"] {
             assert_eq!(text.parse::<Clock>().unwrap().to_string(), text);
         }
-        for text in ["", "realtime:", "realtime:0", "realtime:-1", "realtime:inf", "realtime:nan", "lockstep:2", "fast"]
-        {
+        for text in [
+            "",
+            "realtime:",
+            "realtime:0",
+            "realtime:-1",
+            "realtime:inf",
+            "realtime:1e-300",
+            "realtime:1e300",
+            "realtime:nan",
+            "lockstep:2",
+            "fast",
+        ] {
             let error = text.parse::<Clock>().unwrap_err();
             assert!(error.to_string().contains("expected `lockstep`"), "{text}");
         }

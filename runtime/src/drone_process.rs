@@ -69,6 +69,8 @@ struct DroneProcess {
     first_shard: usize,
     drones: Vec<DroneHandle>,
     scratch: StepScratch,
+    /// Number of downlinks that could not be used.
+    skipped: u64,
 }
 
 impl DroneProcess {
@@ -83,6 +85,7 @@ impl DroneProcess {
             first_shard,
             drones,
             scratch: StepScratch::default(),
+            skipped: 0,
         })
     }
 
@@ -104,6 +107,15 @@ impl DroneProcess {
         }
     }
 
+    /// Counts a downlink that cannot be used, and says so at the first, the second, the fourth …
+    fn skip(&mut self, what: &str) {
+        self.skipped += 1;
+        if self.skipped.is_power_of_two() {
+            let drone = self.drones.first().map(|drone| drone.id.0);
+            tracing::warn!(?drone, "{what}: skipped; {} so far", self.skipped);
+        }
+    }
+
     /// Reads the downlinks up to that of `tick`, and answers that one.
     fn answer(&mut self, tick: Tick) -> Result<(), RuntimeError> {
         let resume_from = self.drones.first().map_or(0, |drone| drone.barrier.resume_from());
@@ -112,8 +124,19 @@ impl DroneProcess {
                 // Its frames were sent while this process was stopped: they are lost.
                 continue;
             }
-            let down = DownlinkView::parse(sample.bytes())
-                .map_err(|source| RuntimeError::Downlink { tick: sample.tick(), source })?;
+            let down = match DownlinkView::parse(sample.bytes()) {
+                Ok(down) => down,
+                Err(error) => {
+                    self.skip(&format!("the downlink of tick {}: {error}", sample.tick()));
+                    continue;
+                }
+            };
+            // The world sends a downlink before it opens the tick.
+            let newest = self.drones.first().map_or(tick, |drone| drone.barrier.newest_tick().saturating_add(1));
+            if sample.tick() > newest {
+                self.skip(&format!("a downlink of tick {}, which has not come", sample.tick()));
+                continue;
+            }
             if sample.tick() < tick {
                 for drone in &mut self.drones {
                     drone.pilot_host.receive_late(&down, &mut self.scratch, drone.barrier.stats_mut());

@@ -1,9 +1,8 @@
 //! What keeps a run from being started or carried through.
 
 use skein_bus::BusError;
-use skein_protocol::downlink::DownlinkError;
+use skein_protocol::DroneId;
 use skein_protocol::shape::ShapeError;
-use skein_protocol::{DroneId, Tick};
 use skein_world::WorldError;
 use std::path::PathBuf;
 use std::process::ExitStatus;
@@ -65,13 +64,11 @@ pub enum RuntimeError {
         /// The incarnation that the new process should have.
         incarnation: u32,
     },
-    /// A downlink sample cannot be read.
-    #[error("downlink of tick {tick}: {source}")]
-    Downlink {
-        /// The tick of the sample.
-        tick: Tick,
-        /// What is wrong with it.
-        source: DownlinkError,
+    /// The launcher does not take the record.
+    #[error("the launcher has taken no record for {waited:.0?}; is the disk of the run's folder stuck?")]
+    RecordNotTaken {
+        /// How long the world waited.
+        waited: Duration,
     },
     /// Frames are missing.
     #[error("uplink shard {shard}: expected all frames that its drones announced, but some did not arrive")]

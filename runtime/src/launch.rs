@@ -23,7 +23,8 @@ pub struct Launch<'a> {
     /// The executable with the roles `world` and `drone`.
     pub executable: PathBuf,
     /// Called with all processes of the run when they are ready and before the first tick. Called again, with the ended
-    /// processes included, when a drone got a new process. An error ends the run with `RuntimeError::OnReady`.
+    /// processes included, when a drone got a new process. An error of the first call ends the run with
+    /// `RuntimeError::OnReady`.
     pub on_ready: &'a mut OnReady<'a>,
     /// Called about once per millisecond. It returns the number of a signal that should stop the run.
     pub interrupted: &'a mut dyn FnMut() -> Option<i32>,

@@ -86,7 +86,7 @@ mod tuning;
 pub mod world_process;
 
 pub use beacon::BeaconPilot;
-pub use child_args::{ChildArgs, lighten};
+pub use child_args::{ChildArgs, end_with_parent, lighten};
 pub use clock::{Clock, ClockError};
 pub use drone_factory::DroneFactory;
 pub use drone_range::DroneRange;

@@ -9,8 +9,10 @@ pub struct RunEnd {
     pub calls: [u64; 2],
     /// The signal that interrupted the run.
     pub signal: Option<i32>,
-    /// Why the recording stopped early.
+    /// Why records are missing: the first error.
     pub sink_error: Option<String>,
+    /// Number of records that could not be used and were left out.
+    pub bad_records: u64,
     /// What failed in the environment during the flight, such as the death of the world process.
     pub failure: Option<String>,
 }

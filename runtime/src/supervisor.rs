@@ -7,7 +7,7 @@ use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{Launch, ProcessInfo, ProcessRole};
 use crate::run_end::RunEnd;
-use crate::tuning::{END_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, SUPERVISOR_POLL};
+use crate::tuning::{END_LIMIT, RESTART_READY_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, SUPERVISOR_POLL};
 use crate::world_process::DISMISSED;
 use crate::{mission, scenario_file};
 use skein_bus::{
@@ -183,10 +183,11 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                     return;
                 }
             };
-            if self.end.sink_error.is_none() {
-                let taken = RecordView::parse(sample.bytes()).map_err(|error| error.to_string());
-                self.end.sink_error =
-                    taken.and_then(|view| self.sink.take(view).map_err(|error| error.to_string())).err();
+            let taken = RecordView::parse(sample.bytes()).map_err(|error| error.to_string());
+            let taken = taken.and_then(|view| self.sink.take(view).map_err(|error| error.to_string()));
+            if let Err(error) = taken {
+                self.end.bad_records += 1;
+                self.end.sink_error.get_or_insert(error);
             }
         }
     }
@@ -222,7 +223,9 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                 u32::from(self.children.resume_drone(drone))
             }
             RequestKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
-                tracing::error!(%error, "restarting drone {drone} failed");
+                tracing::warn!(%error, "drone {drone} is dead again");
+                self.kill(drone);
+                self.control.mark_dead(drone.index());
                 0
             }),
         };
@@ -245,21 +248,27 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         if incarnation == 0 {
             return Err(failed());
         }
+        // The world counts this incarnation, too, whatever becomes of it.
+        self.incarnations[drone] = incarnation;
         // The ended process still holds its places in the services.
         clean_dead_nodes(self.domain)?;
         self.control.revive(drone, first_tick);
         let range = DroneRange { first: id, count: 1, incarnation, first_tick };
         self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
-        let limit = Instant::now() + START_LIMIT;
+        let limit = Instant::now() + RESTART_READY_LIMIT;
         while self.control.ready(drone) != Some(incarnation) {
             self.reap();
-            if self.control.is_dead(drone) || self.world_ended.is_some() || Instant::now() > limit {
+            self.end.signal = self.end.signal.or_else(|| (self.launch.interrupted)());
+            let hopeless = self.control.is_dead(drone) || self.world_ended.is_some() || self.end.signal.is_some();
+            if hopeless || Instant::now() > limit {
                 return Err(failed());
             }
         }
-        self.incarnations[drone] = incarnation;
         self.processes.extend(self.children.list().filter(|process| process.id == Some(id.0)));
-        (self.launch.on_ready)(&self.processes).map_err(RuntimeError::OnReady)?;
+        if let Err(error) = (self.launch.on_ready)(&self.processes) {
+            // The drone flies nevertheless.
+            tracing::warn!(%error, "the new process of drone {id} is not listed");
+        }
         Ok(incarnation)
     }
 

@@ -6,10 +6,23 @@ use std::time::Duration;
 /// less than a millisecond, and a busy machine may stop a process for a second.
 pub(crate) const HUNG_AFTER: Duration = Duration::from_secs(5);
 
+/// A process that takes over a drone and is not ready after this is dead: 5 s. Chosen by hand; a start takes milliseconds.
+pub(crate) const RESTART_READY_LIMIT: Duration = Duration::from_secs(5);
+
+/// In lockstep, the world offers a record to the launcher for this long before it looks for dead processes: 1 s. Chosen by
+/// hand.
+pub(crate) const RECORD_PATIENCE: Duration = Duration::from_secs(1);
+
+/// A launcher that takes no record for this long is warned of: 5 s. Chosen by hand: a disk may stall for a second.
+pub(crate) const RECORD_WARNING: Duration = Duration::from_secs(5);
+
+/// A launcher that takes no record for this long, and is not stopped, has failed: 60 s. Chosen by hand.
+pub(crate) const RECORD_LIMIT: Duration = Duration::from_secs(60);
+
 /// The supervisor kills, stops or continues a process within this: 5 s. Chosen by hand; it takes milliseconds.
 pub(crate) const REQUEST_LIMIT: Duration = Duration::from_secs(5);
 
-/// The supervisor restarts a process within this: 30 s. Chosen by hand: more than [`START_LIMIT`], so that the supervisor
+/// The supervisor restarts a process within this: 30 s. Chosen by hand: more than [`RESTART_READY_LIMIT`], so that the supervisor
 /// gives up first.
 pub(crate) const RESTART_LIMIT: Duration = Duration::from_secs(30);
 

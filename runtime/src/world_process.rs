@@ -5,11 +5,13 @@ use crate::clock::Clock;
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pacer::Pacer;
-use crate::tuning::{DISMISSAL_POLL, HUNG_AFTER, REQUEST_LIMIT, RESTART_LIMIT};
+use crate::tuning::{
+    DISMISSAL_POLL, HUNG_AFTER, RECORD_LIMIT, RECORD_PATIENCE, RECORD_WARNING, REQUEST_LIMIT, RESTART_LIMIT,
+};
 use skein_bus::{
     Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind,
-    SHARD_DRONES, Services, TickOutcome, UplinkSubscriber, WatchPublisher, WorldState, pin_to_core, raise_file_limit,
-    shards,
+    SHARD_DRONES, Services, TickOutcome, UplinkSubscriber, WatchPublisher, WorldState, clean_dead_nodes, pin_to_core,
+    raise_file_limit, shards,
 };
 use skein_protocol::DroneId;
 use skein_protocol::record::{FaultKind, RecordHeader, RecordView};
@@ -36,7 +38,7 @@ pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
     pin_to_core(0, args.pin)?;
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), "world")?;
-    let mut server = WorldServer::new(&scenario, clock, &services, Arc::clone(&control))?;
+    let mut server = WorldServer::new(&scenario, clock, &services, Arc::clone(&control), domain, args.clone())?;
     control.set_world_state(WorldState::Ready);
     if control.wait_go(|| true) {
         control.set_world_state(WorldState::Flying);
@@ -59,6 +61,8 @@ struct WorldServer {
     record: RecordPublisher,
     watch: WatchPublisher,
     control: Arc<Control>,
+    domain: Domain,
+    args: ChildArgs,
     world: World,
     /// How each drone answered the tick.
     outcomes: Vec<TickOutcome>,
@@ -80,11 +84,13 @@ impl WorldServer {
         clock: Clock,
         services: &Services,
         control: Arc<Control>,
+        domain: Domain,
+        args: ChildArgs,
     ) -> Result<Self, RuntimeError> {
         let drones = mission::drones(scenario);
         let policy = match clock {
-            // The launcher reads the records. If it dies, the kernel kills this process, so that the wait ends.
-            Clock::Lockstep => RecordPolicy::Wait(Box::new(|| true)),
+            // The launcher reads the records. If it dies, the kernel kills this process.
+            Clock::Lockstep => RecordPolicy::Wait(Box::new(|waited| waited < RECORD_PATIENCE)),
             Clock::Realtime { .. } => RecordPolicy::Drop,
         };
         Ok(Self {
@@ -93,6 +99,8 @@ impl WorldServer {
             record: services.record_publisher(policy)?,
             watch: services.watch_publisher()?,
             control,
+            domain,
+            args,
             world: mission::world(scenario)?,
             outcomes: vec![TickOutcome::Pending; drones],
             received: vec![0; drones],
@@ -180,7 +188,9 @@ impl WorldServer {
             ProcessCommand::Resume(_) => self.outcomes[drone] = TickOutcome::Pending,
             ProcessCommand::Restart(_, incarnation) => {
                 if reply != incarnation {
-                    return Err(RuntimeError::NotRestarted { drone: id, incarnation });
+                    // The new process has ended, or was never ready: the drone is dead again.
+                    self.outcomes[drone] = TickOutcome::Dead;
+                    return Ok(());
                 }
                 self.outcomes[drone] = TickOutcome::Pending;
                 (self.received[drone], self.announced[drone]) = (0, 0);
@@ -252,13 +262,35 @@ impl WorldServer {
     fn send_tick_record(&mut self) -> Result<(), RuntimeError> {
         self.send_watch()?;
         self.unsent_events.extend_from_slice(self.world.record().events);
-        if self.send_record()? {
+        if self.send_record()? || (!self.wall_clock && self.insist()?) {
             self.lost_records = 0;
             self.unsent_events.clear();
         } else {
             self.lost_records += 1;
         }
         Ok(())
+    }
+
+    /// Offers the record until the launcher takes it. Returns false if the launcher asked to stop meanwhile. A launcher that
+    /// is stopped is waited for.
+    fn insist(&self) -> Result<bool, RuntimeError> {
+        let (since, mut warned) = (Instant::now(), false);
+        while !self.send_record()? {
+            if self.control.stop_requested().is_some() {
+                return Ok(false);
+            }
+            clean_dead_nodes(&self.domain)?;
+            let waited = since.elapsed() + RECORD_PATIENCE;
+            if waited > RECORD_WARNING && !warned {
+                warned = true;
+                tracing::warn!("the launcher has taken no record for {waited:.0?}: the swarm waits");
+            }
+            if waited > RECORD_LIMIT && !self.args.launcher_is_stopped() {
+                return Err(RuntimeError::RecordNotTaken { waited });
+            }
+            std::thread::sleep(DISMISSAL_POLL);
+        }
+        Ok(true)
     }
 
     /// Sends the record to observers. They have a service of their own, so that observers do not change whether the
@@ -286,7 +318,12 @@ impl WorldServer {
     fn send_last_record(&mut self) -> Result<(), RuntimeError> {
         self.send_watch()?;
         self.unsent_events.extend_from_slice(self.world.record().events);
+        let since = Instant::now();
         while !self.send_record()? {
+            let waited = since.elapsed();
+            if waited > RECORD_LIMIT && !self.args.launcher_is_stopped() {
+                return Err(RuntimeError::RecordNotTaken { waited });
+            }
             std::thread::sleep(DISMISSAL_POLL);
         }
         Ok(())

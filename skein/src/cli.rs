@@ -170,6 +170,9 @@ pub(crate) struct RunArgs {
     /// Drones per process; the digest does not depend on it
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) drones_per_process: u32,
+    /// End when this parent process ends; set by `sweep`
+    #[arg(long, hide = true, value_name = "PID")]
+    pub(crate) parent: Option<u32>,
 }
 
 /// Arguments of every child process.

@@ -8,6 +8,7 @@ use crate::interrupt::Interrupt;
 use crate::options::RuntimeChoice;
 use crate::output::{self, complain};
 use crate::progress::MissionBar;
+use rustix::process::Signal;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{
     FlightRecord, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary, Role, RunCompletion,
@@ -16,7 +17,7 @@ use skein_report::{
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{
-    Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, inline, supervisor,
+    Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent, inline, supervisor,
 };
 use skein_scenario::Scenario;
 use std::io::IsTerminal;
@@ -26,6 +27,9 @@ use std::time::Instant;
 /// Flies the mission, writes its folder and prints its summary.
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let started = Instant::now();
+    if let Some(parent) = args.parent {
+        end_with_parent(parent, Signal::TERM).map_err(Failure::environment)?;
+    }
     let scenario = input::scenario(&args.scenario)?;
     check_packing(args, &scenario)?;
     if args.runtime == RuntimeChoice::Processes {
@@ -66,6 +70,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
     let mut trouble: Vec<String> = end.failure.iter().chain(&end.sink_error).cloned().collect();
+    if end.bad_records > 0 {
+        trouble.push(format!("{} records could not be used and were left out", end.bad_records));
+    }
     // The summary comes first: it is there even if nothing else can be written.
     trouble.extend(reserved.write(&summary).err().map(|error| error.to_string()));
     trouble.extend(print(args, &summary, &folder).err().map(|failure| failure.to_string()));

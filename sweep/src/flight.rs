@@ -92,6 +92,8 @@ fn fly_processes(
     let mut child = Command::new(executable)
         .arg("run")
         .arg(&path)
+        // If the sweep is killed, its flights end as well.
+        .args(["--parent", &std::process::id().to_string()])
         .args(["--json", "--no-record", "--force", "--out"])
         .arg(folder.join("run"))
         .stdin(Stdio::null())

@@ -3,7 +3,6 @@
 use crate::body::{Body, admissible};
 use crate::params::WorldParams;
 use crate::process::Process;
-use crate::tuning::COMMAND_HOLD_S;
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, Vec2};
 
@@ -72,7 +71,7 @@ impl DroneTable {
         true
     }
 
-    /// Holds the last command of every drone that has not answered the current tick. Returns how many missed it.
+    /// Notes every drone that has not answered the current tick. Returns how many missed it.
     pub(crate) fn hold_unanswered(&mut self) -> u64 {
         let mut missed = 0;
         for (_, process) in self.bodies.iter().zip(&mut self.processes).filter(|(body, _)| body.is_alive()) {
@@ -130,14 +129,14 @@ impl DroneTable {
     /// Moves every body by one tick: as its process commands, or as its autopilot flies without a command. `wind_mps2`
     /// is added to the commands. Returns how many commands were rejected because they were not finite.
     pub(crate) fn fly(&mut self, params: &WorldParams, wind_mps2: impl Fn(DroneId) -> Vec2) -> u64 {
-        let held_ticks = (COMMAND_HOLD_S / params.dt_s()).round() as u32;
         let mut rejected = 0;
         for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
             if !body.is_alive() {
                 body.fail_safe(params);
                 continue;
             }
-            if process.is_frozen() || process.late_ticks() > held_ticks {
+            // The safety rule allows a command in the state in which it was given, and braking in every state.
+            if process.is_frozen() || process.is_late() {
                 body.hover(params);
                 continue;
             }

@@ -15,10 +15,9 @@ enum Answer {
 /// One drone's process.
 #[derive(Clone, Debug)]
 pub(crate) struct Process {
-    /// The last answer. While it is held over to later ticks, its counters are 0.
+    /// The last answer. In ticks without one, its counters are 0.
     slot: Slot,
     answer: Answer,
-    late_ticks: u32,
     incarnation: u32,
     frozen: bool,
     sequence: u32,
@@ -26,14 +25,7 @@ pub(crate) struct Process {
 
 impl Default for Process {
     fn default() -> Self {
-        Self {
-            slot: Slot::default(),
-            answer: Answer::Pending,
-            late_ticks: 0,
-            incarnation: 1,
-            frozen: false,
-            sequence: 0,
-        }
+        Self { slot: Slot::default(), answer: Answer::Pending, incarnation: 1, frozen: false, sequence: 0 }
     }
 }
 
@@ -41,11 +33,6 @@ impl Process {
     /// The last answer.
     pub(crate) fn slot(&self) -> &Slot {
         &self.slot
-    }
-
-    /// Number of ticks without an answer up to now; 0 after an answer.
-    pub(crate) fn late_ticks(&self) -> u32 {
-        self.late_ticks
     }
 
     /// Number of the process, from 1. Each restart adds 1.
@@ -72,13 +59,11 @@ impl Process {
     pub(crate) fn take(&mut self, slot: &Slot) {
         self.slot = *slot;
         self.answer = Answer::Received;
-        self.late_ticks = 0;
     }
 
-    /// The process missed the current tick: its last command goes on, and it has heard nothing.
+    /// The process missed the current tick: it brakes, and it has heard nothing.
     pub(crate) fn miss(&mut self) {
         self.answer = Answer::Late;
-        self.late_ticks = self.late_ticks.saturating_add(1);
         self.clear_counters();
     }
 

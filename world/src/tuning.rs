@@ -1,11 +1,5 @@
 //! Every tuned number of this crate, with its unit, how it was found, and the command that finds it again.
 
-/// How long a drone that sends no command keeps its last one, s. After that its autopilot brakes until the next command.
-///
-/// Chosen by hand, shorter than the time after which autopilots give up an offboard computer: a command here is an
-/// acceleration. Check it with `skein run FILE --clock wall` on a loaded machine and read the deadline misses.
-pub(crate) const COMMAND_HOLD_S: f64 = 0.2;
-
 /// Altitude from which a drone without a process lands, m. Chosen by hand; no command measures it.
 pub(crate) const FLIGHT_ALTITUDE_M: f64 = 20.0;
 

@@ -152,8 +152,8 @@ impl World {
         self.counters.count_sent(frames.len() as u64);
     }
 
-    /// A drone did not answer in time, which happens by the wall clock only. Its last command holds for a while, then it
-    /// brakes. The missed deadline is counted once per tick.
+    /// A drone did not answer in time, which happens by the wall clock only. It brakes until its next command: its last one may
+    /// no longer be safe. The missed deadline is counted once per tick.
     pub fn hold(&mut self, id: DroneId) {
         self.counters.count_missed(u64::from(self.drones.miss(id)));
     }
