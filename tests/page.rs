@@ -74,6 +74,7 @@ fn a_report_replays_offline() {
 /// A running `skein view`. Dropping this ends it.
 struct View {
     child: Child,
+    /// With its token.
     url: String,
 }
 
@@ -85,11 +86,17 @@ impl View {
         Self { child, url: url.trim().to_owned() }
     }
 
-    /// Sends a request and returns the status line of the answer.
+    /// Its address, and the query with its token.
+    fn address(&self) -> (&str, &str) {
+        self.url.trim_start_matches("http://").split_once('/').unwrap()
+    }
+
+    /// Sends a request and returns the status line of the answer. `OWN` stands for the address, `TOKEN` for the query.
     fn ask(&self, lines: &[&str]) -> String {
-        let address = self.url.trim_start_matches("http://").trim_end_matches('/');
+        let (address, query) = self.address();
         let mut stream = TcpStream::connect(address).unwrap();
-        stream.write_all(format!("{}\r\n\r\n", lines.join("\r\n").replace("OWN", address)).as_bytes()).unwrap();
+        let head = lines.join("\r\n").replace("OWN", address).replace("TOKEN", query);
+        stream.write_all(format!("{head}\r\n\r\n").as_bytes()).unwrap();
         let mut answer = Vec::new();
         let _ = stream.read_to_end(&mut answer);
         String::from_utf8_lossy(&answer).lines().next().unwrap_or_default().to_owned()
@@ -124,7 +131,7 @@ fn the_page_shows_a_running_swarm() {
     let done = flight.finish();
     assert_eq!(done.code, Some(0), "{done:?}");
     assert_eq!(browser.errors, Vec::<String>::new());
-    let address = view.url.trim_start_matches("http://");
+    let (address, _) = view.address();
     let own = |url: &&String| url.starts_with("about:") || url.contains(&format!("://{address}"));
     let elsewhere: Vec<_> = browser.requests.iter().filter(|url| !own(url)).collect();
     assert!(elsewhere.is_empty() && !browser.requests.is_empty(), "{elsewhere:?}");
@@ -135,11 +142,24 @@ fn requests_from_other_origins_are_refused() {
     let place = Place::new();
     let view = View::start(&place, &[]);
     assert!(view.url.starts_with("http://127.0.0.1:"), "{}", view.url);
-    assert_eq!(view.ask(&["GET / HTTP/1.1", "Host: OWN"]), "HTTP/1.1 200 OK");
-    assert_eq!(view.ask(&["GET / HTTP/1.1", "Host: example.org"]), "HTTP/1.1 403 Forbidden");
+    assert_eq!(view.ask(&["GET /TOKEN HTTP/1.1", "Host: OWN"]), "HTTP/1.1 200 OK");
+    assert_eq!(view.ask(&["GET /TOKEN HTTP/1.1", "Host: example.org"]), "HTTP/1.1 403 Forbidden");
     let upgrade = ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"];
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
-    let foreign = ["GET /socket HTTP/1.1", "Host: OWN", "Origin: http://example.org", key];
+    let foreign = ["GET /socketTOKEN HTTP/1.1", "Host: OWN", "Origin: http://example.org", key];
     assert_eq!(view.ask(&[&foreign[..], &upgrade].concat()), "HTTP/1.1 403 Forbidden");
-    assert_eq!(view.ask(&["POST / HTTP/1.1", "Host: OWN"]), "HTTP/1.1 405 Method Not Allowed");
+    assert_eq!(view.ask(&["POST /TOKEN HTTP/1.1", "Host: OWN"]), "HTTP/1.1 405 Method Not Allowed");
+}
+
+#[test]
+fn only_who_knows_the_token_gets_the_page() {
+    let place = Place::new();
+    let view = View::start(&place, &[]);
+    for path in ["/", "/?token=", "/socket", "/?token=00000000000000000000000000000000"] {
+        assert_eq!(view.ask(&[&format!("GET {path} HTTP/1.1"), "Host: OWN"]), "HTTP/1.1 403 Forbidden", "{path}");
+    }
+    // Who holds places without a request keeps nobody out.
+    let held: Vec<TcpStream> = (0..100).map(|_| TcpStream::connect(view.address().0).unwrap()).collect();
+    assert_eq!(view.ask(&["GET /TOKEN HTTP/1.1", "Host: OWN"]), "HTTP/1.1 200 OK");
+    drop(held);
 }

@@ -187,7 +187,7 @@ function applyHash() {
 
 // Follows a live run, and the next one after its end.
 function listen(player) {
-  const socket = new WebSocket(`ws://${location.host}/socket`);
+  const socket = new WebSocket(`ws://${location.host}/socket${location.search}`);
   const hint = byId("hint");
   socket.onopen = () => { hint.hidden = true; };
   socket.onmessage = message => message.data.split("\n").forEach(line => line && player.take(JSON.parse(line)));

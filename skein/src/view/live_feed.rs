@@ -8,7 +8,6 @@ use skein_report::page;
 use skein_report::scene::{Observer, Sample};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -27,8 +26,10 @@ const CLOSE_S: f64 = 0.1;
 const PICTURE: [Duration; 2] = [Duration::from_millis(16), Duration::from_millis(50)];
 /// From this size on, a swarm counts as large.
 const MANY: u32 = 200;
-/// Greatest number of lines that wait for a slow page. The page misses further samples.
-const QUEUE: usize = 4096;
+/// Greatest number of samples by which a page may be behind.
+const LAG: u64 = 256;
+/// Size of the lines that are sent to a page at a time, bytes; the last line may exceed it.
+const PIECE: usize = 256 << 10;
 /// Greatest size of the samples that are kept for later pages, bytes.
 const KEPT: usize = 24 << 20;
 /// No drone is selected.
@@ -49,50 +50,86 @@ struct Shared {
     stop: AtomicBool,
 }
 
-/// What a new page gets first, and the pages that listen.
+/// The lines of the run, from which every page takes what it does not have yet.
 #[derive(Default)]
 struct Backlog {
+    /// Number of the run.
+    run: u64,
     /// Facts, status and events of the run.
     history: Vec<Line>,
     samples: VecDeque<Line>,
+    /// Size of the samples.
     bytes: usize,
-    pages: Vec<SyncSender<Line>>,
+    /// Number of samples of this run that are no longer kept.
+    dropped: u64,
 }
 
 impl Backlog {
-    fn send(&mut self, line: &Line) {
-        self.pages.retain(|page| !matches!(page.try_send(Arc::clone(line)), Err(TrySendError::Disconnected(_))));
+    fn begin(&mut self) {
+        *self = Self { run: self.run + 1, ..Self::default() };
     }
 
     fn keep(&mut self, line: String) {
-        let line: Line = line.into();
-        self.send(&line);
-        self.history.push(line);
+        self.history.push(line.into());
     }
 
     fn sample(&mut self, line: String) {
-        let line: Line = line.into();
-        self.send(&line);
         self.bytes += line.len();
-        self.samples.push_back(line);
+        self.samples.push_back(line.into());
         while self.bytes > KEPT {
             self.bytes -= self.samples.pop_front().map_or(self.bytes, |line| line.len());
+            self.dropped += 1;
         }
+    }
+
+    /// The next lines for a page at this place, and the place after them.
+    fn piece(&self, place: &mut Place) -> Vec<Line> {
+        if place.run != self.run {
+            *place = Place { run: self.run, ..Place::default() };
+        }
+        let all = self.dropped + self.samples.len() as u64;
+        if place.live && all > place.sample + LAG {
+            // The page is too slow. It misses samples.
+            place.sample = all - 1;
+        }
+        place.sample = place.sample.max(self.dropped);
+        let skipped = (place.sample - self.dropped) as usize;
+        let (mut lines, mut bytes) = (Vec::new(), 0);
+        for line in self.history.iter().skip(place.event).chain(self.samples.iter().skip(skipped)) {
+            if bytes > PIECE {
+                break;
+            }
+            bytes += line.len();
+            lines.push(Arc::clone(line));
+        }
+        let events = lines.len().min(self.history.len() - place.event);
+        place.event += events;
+        place.sample += (lines.len() - events) as u64;
+        place.live |= place.sample == all;
+        lines
     }
 }
 
-/// The receiving end of one page.
+/// What a page has got so far.
+#[derive(Default)]
+struct Place {
+    run: u64,
+    event: usize,
+    sample: u64,
+    /// Whether it once had everything.
+    live: bool,
+}
+
+/// The receiving end of one page. It holds no lines, so that a slow page costs no memory.
 pub(crate) struct Listener {
-    first: Mutex<Vec<Line>>,
-    lines: Receiver<Line>,
+    shared: Arc<Shared>,
+    place: Mutex<Place>,
 }
 
 impl Listener {
-    /// The lines that are new.
+    /// Some of the lines that are new.
     pub(crate) fn lines(&self) -> Vec<Line> {
-        let mut lines = std::mem::take(&mut *lock(&self.first));
-        lines.extend(self.lines.try_iter());
-        lines
+        lock(&self.shared.backlog).piece(&mut lock(&self.place))
     }
 }
 
@@ -112,11 +149,7 @@ impl LiveFeed {
 
     /// Adds a page. It first gets the run so far.
     pub(crate) fn listen(&self) -> Listener {
-        let (page, lines) = sync_channel(QUEUE);
-        let mut backlog = lock(&self.shared.backlog);
-        backlog.pages.push(page);
-        let first = backlog.history.iter().chain(&backlog.samples).cloned().collect();
-        Listener { first: Mutex::new(first), lines }
+        Listener { shared: Arc::clone(&self.shared), place: Mutex::default() }
     }
 
     /// Selects the drone whose received frames are shown in a large swarm.
@@ -159,7 +192,7 @@ impl Shared {
     fn follow(&self, tap: &SwarmTap) {
         {
             let mut backlog = lock(&self.backlog);
-            (backlog.history, backlog.samples, backlog.bytes) = Default::default();
+            backlog.begin();
             backlog.keep(page::facts_line(&tap.facts));
             backlog.keep(page::status_line(&page::live_status(&tap.facts)));
         }
@@ -278,5 +311,50 @@ impl Watcher {
         self.slow = tick - self.last_tick.min(tick) < 2 * self.close;
         (self.due, self.last_tick, self.last) = (None, tick, Instant::now());
         Some(sample)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(lines: &[Line]) -> Vec<&str> {
+        lines.iter().map(AsRef::as_ref).collect()
+    }
+
+    #[test]
+    fn a_page_gets_every_line_once_and_a_slow_one_misses_samples() {
+        let (mut backlog, mut page) = (Backlog::default(), Place::default());
+        backlog.begin();
+        backlog.keep("facts".to_owned());
+        backlog.sample("1".to_owned());
+        assert_eq!(texts(&backlog.piece(&mut page)), ["facts", "1"]);
+        assert_eq!(texts(&backlog.piece(&mut page)), Vec::<&str>::new());
+        backlog.sample("2".to_owned());
+        backlog.keep("event".to_owned());
+        assert_eq!(texts(&backlog.piece(&mut page)), ["event", "2"]);
+        for number in 3..=3 + LAG {
+            backlog.sample(number.to_string());
+        }
+        assert_eq!(texts(&backlog.piece(&mut page)), [(3 + LAG).to_string()]);
+        backlog.begin();
+        backlog.keep("next".to_owned());
+        assert_eq!(texts(&backlog.piece(&mut page)), ["next"]);
+    }
+
+    #[test]
+    fn a_late_page_gets_what_is_kept_in_pieces() {
+        let (mut backlog, mut page) = (Backlog::default(), Place::default());
+        backlog.begin();
+        let line = "x".repeat(PIECE / 2);
+        for _ in 0..200 {
+            backlog.sample(line.clone());
+        }
+        let mut pieces = Vec::new();
+        while let lines @ [_, ..] = &backlog.piece(&mut page)[..] {
+            pieces.push(lines.len());
+        }
+        assert_eq!(pieces.iter().sum::<usize>(), KEPT / (PIECE / 2));
+        assert!(pieces.iter().all(|&lines| lines <= 3), "{pieces:?}");
     }
 }

@@ -3,18 +3,22 @@
 mod live_feed;
 mod request;
 mod server;
+mod token;
+mod waiting_room;
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::{complain, print_line};
 use clap::Args;
 use live_feed::LiveFeed;
+use request::Door;
 use server::Content;
 use skein_report::{Interrupted, RunFolder, page};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use token::Token;
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -23,7 +27,8 @@ use std::sync::Arc;
   skein view runs/s2-right-1      a recorded run
   skein view --port 8080 --open
 
-The page is served on 127.0.0.1, to this machine only. Ctrl-C stops the server; the swarm flies on.")]
+The page is served on 127.0.0.1, to this machine only. The address contains a token: nobody else can open the page.
+Ctrl-C stops the server; the swarm flies on.")]
 pub(crate) struct ViewArgs {
     /// Folder of a recorded run [default: a running swarm]
     pub(crate) run_dir: Option<PathBuf>,
@@ -53,12 +58,13 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
         Some(path) => Content::Page(recorded(path)?),
         None => Content::Live { page: page::live(port), feed: Arc::new(LiveFeed::start(args.run.clone())) },
     };
-    let url = format!("http://127.0.0.1:{port}/");
+    let token = Token::draw().map_err(|error| Failure::environment(format!("/dev/urandom: {error}")))?;
+    let url = format!("http://127.0.0.1:{port}/{}", token.query());
     print_line(&url)?;
     if args.open {
         open(&url);
     }
-    server::serve(&listener, port, &content, &interrupt).map_err(Failure::environment)?;
+    server::serve(&listener, &Door { port, token }, &content, &interrupt).map_err(Failure::environment)?;
     Ok(Exit::Reached)
 }
 

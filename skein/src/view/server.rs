@@ -1,7 +1,9 @@
-//! The HTTP and WebSocket server: one thread per client, and a limited number of clients.
+//! The HTTP and WebSocket server: one thread per client, and a limited number of clients. Those without the view's token do not
+//! take the places of the others.
 
 use super::live_feed::{Listener, LiveFeed};
-use super::request::{MAX_HEAD, Request, classify};
+use super::request::{Door, MAX_HEAD, Request, classify};
+use super::waiting_room::WaitingRoom;
 use crate::interrupt::Interrupt;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -12,10 +14,12 @@ use tungstenite::{Message, WebSocket};
 
 /// Time between two looks for new clients and for messages of a client.
 const POLL: Duration = Duration::from_millis(4);
-/// A client that neither sends a request nor reads for this long is disconnected.
+/// A client that does not read for this long is disconnected.
 const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
-/// Greatest number of clients at a time.
-const MAX_CLIENTS: usize = 32;
+/// A client that sends no request for this long is disconnected.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(2);
+/// Greatest number of clients that are served at a time.
+const MAX_GUESTS: usize = 32;
 
 /// What is served.
 pub(crate) enum Content {
@@ -33,54 +37,94 @@ pub(crate) enum Content {
 /// Serves clients until it is interrupted.
 pub(crate) fn serve(
     listener: &TcpListener,
-    port: u16,
+    door: &Door,
     content: &Content,
     interrupt: &Interrupt,
 ) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
-    let clients = AtomicUsize::new(0);
+    let server = Server { door, content, interrupt, waiting: WaitingRoom::default(), guests: AtomicUsize::new(0) };
     std::thread::scope(|scope| {
         while interrupt.signal().is_none() {
             match listener.accept() {
-                Ok((stream, _)) if clients.load(Ordering::Relaxed) < MAX_CLIENTS => {
-                    clients.fetch_add(1, Ordering::Relaxed);
-                    let clients = &clients;
-                    scope.spawn(move || {
-                        // A client that disconnects is not an error.
-                        let _ = answer(stream, port, content, interrupt);
-                        clients.fetch_sub(1, Ordering::Relaxed);
-                    });
+                Ok((stream, _)) => {
+                    let server = &server;
+                    // A client that disconnects is not an error. Without room for a thread it is disconnected.
+                    let answer = move || drop(server.answer(stream));
+                    if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, answer) {
+                        tracing::warn!(%error, "a client could not be served");
+                    }
                 }
-                Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => std::thread::sleep(POLL),
-                Err(error) => tracing::warn!(%error, "a client could not be accepted"),
+                Err(error) => {
+                    tracing::warn!(%error, "a client could not be accepted");
+                    std::thread::sleep(POLL);
+                }
             }
         }
     });
     Ok(())
 }
 
-fn answer(mut stream: TcpStream, port: u16, content: &Content, interrupt: &Interrupt) -> std::io::Result<()> {
-    stream.set_nonblocking(false)?;
-    stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(POLL))?;
-    stream.set_write_timeout(Some(CLIENT_TIMEOUT))?;
-    let Some(head) = head(&stream, interrupt)? else { return Ok(()) };
-    match (classify(&head, port), content) {
-        (Request::Socket, Content::Live { feed, .. }) => return talk(stream, feed, interrupt),
-        (Request::Page, Content::Page(page) | Content::Live { page, .. }) => respond(&mut stream, "200 OK", page)?,
-        (Request::Refused(status), _) => respond(&mut stream, status, status)?,
-        (Request::Socket, Content::Page(_)) => respond(&mut stream, "404 Not Found", "a recorded run has no socket")?,
+/// What the threads of the clients share.
+struct Server<'a> {
+    door: &'a Door,
+    content: &'a Content,
+    interrupt: &'a Interrupt,
+    waiting: WaitingRoom,
+    /// Number of clients that know the token and are served.
+    guests: AtomicUsize,
+}
+
+impl Server<'_> {
+    fn answer(&self, mut stream: TcpStream) -> std::io::Result<()> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(POLL))?;
+        stream.set_write_timeout(Some(CLIENT_TIMEOUT))?;
+        let place = self.waiting.enter(&stream)?;
+        let head = head(&stream, self.interrupt);
+        self.waiting.leave(place);
+        let Some(head) = head? else { return Ok(()) };
+        let request = classify(&head, self.door);
+        if let Request::Refused(status) = request {
+            respond(&mut stream, status, status)?;
+        } else if self.guests.fetch_add(1, Ordering::Relaxed) < MAX_GUESTS {
+            let served = self.serve(stream, request);
+            self.guests.fetch_sub(1, Ordering::Relaxed);
+            return served;
+        } else {
+            self.guests.fetch_sub(1, Ordering::Relaxed);
+            let status = "503 Service Unavailable";
+            respond(&mut stream, status, status)?;
+        }
+        end(stream);
+        Ok(())
     }
+
+    /// Serves a client that knows the token.
+    fn serve(&self, mut stream: TcpStream, request: Request) -> std::io::Result<()> {
+        match (request, self.content) {
+            (Request::Socket, Content::Live { feed, .. }) => return talk(stream, feed, self.interrupt),
+            (Request::Socket, Content::Page(_)) => {
+                respond(&mut stream, "404 Not Found", "a recorded run has no socket")?;
+            }
+            (_, Content::Page(page) | Content::Live { page, .. }) => respond(&mut stream, "200 OK", page)?,
+        }
+        end(stream);
+        Ok(())
+    }
+}
+
+/// Ends an answered connection.
+fn end(mut stream: TcpStream) {
     // The request was only peeked at. If it stays unread, the system resets the connection before the answer arrives.
     let mut rest = [0; MAX_HEAD];
     let _ = stream.read(&mut rest);
-    Ok(())
 }
 
 /// The head of a request. It stays in the socket. `None` if it does not come in time.
 fn head(stream: &TcpStream, interrupt: &Interrupt) -> std::io::Result<Option<String>> {
-    let limit = Instant::now() + CLIENT_TIMEOUT;
+    let limit = Instant::now() + REQUEST_TIMEOUT;
     let mut bytes = vec![0; MAX_HEAD];
     while Instant::now() < limit && interrupt.signal().is_none() {
         let length = match stream.peek(&mut bytes) {
@@ -151,7 +195,7 @@ fn receive(socket: &mut WebSocket<TcpStream>, feed: &LiveFeed) -> std::io::Resul
     }
 }
 
-/// Sends all waiting lines in one message. False if the page has disconnected.
+/// Sends a piece of the lines that are new. False if the page has disconnected.
 fn send(socket: &mut WebSocket<TcpStream>, listener: &Listener) -> bool {
     let lines = listener.lines();
     lines.is_empty() || socket.send(Message::text(lines.join("\n"))).is_ok()
