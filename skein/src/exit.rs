@@ -11,7 +11,9 @@
 //!
 //! If several apply: these come before 3, 3 before 4, 4 before 1.
 
-use crate::output::complain;
+use crate::complaint::complain;
+use skein_report::text::printable;
+use std::borrow::Cow;
 use std::fmt;
 use std::process::ExitCode;
 
@@ -84,20 +86,28 @@ impl Failure {
         use std::io::{IsTerminal, Write};
         match &self.report {
             Report::Diagnostic(diagnostic) if std::io::stderr().is_terminal() => {
-                let theme = match std::env::var_os("NO_COLOR") {
-                    None => miette::GraphicalTheme::unicode(),
-                    Some(_) => miette::GraphicalTheme::unicode_nocolor(),
+                let plain = rendered(diagnostic.as_ref(), miette::GraphicalTheme::unicode_nocolor());
+                let shown = match printable(&plain) {
+                    // The file holds control characters, which must not reach the terminal.
+                    Cow::Owned(harmless) => harmless,
+                    Cow::Borrowed(_) if std::env::var_os("NO_COLOR").is_some() => plain,
+                    Cow::Borrowed(_) => rendered(diagnostic.as_ref(), miette::GraphicalTheme::unicode()),
                 };
-                let mut shown = String::new();
-                let handler = miette::GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
-                match handler.render_report(&mut shown, diagnostic.as_ref()) {
-                    // If this fails, nobody is there to be told.
-                    Ok(()) => drop(write!(std::io::stderr().lock(), "{shown}")),
-                    Err(_) => complain(self),
-                }
+                // If this fails, nobody is there to be told.
+                let _ = write!(std::io::stderr().lock(), "{shown}");
             }
             Report::Text(_) | Report::Diagnostic(_) => complain(self),
         }
+    }
+}
+
+/// The diagnostic with its place in the file.
+fn rendered(diagnostic: &dyn miette::Diagnostic, theme: miette::GraphicalTheme) -> String {
+    let mut shown = String::new();
+    let handler = miette::GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_links(false);
+    match handler.render_report(&mut shown, diagnostic) {
+        Ok(()) => shown,
+        Err(_) => format!("skein: {diagnostic}\n"),
     }
 }
 

@@ -9,6 +9,7 @@ mod bench;
 mod check;
 mod clean;
 mod cli;
+mod complaint;
 mod doctor;
 mod exit;
 mod hunt;

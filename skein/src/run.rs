@@ -1,12 +1,13 @@
 //! `skein run`: flies one mission.
 
 use crate::cli::RunArgs;
+use crate::complaint::complain;
 use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::options::RuntimeChoice;
-use crate::output::{self, complain};
+use crate::output;
 use crate::progress::MissionBar;
 use rustix::process::Signal;
 use skein_protocol::record::{Outcome, RecordSink};

@@ -1,9 +1,10 @@
 //! `skein sweep` and `skein scene`.
 
+use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
-use crate::output::{self, complain};
+use crate::output;
 use crate::progress::RunsBar;
 use clap::Args;
 use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};

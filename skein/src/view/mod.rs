@@ -6,9 +6,10 @@ mod server;
 mod token;
 mod waiting_room;
 
+use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
-use crate::output::{complain, print_line};
+use crate::output::print_line;
 use clap::Args;
 use live_feed::LiveFeed;
 use request::Door;
