@@ -28,6 +28,20 @@ fn a_stopped_launcher_delays_the_swarm_and_changes_nothing() {
     assert_eq!(done.summary()["digest"], alone["digest"]);
 }
 
+#[test]
+fn a_stopped_world_ends_the_run() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &SLOW);
+    let processes = flight.processes();
+    flight.wait_until(0.5);
+    let stopped = Instant::now();
+    signal("STOP", pid_of(&processes, "world", None));
+    let done = flight.finish();
+    assert!(done.code == Some(3) && done.stderr.contains("stopped"), "{done:?}");
+    assert_eq!(json(place.join("out/summary.json"))["outcome"], "aborted");
+    assert!(stopped.elapsed() < Duration::from_secs(12), "{:?}", stopped.elapsed());
+}
+
 /// Waits for a drone's second process and sends it a signal before it is ready. False if it came too late.
 fn catch(launcher: u32, name: &str) -> bool {
     let children = format!("/proc/{launcher}/task/{launcher}/children");

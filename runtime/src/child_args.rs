@@ -1,6 +1,7 @@
 //! What a launcher passes to its child processes in their arguments and environment.
 
 use crate::error::RuntimeError;
+use crate::process_state::is_stopped;
 use crate::scenario_file;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use skein_bus::PinMode;
@@ -39,10 +40,9 @@ impl ChildArgs {
         end_with_parent(self.parent, Signal::KILL)
     }
 
-    /// Whether the launcher is stopped, as by Ctrl-Z or a debugger.
+    /// Whether the launcher is stopped, as by Ctrl-Z.
     pub(crate) fn launcher_is_stopped(&self) -> bool {
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.parent)).unwrap_or_default();
-        stat.rsplit_once(") ").is_some_and(|(_, fields)| fields.starts_with(['T', 't']))
+        is_stopped(self.parent)
     }
 
     /// The scenario as the launcher resolved it.

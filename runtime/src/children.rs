@@ -6,6 +6,7 @@ use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{ProcessInfo, ProcessRole};
 use crate::pilot_kind::PilotKind;
+use crate::process_state::is_stopped;
 use rustix::event::{Timespec, epoll};
 use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
@@ -157,6 +158,12 @@ impl Children {
     /// Continues the stopped process of a drone. Returns false if there is no such process.
     pub(crate) fn resume_drone(&self, drone: DroneId) -> bool {
         self.pid_of(drone).is_some_and(|pid| kill_process(pid, Signal::CONT).is_ok())
+    }
+
+    /// Whether the world's process is stopped (SIGSTOP). A process under a debugger is not.
+    pub(crate) fn world_is_stopped(&self) -> bool {
+        let world = self.running.iter().find(|running| running.role == ChildRole::World);
+        world.is_some_and(|running| is_stopped(running.child.id()))
     }
 
     /// Continues all stopped processes, so that they can end.

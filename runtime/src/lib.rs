@@ -77,6 +77,7 @@ pub mod mission;
 mod pacer;
 mod pilot_host;
 mod pilot_kind;
+mod process_state;
 mod radio_receiver;
 mod run_end;
 pub mod run_facts;

@@ -7,7 +7,9 @@ use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{Launch, ProcessInfo, ProcessRole};
 use crate::run_end::RunEnd;
-use crate::tuning::{END_LIMIT, RESTART_READY_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, SUPERVISOR_POLL};
+use crate::tuning::{
+    END_LIMIT, HUNG_AFTER, RESTART_READY_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, STOPPED_POLL, SUPERVISOR_POLL,
+};
 use crate::world_process::DISMISSED;
 use crate::{mission, scenario_file};
 use skein_bus::{
@@ -48,6 +50,10 @@ struct Supervisor<'l, 's, 'd> {
     /// The incarnation of each drone's newest process.
     incarnations: Vec<u32>,
     world_ended: Option<ExitStatus>,
+    /// When the supervisor last looked whether the world is stopped.
+    looked: Instant,
+    /// Since when the world has been stopped.
+    stopped_since: Option<Instant>,
     end: RunEnd,
     /// Keeps the services open for as long as the run lasts.
     _services: Services,
@@ -83,6 +89,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             processes: Vec::new(),
             incarnations: vec![1; drones],
             world_ended: None,
+            looked: Instant::now(),
+            stopped_since: None,
             end: RunEnd::default(),
             _services: services,
         })
@@ -151,6 +159,11 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                 self.end.failure = Some(format!("the world ended in flight: {status}"));
                 return;
             }
+            if self.world_is_hung() {
+                self.take_records(true);
+                self.end.failure = Some(format!("the world was stopped for {HUNG_AFTER:.0?} and was killed"));
+                return;
+            }
             let finished = self.control.world_state() == WorldState::Finished;
             self.take_records(finished);
             if finished {
@@ -169,6 +182,19 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                 return;
             }
         }
+    }
+
+    /// Whether the world's process has been stopped for too long. Nobody in the run stops it, and all wait for it.
+    fn world_is_hung(&mut self) -> bool {
+        if self.looked.elapsed() < STOPPED_POLL {
+            return false;
+        }
+        self.looked = Instant::now();
+        if !self.children.world_is_stopped() {
+            self.stopped_since = None;
+            return false;
+        }
+        self.stopped_since.get_or_insert(self.looked).elapsed() > HUNG_AFTER
     }
 
     /// Hands records to the sink: all that are there with `all`, however slow the disk is, otherwise only while the sink is

@@ -19,6 +19,9 @@ pub(crate) const RECORD_WARNING: Duration = Duration::from_secs(5);
 /// A launcher that takes no record for this long, and is not stopped, has failed: 60 s. Chosen by hand.
 pub(crate) const RECORD_LIMIT: Duration = Duration::from_secs(60);
 
+/// Time between two looks at whether the world process is stopped: 0.5 s. Chosen by hand: it takes microseconds.
+pub(crate) const STOPPED_POLL: Duration = Duration::from_millis(500);
+
 /// The supervisor kills, stops or continues a process within this: 5 s. Chosen by hand; it takes milliseconds.
 pub(crate) const REQUEST_LIMIT: Duration = Duration::from_secs(5);
 
