@@ -44,8 +44,12 @@ pub struct Moving {
 /// The drone's own state, to which the rule is applied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnMotion {
-    /// Number of the tick in which the command takes effect.
+    /// Number of the present tick, in which neighbours are sensed.
     pub tick: u64,
+    /// Position now, world frame, m.
+    pub sensed_position: Vec2,
+    /// Velocity now, world frame, m/s.
+    pub sensed_velocity: Vec2,
     /// Position when the command takes effect, world frame, m.
     pub position: Vec2,
     /// Velocity when the command takes effect, world frame, m/s.
@@ -58,6 +62,9 @@ pub struct OwnMotion {
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
+/// The same for a drone whose commands take effect late: it leaves half of its share, because the direction to the neighbour
+/// turns until its last commands are seen.
+const SHARE_LATE: f64 = 0.25;
 /// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
 /// Added to the clearance, m, so that rounding errors do not break it.
@@ -85,10 +92,9 @@ impl BrakingFilterParams {
         ((8.0 * self.margin_m() / bend).sqrt() / self.dt_s).max(1.0) as u32
     }
 
-    /// The distance that two drones keep if commands take effect `lag` ticks late, m.
-    pub(crate) fn keep_m(&self, lag: u32) -> f64 {
-        let late_s = f64::from(lag) * self.dt_s;
-        self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
+    /// The distance that two drones keep, m.
+    pub(crate) fn keep_m(&self) -> f64 {
+        self.safe_distance_m + self.margin_m()
     }
 
     fn law(&self) -> BrakingLaw {
@@ -104,23 +110,28 @@ impl BrakingFilterParams {
         (brake * late_s).hypot((2.0 * brake * room_m.max(0.0)).sqrt()) - brake * late_s
     }
 
-    /// Upper bound on the distance that a drone flies until it stops, if it may accelerate for one more tick, m.
+    /// Upper bound on the distance that a drone flies until it stops, if it may accelerate for `ticks` ticks, m.
     /// `speed_squared`: square of its speed, m²/s².
-    fn reach_m(&self, speed_squared: f64) -> f64 {
-        let step_mps = self.acceleration_max_mps2 * self.dt_s;
-        let speed_mps = speed_squared.sqrt() + step_mps;
-        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * self.dt_s
+    fn reach_m(&self, speed_squared: f64, ticks: u32) -> f64 {
+        let span_s = f64::from(ticks) * self.dt_s;
+        let speed_mps = speed_squared.sqrt() + self.acceleration_max_mps2 * span_s;
+        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s
     }
+}
+
+/// The share of the room that a drone uses whose commands take effect `lag` ticks late.
+fn share(lag: u32) -> f64 {
+    if lag == 0 { SHARE } else { SHARE_LATE }
 }
 
 /// Two braking paths at one compared tick.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
-    /// Ticks from now.
+    /// Ticks from when the command takes effect.
     ticks: u32,
     /// Unit vector from the neighbour's path to this drone's path.
     normal: Vec2,
-    /// Position on this drone's braking path, relative to its present position, m.
+    /// Position on this drone's braking path from now on, relative to the position at which its command takes effect, m.
     own_m: Vec2,
     /// How far this drone's path may move towards the neighbour's path, m.
     room_m: f64,
@@ -171,7 +182,8 @@ impl BrakingFilter {
         neighbours: impl Iterator<Item = Moving>,
     ) -> Vec2 {
         self.compare(own, neighbours);
-        let reach_m = self.params.reach_m(own.velocity.norm_squared()) + self.params.clearance_m + CLEARANCE_ROUNDING_M;
+        let reach_m =
+            self.params.reach_m(own.velocity.norm_squared(), 1) + self.params.clearance_m + CLEARANCE_ROUNDING_M;
         let near = obstacles.filter(move |(_, distance_m)| *distance_m <= reach_m).map(|(shape, _)| shape);
         let limit = self.params.acceleration_max_mps2;
         let wanted = if wanted.norm() > limit { wanted * (limit / wanted.norm()) } else { wanted };
@@ -207,39 +219,44 @@ impl BrakingFilter {
         let params = self.params;
         self.samples.clear();
         self.ends.clear();
-        let keep_m = params.keep_m(own.lag);
-        let (own_speed2, limit) = (own.velocity.norm_squared(), params.acceleration_max_mps2);
-        let own_reach_m = params.reach_m(own_speed2);
-        let path = BrakingPath::new(Vec2::zeros(), own.velocity, params.law());
+        let keep_m = params.keep_m();
+        // Neighbours do not know the commands of this drone that have not taken effect yet, and this drone does not know
+        // theirs. So the room is that between the braking paths from the present, sensed states.
+        let hidden = own.lag + 1;
+        let hidden_s = f64::from(hidden) * params.dt_s;
+        let (own_speed2, limit) = (own.sensed_velocity.norm_squared(), params.acceleration_max_mps2);
+        let own_reach_m = params.reach_m(own_speed2, hidden);
+        let path = BrakingPath::new(Vec2::zeros(), own.sensed_velocity, params.law());
         for other in neighbours {
             let (distance2, speed2) = (other.position_m.norm_squared(), other.velocity_mps.norm_squared());
-            let apart_m = keep_m + own_reach_m + params.reach_m(speed2);
+            let apart_m = keep_m + own_reach_m + params.reach_m(speed2, hidden);
             if distance2 > apart_m * apart_m {
                 continue;
             }
             // Full braking is a projection, and projections do not increase distances. So the distance of two braking
             // paths changes by at most the relative speed times the time until both drones are at rest.
-            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
-            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.velocity).norm() * stop_s;
-            if SHARE * room_m >= 2.0 * limit * params.dt_s * stop_s {
+            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * hidden_s;
+            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.sensed_velocity).norm() * stop_s;
+            if share(own.lag) * room_m >= 2.0 * limit * hidden_s * stop_s {
                 continue;
             }
             let other_path = BrakingPath::new(other.position_m, other.velocity_mps, params.law());
-            self.sample(own.tick, &path, &other_path, keep_m);
+            self.sample(own, &path, &other_path, keep_m);
         }
     }
 
-    fn sample(&mut self, tick: u64, own: &BrakingPath, other_path: &BrakingPath, keep_m: f64) {
-        let stride = u64::from(self.stride);
-        // A command can lengthen this drone's path by one tick.
-        let last = own.ticks().max(other_path.ticks()) + 2;
-        let mut ticks = 1;
+    fn sample(&mut self, own: &OwnMotion, own_path: &BrakingPath, other_path: &BrakingPath, keep_m: f64) {
+        let (stride, tick) = (u64::from(self.stride), own.tick);
+        let flown_m = own.position - own.sensed_position;
+        // Each command can lengthen this drone's path by one tick.
+        let last = own_path.ticks().max(other_path.ticks()) + own.lag + 2;
+        let mut ticks = own.lag + 1;
         loop {
-            let (here, there) = (own.at(ticks), other_path.at(ticks));
+            let (here, there) = (own_path.at(ticks), other_path.at(ticks));
             let (offset, distance_m) = (here - there, (here - there).norm());
             let normal = if distance_m > 1e-9 { offset / distance_m } else { Vec2::x() };
-            let room_m = SHARE * (distance_m - keep_m).max(0.0);
-            self.samples.push(Sample { ticks, normal, own_m: here, room_m });
+            let room_m = share(own.lag) * (distance_m - keep_m).max(0.0);
+            self.samples.push(Sample { ticks: ticks - own.lag, normal, own_m: here - flown_m, room_m });
             if ticks >= last {
                 break;
             }

@@ -128,8 +128,7 @@ impl PilotParams {
     #[must_use]
     pub fn separation_kept_m(&self) -> f64 {
         let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
-        let lag = (self.braking.reaction_time_s / self.tick_s).round() as u32;
-        filter.keep_m(lag).max(self.safety.keep_m(self.braking.reaction_time_s))
+        filter.keep_m().max(self.safety.keep_m(self.braking.reaction_time_s))
     }
 
     pub(crate) fn neighbours(&self) -> NeighbourParams {

@@ -308,7 +308,7 @@ impl SwarmPilot {
     }
 
     /// The safe acceleration nearest to the one that leads to the wanted velocity, m/s².
-    fn safe_acceleration(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
+    fn safe_acceleration(&mut self, wanted: Vec2, now: &Senses<'_>, senses: &Senses<'_>) -> Vec2 {
         let gain = self.params.velocity_gain_per_s;
         let obstacles = senses
             .obstacles
@@ -316,23 +316,26 @@ impl SwarmPilot {
             .map(|o| NearObstacle { nearest_m: Vec2::from(o.nearest_m) - senses.position, distance_m: o.distance_m });
         let smooth =
             self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, self.neighbours.iter());
-        self.keep_braking_path(smooth, senses)
+        self.keep_braking_path(smooth, now, senses)
     }
 
     /// The acceleration nearest to `wanted` that the safety rule allows, m/s².
-    fn keep_braking_path(&mut self, wanted: Vec2, senses: &Senses<'_>) -> Vec2 {
+    /// `now`: what is sensed; `then`: the same, predicted for the moment at which the command takes effect.
+    fn keep_braking_path(&mut self, wanted: Vec2, now: &Senses<'_>, then: &Senses<'_>) -> Vec2 {
         let lag = (self.reaction.delay_s() / self.params.dt_s).round() as u32;
         let own = OwnMotion {
-            tick: senses.tick + u64::from(lag),
-            position: senses.position,
-            velocity: senses.velocity,
+            tick: now.tick,
+            sensed_position: now.position,
+            sensed_velocity: now.velocity,
+            position: then.position,
+            velocity: then.velocity,
             speed_limit_mps: self.params.speed_on_sight_mps(lag),
             lag,
         };
-        let obstacles = senses.obstacles.iter().filter_map(|o| Some((&senses.shape(o)?.shape, o.distance_m)));
-        let neighbours = senses.neighbours.iter().map(|n| Moving {
+        let obstacles = then.obstacles.iter().filter_map(|o| Some((&then.shape(o)?.shape, o.distance_m)));
+        let neighbours = now.neighbours.iter().map(|n| Moving {
             position_m: n.position_m.into(),
-            velocity_mps: Vec2::from(n.velocity_mps) + senses.velocity,
+            velocity_mps: Vec2::from(n.velocity_mps) + now.velocity,
         });
         self.braking_filter.filter(&own, wanted, obstacles, neighbours)
     }
@@ -358,7 +361,7 @@ impl SwarmPilot {
             obeyed: self.leading.stamp(),
             places: open,
         });
-        let safe = self.safe_acceleration(wanted, &then);
+        let safe = self.safe_acceleration(wanted, senses, &then);
         self.predictor = predictor;
         safe
     }

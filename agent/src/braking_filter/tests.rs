@@ -10,7 +10,15 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
         speed_max_mps: 20.0,
         dt_s: 0.02,
     };
-    let own = OwnMotion { tick: 7, position: Vec2::zeros(), velocity: own, speed_limit_mps: 20.0, lag: 0 };
+    let own = OwnMotion {
+        tick: 7,
+        sensed_position: Vec2::zeros(),
+        sensed_velocity: own,
+        position: Vec2::zeros(),
+        velocity: own,
+        speed_limit_mps: 20.0,
+        lag: 0,
+    };
     let neighbour = Moving { position_m: Vec2::new(distance_m, 0.0), velocity_mps: other };
     BrakingFilter::new(params).filter(&own, wanted, std::iter::empty(), std::iter::once(neighbour))
 }

@@ -171,17 +171,22 @@ impl Crowd {
     fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, random: &mut Keyed) {
         let before = self.bodies.clone();
         for (i, filter) in filters.iter_mut().enumerate() {
-            let lag_s = f64::from(self.lag) * self.params.dt_s;
             let (mut position, mut velocity) = before[i];
             for command in &self.pending[i] {
                 (position, velocity) = self.fly((position, velocity), *command);
             }
-            let tick = self.tick + u64::from(self.lag);
-            let own = OwnMotion { tick, position, velocity, speed_limit_mps: f64::INFINITY, lag: self.lag };
+            let own = OwnMotion {
+                tick: self.tick,
+                sensed_position: before[i].0,
+                sensed_velocity: before[i].1,
+                position,
+                velocity,
+                speed_limit_mps: f64::INFINITY,
+                lag: self.lag,
+            };
             let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
             let neighbours = before.iter().enumerate().filter(|(j, _)| *j != i);
-            let neighbours =
-                neighbours.map(|(_, b)| Moving { position_m: b.0 + b.1 * lag_s - position, velocity_mps: b.1 });
+            let neighbours = neighbours.map(|(_, b)| Moving { position_m: b.0 - before[i].0, velocity_mps: b.1 });
             let wanted = self.wish(i, wish, random);
             let acceleration = filter.filter(&own, wanted, obstacles, neighbours);
             assert!(acceleration.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
