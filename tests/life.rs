@@ -100,7 +100,7 @@ fn processes_end_with_a_killed_launcher_and_the_next_run_cleans_up() {
         signal("KILL", launcher);
         assert_eq!(flight.end().code, None);
         assert_all_die(&processes, killed);
-        assert_eq!(place.runs_in_domain().len(), 1, "nobody was left to remove it");
+        assert_eq!(place.runs_in_domain().len(), 1, "no process was left to remove it");
         assert!(!shared_files(launcher).is_empty());
         let done = match cleaner {
             "clean" => place.run(&["clean"]),

@@ -158,7 +158,7 @@ fn only_who_knows_the_token_gets_the_page() {
     for path in ["/", "/?token=", "/socket", "/?token=00000000000000000000000000000000"] {
         assert_eq!(view.ask(&[&format!("GET {path} HTTP/1.1"), "Host: OWN"]), "HTTP/1.1 403 Forbidden", "{path}");
     }
-    // Who holds places without a request keeps nobody out.
+    // A client that holds places without a request keeps no one out.
     let held: Vec<TcpStream> = (0..100).map(|_| TcpStream::connect(view.address().0).unwrap()).collect();
     assert_eq!(view.ask(&["GET /TOKEN HTTP/1.1", "Host: OWN"]), "HTTP/1.1 200 OK");
     drop(held);

@@ -37,9 +37,9 @@ fn observers_do_not_change_the_digest() {
 #[test]
 fn a_running_swarm_shows_in_the_terminal() {
     let place = Place::new();
-    let nobody = place.run(&["topic", "list"]);
-    assert_eq!(nobody.code, Some(3));
-    assert!(nobody.stderr.contains("no swarm runs"), "{nobody:?}");
+    let without_swarm = place.run(&["topic", "list"]);
+    assert_eq!(without_swarm.code, Some(3));
+    assert!(without_swarm.stderr.contains("no swarm runs"), "{without_swarm:?}");
     assert!(place.run(&["top", "--once"]).stdout.contains("no swarm runs"));
     let mut flight = place.take_off("s2-right", &["--clock", "realtime:8"]);
     flight.wait_until(0.5);

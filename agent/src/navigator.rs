@@ -82,6 +82,12 @@ impl Navigator {
         self.tight.is_free(from, to)
     }
 
+    /// Whether a straight flight keeps the planning distance from all known obstacles. World frame, m.
+    #[must_use]
+    pub fn is_clear(&self, from: Vec2, to: Vec2) -> bool {
+        self.wide.is_free(from, to)
+    }
+
     /// Length that is left of the path that the drone flies, m; `None` if it flies none.
     #[must_use]
     pub fn left_m(&self, from: Vec2) -> Option<f64> {

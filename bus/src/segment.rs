@@ -18,7 +18,7 @@ pub(crate) struct Segment {
 }
 
 // SAFETY: the mapping does not depend on the thread that made it and stays until drop. `Segment` itself reads and writes
-// nothing in it; whoever uses a pointer into it states why that is sound.
+// nothing in it; code that uses a pointer into it states why that is sound.
 unsafe impl Send for Segment {}
 // SAFETY: as for `Send`; a shared `Segment` hands out pointers only.
 unsafe impl Sync for Segment {}
@@ -104,7 +104,7 @@ pub(crate) struct SharedArray<T> {
 }
 
 // SAFETY: the pointer is into the mapping that `_segment` keeps, which any thread may use. References are given to
-// `Atomics` only; whoever uses other pointers states why that is sound.
+// `Atomics` only; code that uses other pointers states why that is sound.
 unsafe impl<T> Send for SharedArray<T> {}
 // SAFETY: as for `Send`.
 unsafe impl<T> Sync for SharedArray<T> {}

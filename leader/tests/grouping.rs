@@ -65,7 +65,7 @@ fn arrival() -> impl Strategy<Value = f64> {
 fn instance(drones: usize, routes: usize) -> impl Strategy<Value = (Vec<Vec<f64>>, Vec<f64>)> {
     let row = move || {
         prop::collection::vec(arrival(), routes).prop_map(|mut row| {
-            // The first route is open to everybody.
+            // The first route is open to all drones.
             row[0] = if row[0].is_finite() { row[0] } else { 7.0 };
             row
         })

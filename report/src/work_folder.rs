@@ -1,4 +1,4 @@
-//! A folder whose files this program writes. Nobody else's files are ever overwritten through it.
+//! A folder whose files this program writes. Files of other users are never overwritten through it.
 
 use crate::error::ReportError;
 use rustix::fs::{AtFlags, Dir, FlockOperation, Mode, OFlags, flock, fstat, mkdirat, open, openat, renameat, unlinkat};

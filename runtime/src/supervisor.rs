@@ -184,7 +184,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         }
     }
 
-    /// Whether the world's process has been stopped for too long. Nobody in the run stops it, and all wait for it.
+    /// Whether the world's process has been stopped for too long. No part of the run stops it, and all wait for it.
     fn world_is_hung(&mut self) -> bool {
         if self.looked.elapsed() < STOPPED_POLL {
             return false;

@@ -122,8 +122,8 @@ impl Scenario {
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))
     }
 
-    /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or [`BEACON_PERIOD_S`], or longer where the beacons of
-    /// all drones would take more than [`BEACON_SHARE`] of the bandwidth.
+    /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or 0.1 s, or longer where the beacons of all drones
+    /// would take more than a quarter of the bandwidth.
     #[must_use]
     pub fn beacon_period_s(&self) -> f64 {
         let frame_bits = 8.0 * (HEAD_BYTES as f64 + size_of::<Pose>() as f64);
@@ -160,7 +160,7 @@ impl Scenario {
         Ok(starts.filter(|(start, _)| barrier.separates(*start, to)).map(|(_, drone)| drone).collect())
     }
 
-    /// The time limit of the mission, s: `time.timeout_s`; or [`TIMEOUT_S`], or [`TIMEOUT_FACTOR`] times what a smooth flight takes
+    /// The time limit of the mission, s: `time.timeout_s`; or 180 s, or twice what a smooth flight takes
     /// from the last slot past all obstacles and to the goal, one drone behind another, if that is longer.
     #[must_use]
     pub fn timeout_s(&self) -> f64 {

@@ -4,7 +4,7 @@ use skein_report::text::printable;
 use std::fmt::Display;
 use std::io::Write;
 
-/// Prints a message to stderr, without the control characters that it may have from a file. If that fails, nobody is there to
+/// Prints a message to stderr, without the control characters that it may have from a file. If that fails, no one is there to
 /// be told.
 pub(crate) fn complain(message: impl Display) {
     let message = message.to_string();

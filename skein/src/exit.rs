@@ -93,7 +93,7 @@ impl Failure {
                     Cow::Borrowed(_) if std::env::var_os("NO_COLOR").is_some() => plain,
                     Cow::Borrowed(_) => rendered(diagnostic.as_ref(), miette::GraphicalTheme::unicode()),
                 };
-                // If this fails, nobody is there to be told.
+                // If this fails, no one is there to be told.
                 let _ = write!(std::io::stderr().lock(), "{shown}");
             }
             Report::Text(_) | Report::Diagnostic(_) => complain(self),

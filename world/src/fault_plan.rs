@@ -182,8 +182,8 @@ impl FaultEffect {
             Self::Freeze => "stopped".to_owned(),
             Self::Restart => "killed, a new process follows".to_owned(),
             Self::Slow(extra_s) => format!("reacts {extra_s} s later"),
-            Self::Deaf => "hears nobody".to_owned(),
-            Self::Mute => "is heard by nobody".to_owned(),
+            Self::Deaf => "hears no other drone".to_owned(),
+            Self::Mute => "is heard by no other drone".to_owned(),
             Self::Partition(sides) => {
                 let side = |side: &Vec<DroneId>| side.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
                 format!("no frame passes between {}", sides.iter().map(side).collect::<Vec<_>>().join(" | "))

@@ -5,7 +5,7 @@ use crate::grid::Grid;
 use crate::tuning::PAIRWISE_MAX_BODIES;
 
 /// For each body the other bodies within a radius, ids ascending. Bodies that have landed have no neighbours and are
-/// nobody's neighbours.
+/// no drone's neighbours.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Neighbours {
     /// Where each body's entries begin; one more than there are bodies.

@@ -59,7 +59,7 @@ pub struct Rollout<P> {
     /// Steps of the whole swarm in a tick.
     steps_per_tick: usize,
     decision_tick: u64,
-    /// Whether there is no room left for an obstacle set that nobody has seen yet.
+    /// Whether there is no room left for an obstacle set that no drone has seen yet.
     sees_the_end: bool,
     interim: usize,
     alternatives: Vec<PlanBundle>,

@@ -28,7 +28,7 @@ use token::Token;
   skein view runs/s2-right-1      a recorded run
   skein view --port 8080 --open
 
-The page is served on 127.0.0.1, to this machine only. The address contains a token: nobody else can open the page.
+The page is served on 127.0.0.1, to this machine only. The address contains a token: no one else can open the page.
 Ctrl-C stops the server; the swarm flies on.")]
 pub(crate) struct ViewArgs {
     /// Folder of a recorded run [default: a running swarm]

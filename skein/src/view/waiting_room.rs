@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const PLACES: usize = 32;
 
 /// The clients that wait. If there are too many, the one that came first is disconnected: who only holds a place, without a
-/// request, keeps nobody out.
+/// request, keeps no one out.
 #[derive(Default)]
 pub(crate) struct WaitingRoom(Mutex<Waiting>);
 
