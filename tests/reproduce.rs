@@ -179,7 +179,7 @@ fn beside_the_paper(rows: &BTreeMap<String, Value>) {
     // It breaks no distance.
     let reacting = |t_c: &str, what: &str| ours(&format!("E4.S2.congestion-aware-paper.t_c-{t_c}.{what}"));
     let dearer = |t_c: &str| reacting(t_c, "total") / reacting("0", "total") - 1.0;
-    assert!(dearer("0.2").abs() < 0.05 && (0.0..0.15).contains(&dearer("0.5")), "{}", dearer("0.5"));
+    assert!(dearer("0.2").abs() < 0.05 && (dearer("0.5") - 0.11).abs() < 0.02, "{}", dearer("0.5"));
     assert!(["0", "0.2", "0.5"].iter().all(|t_c| reacting(t_c, "separation") >= 37.0));
     // The formation is deformed most at the wide obstacle, less at the two small ones, and not at the end.
     assert!(ours("E6.disturbance.1") > 2.0 * ours("E6.disturbance.2") && ours("E6.disturbance.2") > 10.0);

@@ -7,6 +7,9 @@
 //! n(t) · (B'(t) − B(t)) ≥ −s (D(t) − d). If both drones obey this with s = ½, their new braking paths are at least d apart.
 //! Full braking leaves B unchanged and is therefore always allowed.
 //!
+//! If commands take effect late, the rule starts from what both drones sense now, and covers all commands that the other drone
+//! cannot see yet: see `docs/safety.md`, "Reaction time".
+//!
 //! Braking paths are compared at ticks whose number is a multiple of a stride. These ticks are the same for all drones, so the
 //! invariant is exact there. [`BrakingFilterParams::margin_m`] covers the loss of distance between the compared ticks.
 
@@ -32,10 +35,10 @@ pub struct BrakingFilterParams {
     pub dt_s: f64,
 }
 
-/// A neighbour as sensed.
+/// A neighbour as sensed now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moving {
-    /// Position relative to the drone, m.
+    /// Position relative to the drone's present position, m.
     pub position_m: Vec2,
     /// Velocity in the world frame, m/s.
     pub velocity_mps: Vec2,
@@ -62,8 +65,8 @@ pub struct OwnMotion {
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
-/// The same for a drone whose commands take effect late: it leaves half of its share, because the direction to the neighbour
-/// turns until its last commands are seen.
+/// The same if the drone's commands take effect late. It leaves half of its share unused, because the direction to the neighbour
+/// turns until the drone's last commands are seen.
 const SHARE_LATE: f64 = 0.25;
 /// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
@@ -119,7 +122,7 @@ impl BrakingFilterParams {
     }
 }
 
-/// The share of the room that a drone uses whose commands take effect `lag` ticks late.
+/// The share of the room that a drone may use if its commands take effect `lag` ticks late.
 fn share(lag: u32) -> f64 {
     if lag == 0 { SHARE } else { SHARE_LATE }
 }
@@ -153,7 +156,7 @@ pub struct BrakingFilter {
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     acceleration: Vec2,
-    /// Braking path from the end of this tick on, relative to the drone's present position.
+    /// Braking path from the end of the command's tick on, relative to the position at which the command takes effect.
     path: BrakingPath,
 }
 
@@ -173,7 +176,8 @@ impl BrakingFilter {
 
     /// Returns the allowed acceleration nearest to `wanted` that the search finds, world frame, m/s². The norm of `wanted` is
     /// first limited to the greatest acceleration. The result is `wanted` itself if it is allowed, and full braking in the worst
-    /// case. `obstacles`: each shape in the world frame, and its distance from the drone's centre, m.
+    /// case. `obstacles`: each shape in the world frame, and its distance from where the drone's centre is when the command takes
+    /// effect, m.
     pub fn filter<'a>(
         &mut self,
         own: &OwnMotion,

@@ -251,17 +251,17 @@ impl SwarmPilot {
     }
 
     /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route. `route_m`: length
-    /// of the planned route that is left. A detour that was begun is kept while it is shorter than that
-    /// and the route does not keep the planning distance.
+    /// of the planned route that is left. A detour that was begun is kept while it is shorter than that and
+    /// the route does not keep the planning distance.
     fn detour(&mut self, senses: &Senses<'_>, route_m: f64) -> Option<Vec2> {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
             let blocked = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_free(a, b));
             let begun = self.detour_to.filter(|to| self.route.end() == Some(*to));
-            let clear = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_clear(a, b)).is_none();
-            let left_m = self.navigator.left_m(senses.position);
-            let shorter = begun.filter(|_| !clear && left_m.is_some_and(|left_m| left_m < route_m));
-            self.detour_to = blocked.or(shorter);
+            let shorter = || self.navigator.left_m(senses.position).is_some_and(|left_m| left_m < route_m);
+            let is_clear = |a, b| self.navigator.is_clear(a, b);
+            let near = || self.route.end_if_blocked(senses.position, is_clear).is_some();
+            self.detour_to = blocked.or_else(|| begun.filter(|_| shorter() && near()));
         }
         let target = self.detour_to?;
         let next = match self.navigator.head(senses.tick, senses.position, target) {

@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 /// The broadcasts of one drone: their periods, and what was said when.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Broadcaster {
-    me: DroneId,
     beacon_ticks: u64,
     repeat_s: f64,
     /// When each known obstacle is said again.
@@ -41,13 +40,12 @@ struct Extent {
 impl Broadcaster {
     /// Nothing said yet.
     pub(crate) fn new(params: &LeadingParams) -> Self {
-        let (me, repeat_s) = (params.me, params.repeat_period_s);
+        let repeat_s = params.repeat_period_s;
         Self {
-            me,
             beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
             repeat_s,
             obstacles: BTreeMap::new(),
-            passed: Gossip::new(params.start, repeat_s, me),
+            passed: Gossip::new(params.start, repeat_s, params.me),
             term: Ballot::NONE,
             spoken: false,
             next_repeat: params.start,
@@ -104,7 +102,7 @@ impl Broadcaster {
     fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, say: &mut Vec<Message>) {
         if self.obstacles.len() < k.obstacles().count() {
             for (id, known) in k.obstacles().iter() {
-                let (me, repeat_s) = (self.me, self.repeat_s);
+                let (me, repeat_s) = (k.me(), self.repeat_s);
                 self.obstacles.entry(id).or_insert_with(|| {
                     if known.witness == me {
                         say.extend(obstacle(k.obstacles(), id));

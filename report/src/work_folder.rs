@@ -20,7 +20,7 @@ const FOLDER: OFlags = OFlags::RDONLY.union(OFlags::DIRECTORY).union(OFlags::CLO
 
 /// A folder that is open. Files are found through its descriptor, so that it does not matter if its path changes.
 ///
-/// Anybody may read. The first write claims the folder: it must belong to this user, and it is locked until the last copy
+/// Any user may read. The first write claims the folder: it must belong to this user, and it is locked until the last copy
 /// of this value is dropped, or the process ends in whatever way. A new file replaces what had its name and is never
 /// written through a link. A file system that cannot lock folders, such as some network file systems, gives no lock.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@
 mod support;
 
 use skein_protocol::record::Outcome;
-use support::{fly_to_the_end, scenario};
+use support::{fly_to_the_end, parse, scenario};
 
 fn assert_reached(name: &str, strategy: &str) {
     let scenario = scenario(&format!("hard/{name}"), &[("strategy", &format!("\"{strategy}\""))]);
@@ -15,8 +15,17 @@ fn assert_reached(name: &str, strategy: &str) {
     assert!(clearance_m >= scenario.avoidance.clearance_m, "{name}: {clearance_m} m to an obstacle");
 }
 
-const SWARMS: [&str; 7] =
-    ["defaults", "column", "reform-blind", "gap-crush", "in-sight-at-start", "obstacle-hit", "plan-storm"];
+const SWARMS: [&str; 9] = [
+    "defaults",
+    "column",
+    "reform-blind",
+    "gap-crush",
+    "in-sight-at-start",
+    "obstacle-hit",
+    "plan-storm",
+    "flipping-detour",
+    "tight-gaps",
+];
 
 #[test]
 fn a_single_drone_finds_its_path() {
@@ -37,4 +46,23 @@ fn the_papers_rule_reaches_every_hard_scene() {
     for name in SWARMS {
         assert_reached(name, "congestion-aware-paper");
     }
+}
+
+#[test]
+fn a_reaction_time_breaks_no_distance() {
+    for strategy in ["shortest-path", "congestion-aware"] {
+        assert_reached("late-reaction", strategy);
+    }
+}
+
+/// Four walls around the only drone.
+#[test]
+fn a_mission_without_a_way_is_stuck_at_once() {
+    let walls =
+        [(0, 100, 100, 5), (0, -100, 100, 5), (-95, 0, 5, 100), (95, 0, 5, 100)].map(|(x, y, width, height)| {
+            format!("[[obstacle]]\nshape = \"rectangle\"\ncentre_m = [{x}, {y}]\nhalf_size_m = [{width}, {height}]\n")
+        });
+    let text = format!("[formation]\ndrones = 1\n{}", walls.concat());
+    let world = fly_to_the_end(&parse(&text, &[]), None);
+    assert_eq!((world.ended(), world.tick()), (Some(Outcome::Stuck), 1));
 }

@@ -27,6 +27,26 @@ fn the_shortest_scenario_has_the_defaults_of_the_paper() {
 }
 
 #[test]
+fn defaults_follow_the_scenario() {
+    let of = |sets: &[(&str, &str)]| parse("[formation]", sets);
+    // A drone brakes with g·c_d, at most with its greatest acceleration.
+    assert!((of(&[("drone.drag_coefficient", "0.2")]).braking_mps2() - 1.962).abs() < 1e-12);
+    assert_eq!(of(&[("drone.drag_coefficient", "5")]).braking_mps2(), 5.0);
+    // All beacons take at most a quarter of the satellite's 256 kbit/s.
+    let beacon_s = |preset, drones| of(&[("radio.preset", preset), ("formation.drones", drones)]).beacon_period_s();
+    let frame_bits = 8.0 * (8 + size_of::<skein_protocol::payload::Pose>()) as f64;
+    assert_eq!((beacon_s("ideal", "64"), beacon_s("wifi", "8")), (0.1, 0.1));
+    assert!((beacon_s("satellite", "16") - 16.0 * frame_bits / 64_000.0).abs() < 1e-12);
+    assert_eq!(beacon_s("satellite", "200"), 0.5, "a third of the peer time-out");
+    assert_eq!(of(&[("radio.preset", "satellite"), ("protocol.beacon_period_s", "0.2")]).beacon_period_s(), 0.2);
+    // A column of 64 is 2520 m long and takes 252 s to pass a point; 64 headways of 3.85 s come on top.
+    assert_eq!(of(&[]).timeout_s(), 180.0);
+    let column = of(&[("formation.shape", "column"), ("formation.drones", "64")]);
+    assert_eq!(column.timeout_s(), (2.0 * (252.0 + 64.0 * 3.85_f64)).ceil());
+    assert_eq!(of(&[("time.timeout_s", "7")]).timeout_s(), 7.0);
+}
+
+#[test]
 fn overrides_are_toml_or_strings() {
     let text = "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [200, 0]\nradius_m = 5";
     let sets = [

@@ -3,7 +3,7 @@
 //! | code | when |
 //! |---|---|
 //! | 0 | the mission reached its goal and every invariant held |
-//! | 1 | the goal was not reached: the mission's time ran out |
+//! | 1 | the goal was not reached: the mission's time ran out, or some drone has no way there |
 //! | 2 | bad usage or a bad scenario; nothing was started |
 //! | 3 | the environment failed: shared memory, limits, a process that could not be started, a killed world |
 //! | 4 | an invariant was broken |

@@ -1,4 +1,5 @@
-//! The secret in the address of a view. Who does not know it gets nothing: other users of the machine can connect as well.
+//! The secret in the address of a view. A request without it gets nothing, because other users of
+//! the machine can connect as well.
 
 use std::io::Read;
 

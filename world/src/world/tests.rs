@@ -200,6 +200,17 @@ fn without_living_drones_the_mission_is_over() {
 }
 
 #[test]
+fn a_drone_without_a_way_ends_the_mission_in_its_first_tick() {
+    let mut world = eight(WorldParams { without_way: vec![DroneId(2), DroneId(5)], ..params() }, &[]);
+    world.advance();
+    assert_eq!((world.ended(), world.tick()), (Some(Outcome::Stuck), 1));
+    world.finish(&LinkStats::default(), 0.0);
+    let Some(EventKind::End { reason, stuck, .. }) = event_kinds(events(&world)).pop() else { panic!("no end") };
+    assert_eq!(stuck, [DroneId(2), DroneId(5)]);
+    assert!(reason.starts_with("drones 2, 5 have no way"), "{reason}");
+}
+
+#[test]
 fn a_held_formation_ends_the_mission_with_a_last_record() {
     let end = End::Hold { stop_x_m: 15.0 };
     let mut world = eight(WorldParams { end, ..params() }, &[]);
