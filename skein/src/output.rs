@@ -4,7 +4,7 @@ use crate::exit::Failure;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
-/// Prints to stdout. Returns whether anybody reads it: a closed pipe is the reader's choice, not a failure.
+/// Prints to stdout. Returns whether the output has a reader: a closed pipe is the reader's choice, not a failure.
 pub(crate) fn print(text: impl AsRef<[u8]>) -> Result<bool, Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_ref()).and_then(|()| out.flush()) {

@@ -1,5 +1,5 @@
-//! Classifies HTTP requests. Each must contain the token of the view's address. Only pages that this server served may connect: a page from elsewhere could otherwise reach
-//! the server by a name that resolves to this machine (DNS rebinding).
+//! Classifies HTTP requests. Each must contain the token of the view's address. Only pages that this server served may connect. A page
+//! from elsewhere could otherwise reach the server by a name that resolves to this machine (DNS rebinding).
 
 use super::token::Token;
 

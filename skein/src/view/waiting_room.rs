@@ -7,8 +7,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Greatest number of clients that wait.
 const PLACES: usize = 32;
 
-/// The clients that wait. If there are too many, the one that came first is disconnected: who only holds a place, without a
-/// request, keeps no one out.
+/// The clients that wait. If there are too many, the one that came first is disconnected. So a client that only holds a place,
+/// without a request, keeps no one out.
 #[derive(Default)]
 pub(crate) struct WaitingRoom(Mutex<Waiting>);
 
