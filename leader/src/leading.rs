@@ -216,6 +216,8 @@ impl Leading {
             MessageRef::Assignment(part) => self.knowledge.hear_assignment(now, source, part),
             MessageRef::Arrivals(row) => self.planner.hear(now, row),
             MessageRef::Passed(passed) => self.knowledge.hear_passed(source, passed),
+            // A message of the pilot's own says nothing about leading.
+            MessageRef::User(_) => {}
         }
     }
 

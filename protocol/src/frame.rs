@@ -18,7 +18,8 @@ pub const NEVER_TRANSMITTED: u64 = u64::MAX;
 #[repr(C, align(8))]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Frame {
-    /// Number of the message's [`crate::message::Topic`]. A frame from another process can contain any number.
+    /// Number of the message's [`crate::message::Topic`] or [`crate::TopicName`]; that of a [`crate::telemetry`] frame between a drone
+    /// and the world. A frame from another process can contain any number.
     pub kind: u16,
     /// Version of the payload layout: [`crate::payload::VERSION`].
     pub version: u16,

@@ -4,6 +4,7 @@
 //!
 //! - [`Message`] is one message; [`message::Topic`] names its kind. [`Message::encode`] makes a [`frame::Frame`] of fixed
 //!   size, and [`Message::decode`] checks every field of a frame that another process wrote.
+//! - [`UserMessage`] is a message of a pilot's own under a [`TopicName`]; [`telemetry`] is what a pilot reports about itself.
 //! - [`payload`] has the layouts of the messages, and [`wire`] the enums behind their integers ([`LeadershipKind`],
 //!   [`Phase`], [`ArrivalsKind`]).
 //! - [`ids`] and [`time`] name drones, groups, terms, plans and instants of simulated time.
@@ -41,6 +42,7 @@
 //! assert_eq!(delivery, Delivery::Deliver { due: SimTime::ZERO, again: None });
 //! ```
 
+mod decode_error;
 pub mod digest;
 pub mod downlink;
 mod drop_reason;
@@ -52,19 +54,29 @@ pub mod ids;
 pub mod link_faults;
 pub mod matching;
 pub mod message;
+mod metric_name;
 pub mod nearby;
 pub mod payload;
 pub mod radio;
 pub mod record;
 pub mod shape;
+mod short_text;
 pub mod slot;
+pub mod telemetry;
 pub mod thin_plate;
 pub mod time;
+mod topic;
+mod topic_name;
+mod user_message;
 pub mod wire;
 
 pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 pub use message::{Message, MessageRef};
+pub use metric_name::{MetricName, MetricNameError};
+pub use short_text::{ShortText, TEXT_FIELD};
 pub use time::{SimTime, Tick};
+pub use topic_name::{OWN_TOPIC, TopicName, TopicNameError};
+pub use user_message::{TooLong, USER_BYTES, UserMessage};
 pub use wire::{ArrivalsKind, LeadershipKind, Phase, flag};
 
 /// A planar vector or point, metres (or m/s, m/s²), world frame.

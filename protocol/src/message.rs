@@ -6,44 +6,14 @@
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
 use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use crate::topic_name::OWN_TOPIC;
+use crate::user_message::UserMessage;
 use crate::wire::{ArrivalsKind, LeadershipKind, Phase, UnknownCode};
 use bytemuck::Pod;
-use serde::{Deserialize, Serialize};
 use std::mem::offset_of;
-use thiserror::Error;
 
-/// The kind of a message. An observer sees each kind as a separate topic, and the rules of the radio apply to topics.
-#[repr(u16)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Topic {
-    /// Carries a [`Pose`].
-    Pose = 1,
-    /// Carries an [`Obstacle`].
-    Obstacle = 2,
-    /// Carries a [`Leadership`].
-    Leadership = 3,
-    /// Carries a [`Plan`].
-    Plan = 4,
-    /// Carries an [`Assignment`].
-    Assignment = 5,
-    /// Carries an [`Arrivals`].
-    Arrivals = 6,
-    /// Carries a [`Passed`].
-    Passed = 7,
-}
-
-impl Topic {
-    /// All topics, in the order of their numbers on the wire.
-    pub const ALL: [Self; 7] =
-        [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Arrivals, Self::Passed];
-
-    /// The topic with this number on the wire; `None` if no topic has it.
-    #[must_use]
-    pub fn from_wire(kind: u16) -> Option<Self> {
-        Self::ALL.into_iter().find(|topic| *topic as u16 == kind)
-    }
-}
+pub use crate::decode_error::{DecodeError, MAX_ABS};
+pub use crate::topic::Topic;
 
 /// A message, decoded and checked or about to be encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,35 +32,15 @@ pub enum Message {
     Arrivals(Arrivals),
     /// A drone's notice that it has passed an obstacle set.
     Passed(Passed),
-}
-
-/// Maximum absolute value of a coordinate (m), speed (m/s) or time (s) in a message. [`Message::decode`] refuses greater
-/// values, except in fields that may be infinite or NaN.
-pub const MAX_ABS: f64 = 1e9;
-
-/// Why a frame could not be decoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum DecodeError {
-    /// No topic has this number.
-    #[error("frame of unknown kind {0}")]
-    Kind(u16),
-    /// The frame has this version of the payload layouts instead of [`payload::VERSION`].
-    #[error("frame of version {0}, expected {expected}", expected = payload::VERSION)]
-    Version(u16),
-    /// The length of the payload (first number, bytes) is not the length that its kind requires (second number, bytes).
-    #[error("frame of {0} bytes, expected {1}")]
-    Length(u32, usize),
-    /// The named field is invalid: a number that is not finite or is greater than [`MAX_ABS`], a count out of range, a group that
-    /// is not a lineage, an invalid shape, or an unknown kind or phase.
-    #[error("frame with an invalid {0}")]
-    Field(&'static str),
+    /// A message of a pilot's own.
+    User(UserMessage),
 }
 
 impl Message {
-    /// The message's topic.
+    /// Number of the message's topic on the wire: that of a [`Topic`] or of a [`crate::TopicName`].
     #[must_use]
-    pub fn topic(&self) -> Topic {
-        match self {
+    pub fn kind(&self) -> u16 {
+        let topic = match self {
             Self::Pose(_) => Topic::Pose,
             Self::Obstacle(_) => Topic::Obstacle,
             Self::Leadership(_) => Topic::Leadership,
@@ -98,7 +48,9 @@ impl Message {
             Self::Assignment(_) => Topic::Assignment,
             Self::Arrivals(_) => Topic::Arrivals,
             Self::Passed(_) => Topic::Passed,
-        }
+            Self::User(message) => return message.topic().kind(),
+        };
+        topic as u16
     }
 
     /// Encodes the message as a frame.
@@ -113,9 +65,10 @@ impl Message {
             Self::Assignment(payload) => bytemuck::bytes_of(payload),
             Self::Arrivals(payload) => bytemuck::bytes_of(payload),
             Self::Passed(payload) => bytemuck::bytes_of(payload),
+            Self::User(message) => message.payload(),
         };
         let mut frame = Frame {
-            kind: self.topic() as u16,
+            kind: self.kind(),
             version: payload::VERSION,
             len: bytes.len() as u32,
             payload: [0; FRAME_PAYLOAD],
@@ -150,6 +103,8 @@ pub enum MessageRef<'a> {
     Arrivals(&'a Arrivals),
     /// See [`Message::Passed`].
     Passed(&'a Passed),
+    /// See [`Message::User`].
+    User(&'a UserMessage),
 }
 
 impl<'a> From<&'a Message> for MessageRef<'a> {
@@ -162,6 +117,7 @@ impl<'a> From<&'a Message> for MessageRef<'a> {
             Message::Assignment(payload) => Self::Assignment(payload),
             Message::Arrivals(payload) => Self::Arrivals(payload),
             Message::Passed(payload) => Self::Passed(payload),
+            Message::User(message) => Self::User(message),
         }
     }
 }
@@ -175,6 +131,9 @@ impl<'a> MessageRef<'a> {
     pub fn read(frame: &'a Frame) -> Result<Self, DecodeError> {
         if frame.version != payload::VERSION {
             return Err(DecodeError::Version(frame.version));
+        }
+        if frame.kind & OWN_TOPIC != 0 {
+            return UserMessage::read(frame).map(Self::User);
         }
         let message = match Topic::from_wire(frame.kind).ok_or(DecodeError::Kind(frame.kind))? {
             Topic::Pose => Self::Pose(read(frame)?),
@@ -200,6 +159,7 @@ impl<'a> MessageRef<'a> {
             Self::Assignment(payload) => Message::Assignment(*payload),
             Self::Arrivals(payload) => Message::Arrivals(*payload),
             Self::Passed(payload) => Message::Passed(*payload),
+            Self::User(message) => Message::User(*message),
         }
     }
 
@@ -250,6 +210,8 @@ impl<'a> MessageRef<'a> {
                 if a.gate_s.iter().any(invalid) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
             }
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
+            // Checked when it is read: only the name has rules.
+            Self::User(_) => Ok(()),
         }
     }
 }

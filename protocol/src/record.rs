@@ -4,14 +4,15 @@ use crate::drop_reason::DROP_REASONS;
 use crate::frame::AirFrame;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::link_faults::LinkFaults;
+use crate::telemetry::TelemetryRow;
 use crate::time::{SimTime, Tick};
 use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The head of a record sample. The [`DroneRow`]s, the [`AirFrame`]s and `events_len` bytes of JSON lines follow it in this
-/// order. Each line is one [`RunEvent`].
+/// The head of a record sample. The [`DroneRow`]s, the [`AirFrame`]s, the [`TelemetryRow`]s and `events_len` bytes of JSON lines
+/// follow it in this order. Each line is one [`RunEvent`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RecordHeader {
@@ -23,10 +24,14 @@ pub struct RecordHeader {
     pub rows: u32,
     /// Number of frames sent in this tick.
     pub frames: u32,
+    /// Number of figures, marks and lines that pilots reported in this tick.
+    pub telemetry: u32,
     /// Length of the JSON lines, bytes.
     pub events_len: u32,
     /// Number of ticks whose records were dropped since the last sample because the recorder was full (wall clock only).
     pub lost: u32,
+    /// Always 0.
+    pub reserved: u32,
     /// Running digest of the mission so far.
     pub digest: u64,
 }
@@ -355,6 +360,8 @@ pub struct RecordView<'a> {
     pub rows: &'a [DroneRow],
     /// Frames sent in this tick.
     pub frames: &'a [AirFrame],
+    /// What pilots reported about themselves in this tick, ordered by drone.
+    pub telemetry: &'a [TelemetryRow],
     /// Events as JSON lines, one [`RunEvent`] per line. They include the events of lost records since the last sample.
     pub events: &'a [u8],
 }
@@ -379,11 +386,13 @@ impl<'a> RecordView<'a> {
         let head: &RecordHeader = bytemuck::try_from_bytes(head).map_err(|_| error)?;
         let (rows, rest) = cut(rest, head.rows as usize * size_of::<DroneRow>())?;
         let (frames, rest) = cut(rest, head.frames as usize * size_of::<AirFrame>())?;
+        let (telemetry, rest) = cut(rest, head.telemetry as usize * size_of::<TelemetryRow>())?;
         let (events, _) = cut(rest, head.events_len as usize)?;
         Ok(Self {
             head,
             rows: bytemuck::try_cast_slice(rows).map_err(|_| error)?,
             frames: bytemuck::try_cast_slice(frames).map_err(|_| error)?,
+            telemetry: bytemuck::try_cast_slice(telemetry).map_err(|_| error)?,
             events,
         })
     }
@@ -391,7 +400,11 @@ impl<'a> RecordView<'a> {
     /// Size of the sample that [`RecordView::write_to`] writes, bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
-        size_of::<RecordHeader>() + size_of_val(self.rows) + size_of_val(self.frames) + self.events.len()
+        size_of::<RecordHeader>()
+            + size_of_val(self.rows)
+            + size_of_val(self.frames)
+            + size_of_val(self.telemetry)
+            + self.events.len()
     }
 
     /// Writes the sample to the start of `out`.
@@ -403,6 +416,7 @@ impl<'a> RecordView<'a> {
             bytemuck::bytes_of(self.head),
             bytemuck::cast_slice(self.rows),
             bytemuck::cast_slice(self.frames),
+            bytemuck::cast_slice(self.telemetry),
             self.events,
         ];
         let mut at = 0;

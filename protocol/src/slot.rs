@@ -10,6 +10,10 @@ use bytemuck::{Pod, Zeroable};
 pub const SLOT_LEADS: u32 = 1;
 /// [`Slot::flags`]: the drone flies a route past an obstacle set.
 pub const SLOT_QUEUED: u32 = 2;
+/// [`Slot::flags`]: the pilot says that its mission is done. It may take that back in a later tick.
+pub const SLOT_DONE: u32 = 4;
+/// [`Slot::flags`]: the pilot has failed in this tick. The slot's acceleration does not count.
+pub const SLOT_FAILED: u32 = 8;
 
 /// One drone's answer to one tick.
 #[repr(C, align(64))]
@@ -37,7 +41,7 @@ pub struct Slot {
     pub duplicates: u32,
     /// Number of frames that its radio dropped in this tick, indexed by [`crate::radio::DropReason`].
     pub dropped: [u32; DROP_REASONS],
-    /// Combination of [`SLOT_LEADS`] and [`SLOT_QUEUED`].
+    /// Combination of [`SLOT_LEADS`], [`SLOT_QUEUED`], [`SLOT_DONE`] and [`SLOT_FAILED`].
     pub flags: u32,
     /// A [`Phase`], see [`Slot::phase`].
     pub phase: u32,
@@ -70,6 +74,18 @@ impl Slot {
     #[must_use]
     pub fn is_queued(&self) -> bool {
         self.flags & SLOT_QUEUED != 0
+    }
+
+    /// Whether the pilot says that its mission is done.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.flags & SLOT_DONE != 0
+    }
+
+    /// Whether the pilot has failed in this tick.
+    #[must_use]
+    pub fn has_failed(&self) -> bool {
+        self.flags & SLOT_FAILED != 0
     }
 }
 

@@ -47,7 +47,7 @@
 //! let mut recorder = Recorder::in_memory(facts);
 //! let head = RecordHeader { now: SimTime::from_secs(0.02), rows: 1, digest: 0xabc, ..RecordHeader::default() };
 //! let row = DroneRow { energy_j: 12.5, flags: ROW_ALIVE, ..DroneRow::default() };
-//! recorder.take(RecordView { head: &head, rows: &[row], frames: &[], events: b"" }).unwrap();
+//! recorder.take(RecordView { head: &head, rows: &[row], frames: &[], telemetry: &[], events: b"" }).unwrap();
 //!
 //! let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: None };
 //! let (summary, record) = recorder.finish(&completion);

@@ -182,7 +182,7 @@ mod tests {
         let rows: Vec<DroneRow> = (0..4).map(|drone| row(tick as f64, f64::from(drone))).collect();
         let events = vec![b'x'; tick as usize % 11];
         let head = RecordHeader { tick, rows: 4, events_len: events.len() as u32, ..RecordHeader::default() };
-        spool.take(RecordView { head: &head, rows: &rows, frames: &[], events: &events })
+        spool.take(RecordView { head: &head, rows: &rows, frames: &[], telemetry: &[], events: &events })
     }
 
     fn ticks(path: &Path) -> Vec<u64> {

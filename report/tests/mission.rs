@@ -184,11 +184,13 @@ fn give(recorder: &mut Recorder, tick: u64, frames: &[AirFrame], events: &[RunEv
         now: SimTime((tick as i64 + 1) * 100_000_000),
         rows: 4,
         frames: frames.len() as u32,
+        telemetry: 0,
         events_len: lines.concat().len() as u32,
         lost: 0,
+        reserved: 0,
         digest: 0xabc + tick,
     };
-    recorder.take(RecordView { head: &head, rows: &rows, frames, events: lines.concat().as_bytes() })
+    recorder.take(RecordView { head: &head, rows: &rows, frames, telemetry: &[], events: lines.concat().as_bytes() })
 }
 
 fn fly(recorder: &mut Recorder, ticks: std::ops::RangeInclusive<u64>) {
@@ -300,7 +302,7 @@ fn an_invalid_record_is_refused_with_its_tick() {
     let error = give(&mut recorder, 3, &[], &[]).unwrap_err();
     assert_eq!(error.to_string(), "tick 3: expected a record of 5 rows, one per drone, found 4");
     let head = RecordHeader { tick: 7, ..RecordHeader::default() };
-    let record = RecordView { head: &head, rows: &[], frames: &[], events: b"{\"t_s\": 1}\n" };
+    let record = RecordView { head: &head, rows: &[], frames: &[], telemetry: &[], events: b"{\"t_s\": 1}\n" };
     let error = recorder.take(record).unwrap_err();
     assert!(error.to_string().starts_with("tick 7: expected an event"), "{error}");
 }

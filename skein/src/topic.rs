@@ -98,8 +98,7 @@ fn kind(text: &str) -> Result<String, KindError> {
 }
 
 fn name(kind: u16) -> String {
-    let topic = Topic::from_wire(kind).and_then(|topic| serde_json::to_value(topic).ok());
-    topic.and_then(|topic| topic.as_str().map(str::to_owned)).unwrap_or_else(|| "unknown".to_owned())
+    Topic::from_wire(kind).map_or("unknown", Topic::name).to_owned()
 }
 
 /// Why a kind of frame is refused.

@@ -46,8 +46,10 @@ impl TickRecord {
             now: ended.end,
             rows: self.rows.len() as u32,
             frames: ended.frames as u32,
+            telemetry: 0,
             events_len: ended.events_len as u32,
             lost: 0,
+            reserved: 0,
             digest: ended.digest,
         };
     }
@@ -55,13 +57,14 @@ impl TickRecord {
     /// Makes the last record of the mission: without rows and frames, under the tick and time of the last one.
     pub(crate) fn close_mission(&mut self, digest: u64, events_len: usize) {
         self.rows.clear();
-        self.head = RecordHeader { rows: 0, frames: 0, events_len: events_len as u32, digest, ..self.head };
+        self.head =
+            RecordHeader { rows: 0, frames: 0, telemetry: 0, events_len: events_len as u32, digest, ..self.head };
     }
 
     /// The record with its frames and events. A record without frames ignores `frames`.
     pub(crate) fn view<'a>(&'a self, frames: &'a [AirFrame], events: &'a [u8]) -> RecordView<'a> {
         let frames = if self.head.frames == 0 { &[] } else { frames };
-        RecordView { head: &self.head, rows: &self.rows, frames, events }
+        RecordView { head: &self.head, rows: &self.rows, frames, telemetry: &[], events }
     }
 }
 

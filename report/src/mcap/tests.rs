@@ -40,7 +40,9 @@ fn record(folder: &Path, wall: u32) -> PathBuf {
             .collect();
         let head = RecordHeader { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHeader::default() };
         let events = events(tick, wall);
-        writer.take(RecordView { head: &head, rows: &rows, frames: &[], events: &[] }, &events).unwrap();
+        writer
+            .take(RecordView { head: &head, rows: &rows, frames: &[], telemetry: &[], events: &[] }, &events)
+            .unwrap();
     }
     writer.finish().unwrap();
     path

@@ -76,6 +76,7 @@ pub(super) fn content(frame: &AirFrame) -> String {
         Ok(Message::Assignment(part)) => format!("drone {}: {}, place {}", part.drone, part.group, part.rank),
         Ok(Message::Arrivals(row)) => format!("drone {}: arrival times by {} routes", row.drone, row.routes),
         Ok(Message::Passed(passed)) => format!("passed {} obstacles", passed.set_count),
+        Ok(Message::User(message)) => format!("{} bytes", message.bytes().len()),
         Err(error) => error.to_string(),
     }
 }

@@ -169,7 +169,8 @@ mod tests {
             .map(|drone| DroneRow { heard: 2, dropped: [0, 0, 1, 0, 0, 0, 0], ..row(1.00049, drone as f64) })
             .collect();
         let head = RecordHeader { tick, now: SimTime((tick as i64 + 1) * 20_000_000), ..RecordHeader::default() };
-        observer.take(RecordView { head: &head, rows: &rows, frames: &[frame(tick)], events: &[] }, wanted)
+        observer
+            .take(RecordView { head: &head, rows: &rows, frames: &[frame(tick)], telemetry: &[], events: &[] }, wanted)
     }
 
     #[test]
