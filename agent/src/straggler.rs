@@ -14,6 +14,15 @@ pub(crate) struct Straggler {
     unfollowed_since: Option<SimTime>,
 }
 
+/// What the drone itself obeys.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct OwnPlan {
+    /// Whether the drone leads and no other drone shows its term. In a group of one drone this is always so.
+    pub(crate) unfollowed: bool,
+    /// When the plan was made by which the drone passes obstacles; `None` if it obeys another kind of plan.
+    pub(crate) passing_since: Option<SimTime>,
+}
+
 impl Straggler {
     /// Notes the formation that a message announces.
     pub(crate) fn hear(&mut self, message: MessageRef<'_>) {
@@ -25,17 +34,13 @@ impl Straggler {
     }
 
     /// The place behind the others' formation (world frame, m) and its velocity (m/s), once the drone has been
-    /// `unfollowed` for [`UNHEARD_S`]: the last slot of a formation with one drone more.
-    pub(crate) fn slot(
-        &mut self,
-        now: SimTime,
-        unfollowed: bool,
-        shape: &Shape,
-        spacing_m: f64,
-    ) -> Option<(Vec2, Vec2)> {
-        self.unfollowed_since = unfollowed.then(|| self.unfollowed_since.unwrap_or(now));
+    /// unfollowed for [`UNHEARD_S`]: the last slot of a formation with one drone more.
+    pub(crate) fn slot(&mut self, now: SimTime, own: OwnPlan, shape: &Shape, spacing_m: f64) -> Option<(Vec2, Vec2)> {
+        self.unfollowed_since = own.unfollowed.then(|| self.unfollowed_since.unwrap_or(now));
         let unheard = self.unfollowed_since.is_some_and(|since| now.since(since) >= UNHEARD_S);
-        let plan = self.formation.as_ref().filter(|_| unheard)?;
+        // A formation from before the obstacles is behind the drone, where others are still passing.
+        let current = |plan: &&Plan| own.passing_since.is_none_or(|since| plan.stamp > since);
+        let plan = self.formation.as_ref().filter(|_| unheard).filter(current)?;
         let (front, velocity) = anchor(plan, now);
         Some((front + *shape.slots(plan.members as usize + 1, spacing_m).last()?, velocity))
     }
@@ -52,7 +57,8 @@ mod tests {
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0], [-20.0, 5.0]]);
         let mut straggler = Straggler::default();
         let slot = |straggler: &mut Straggler, now_s, unfollowed| {
-            straggler.slot(SimTime::from_secs(now_s), unfollowed, &shape, 10.0)
+            let own = OwnPlan { unfollowed, passing_since: None };
+            straggler.slot(SimTime::from_secs(now_s), own, &shape, 10.0)
         };
         assert_eq!(slot(&mut straggler, 0.0, true), None);
         assert_eq!(slot(&mut straggler, 6.0, true), None, "it knows of no formation");
@@ -60,5 +66,23 @@ mod tests {
         assert_eq!(slot(&mut straggler, 6.1, true), Some((Vec2::new(30.0, 12.0), Vec2::zeros())));
         assert_eq!(slot(&mut straggler, 6.2, false), None);
         assert_eq!(slot(&mut straggler, 6.3, true), None, "it may last a moment only");
+    }
+
+    #[test]
+    fn a_drone_does_not_return_to_a_formation_from_before_its_obstacles() {
+        let made = |stamp_s| Plan {
+            stamp: SimTime::from_secs(stamp_s),
+            phase: Phase::Reform.to_wire(),
+            members: 1,
+            ..Plan::zeroed()
+        };
+        let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0]]);
+        let own = OwnPlan { unfollowed: true, passing_since: Some(SimTime::from_secs(2.0)) };
+        let mut straggler = Straggler::default();
+        straggler.hear(MessageRef::Plan(&made(1.0)));
+        straggler.slot(SimTime::from_secs(3.0), own, &shape, 10.0);
+        assert_eq!(straggler.slot(SimTime::from_secs(60.0), own, &shape, 10.0), None);
+        straggler.hear(MessageRef::Plan(&made(50.0)));
+        assert!(straggler.slot(SimTime::from_secs(60.0), own, &shape, 10.0).is_some());
     }
 }

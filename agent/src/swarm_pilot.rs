@@ -19,7 +19,7 @@ use crate::safety::{NearObstacle, Safety};
 use crate::silent_drones::SilentDrones;
 use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
-use crate::straggler::Straggler;
+use crate::straggler::{OwnPlan, Straggler};
 use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S, SILENT_DRONE_RADIUS};
 use skein_leader::cost::Flight;
 use skein_leader::leading::Leading;
@@ -231,8 +231,12 @@ impl SwarmPilot {
             return direction * self.queue_speed_mps(senses.now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
-        let unfollowed = self.leading.is_unfollowed(senses.now);
-        if let Some((slot, velocity)) = self.straggler.slot(senses.now, unfollowed, shape, spacing_m) {
+        let passing = self.leading.obeyed().filter(|bundle| bundle.plan.phase() == Phase::Avoid);
+        let own = OwnPlan {
+            unfollowed: self.leading.is_unfollowed(senses.now),
+            passing_since: passing.map(|bundle| bundle.plan.stamp),
+        };
+        if let Some((slot, velocity)) = self.straggler.slot(senses.now, own, shape, spacing_m) {
             let wanted = self.velocity_to_slot(senses, slot, velocity);
             return self.limit_on_sight(wanted, senses.now);
         }

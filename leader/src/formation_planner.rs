@@ -7,7 +7,8 @@ use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_MPS, STALLED_S};
+use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_S};
+use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::payload::{Assignment, NO_ROUTE};
 use skein_protocol::{GroupId, Phase, SimTime, Vec2};
 
@@ -19,7 +20,7 @@ const MAX_ANCHOR_STEPS: u32 = 10_000;
 pub(crate) struct FormationPlanner {
     /// Since when the members differ from those planned for.
     changed: Option<SimTime>,
-    /// Since when no member has moved although one is not in its slot.
+    /// Since when all members are at rest although one is not in its slot.
     stalled: Option<SimTime>,
     /// Whether the ranks are open.
     open: bool,
@@ -63,7 +64,7 @@ impl FormationPlanner {
         self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
     }
 
-    /// Whether no member has moved for a while although one is not in its slot, or although the ranks are open.
+    /// Whether all members have been at rest for a while although one is not in its slot, or although the ranks are open.
     fn is_stuck(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> bool {
         let anchor = Vec2::from(bundle.plan.anchor_m);
         let error = |m: &Member| match bundle.parts.get(m.id) {
@@ -71,7 +72,7 @@ impl FormationPlanner {
             None => 0.0,
         };
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
-        let still = s.members.iter().all(|m| m.speed_mps < STALLED_MPS);
+        let still = s.members.iter().all(|m| m.speed_mps < HOLD_SPEED_MPS);
         if !still || bundle.plan.phase() != Phase::Reform || (worst <= s.params.arrival_error_m && !self.open) {
             self.stalled = None;
             return false;

@@ -85,8 +85,6 @@ pub(crate) const SLOT_BERTH: f64 = 1.05;
 pub(crate) const ANCHOR_STEP_M: f64 = 5.0;
 /// A formation in which a drone cannot reach its slot is widened by this factor. No unit. 1.6. By hand.
 pub(crate) const OPEN_RANKS: f64 = 1.6;
-/// Below this speed a drone counts as stalled, m/s. 0.5. By hand.
-pub(crate) const STALLED_MPS: f64 = 0.5;
 /// A formation in which all drones have been stalled for this long is stuck, s. 3. By hand.
 pub(crate) const STALLED_S: f64 = 3.0;
 
