@@ -7,13 +7,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const PURE: [&str; 5] = ["protocol", "leader", "agent", "world", "scenario"];
+const PURE: [&str; 6] = ["protocol", "leader", "pilot", "agent", "world", "scenario"];
 
 /// The workspace packages that each package may depend on.
-const DIRECTIONS: [(&str, &[&str]); 12] = [
+const DIRECTIONS: [(&str, &[&str]); 13] = [
     ("skein-protocol", &[]),
     ("skein-leader", &["skein-protocol"]),
-    ("skein-agent", &["skein-leader", "skein-protocol"]),
+    ("skein-pilot", &["skein-protocol"]),
+    ("skein-agent", &["skein-leader", "skein-pilot", "skein-protocol"]),
     ("skein-world", &["skein-protocol"]),
     ("skein-scenario", &["skein-protocol", "skein-leader", "skein-agent", "skein-world"]),
     ("skein-bus", &["skein-protocol"]),
@@ -23,6 +24,7 @@ const DIRECTIONS: [(&str, &[&str]); 12] = [
         &[
             "skein-protocol",
             "skein-leader",
+            "skein-pilot",
             "skein-agent",
             "skein-world",
             "skein-scenario",
@@ -44,6 +46,7 @@ const DIRECTIONS: [(&str, &[&str]); 12] = [
         &[
             "skein-protocol",
             "skein-leader",
+            "skein-pilot",
             "skein-agent",
             "skein-world",
             "skein-scenario",

@@ -1,7 +1,6 @@
-//! The pilot of a drone: senses and messages in, a command and messages out.
+//! The paper's pilot of a drone: senses and messages in, a command and messages out.
 //!
-//! The crate has two parts. [`Pilot`] is the interface of anything that flies a drone: a runtime calls [`Pilot::step`] once
-//! per tick. [`SwarmPilot`] is the pilot of the paper. It is composed of machines that can be used on their own:
+//! [`SwarmPilot`] is the paper's [`skein_pilot::Pilot`]. It is composed of machines that can be used on their own:
 //!
 //! - [`detection`] computes stopping distances and the danger zone (paper, equations 1 to 4);
 //! - [`route_follower`] follows the routes past obstacles, and [`emergency_route`] finds one that no leader has planned;
@@ -16,33 +15,7 @@
 //! Elections, grouping and planning are not here: they are in `skein-leader`, whose machine `Leading` a [`SwarmPilot`] owns.
 //! The crate is pure. It has no clock, thread, file or random generator, and it does not know whether it runs in a process of
 //! its own. A pilot knows nothing of other drones but what it senses and hears.
-//!
-//! # Example
-//!
-//! A pilot that brakes until it is at rest:
-//!
-//! ```
-//! use skein_agent::{Command, Heard, Pilot};
-//! use skein_protocol::downlink::Senses;
-//! use skein_protocol::{Message, SimTime, Vec2};
-//!
-//! struct Brake;
-//!
-//! impl Pilot for Brake {
-//!     fn step(&mut self, senses: &Senses<'_>, _heard: &[Heard<'_>], _say: &mut Vec<Message>) -> Command {
-//!         Command { acceleration: -senses.velocity, ..Command::default() }
-//!     }
-//!
-//!     fn pose_ages_s(&self, _now: SimTime, ages: &mut Vec<f64>) {
-//!         ages.clear();
-//!     }
-//! }
-//!
-//! let (position, velocity) = (Vec2::zeros(), Vec2::new(2.0, 0.0));
-//! let senses = Senses::new((0, SimTime(0)), (position, velocity), &[], &[], &[]);
-//! let command = Brake.step(&senses, &[], &mut Vec::new());
-//! assert_eq!(command.acceleration, Vec2::new(-2.0, 0.0));
-//! ```
+//
 
 pub mod braking_filter;
 pub mod braking_path;
@@ -54,7 +27,6 @@ mod lone_flight;
 pub mod navigator;
 mod neighbour_table;
 mod params;
-mod pilot;
 pub mod program;
 pub mod queue;
 mod reaction;
@@ -72,5 +44,4 @@ mod tuning;
 pub mod visibility;
 
 pub use params::PilotParams;
-pub use pilot::{Command, Heard, Pilot};
 pub use swarm_pilot::SwarmPilot;

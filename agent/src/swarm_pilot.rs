@@ -10,7 +10,6 @@ use crate::lone_flight::LoneFlight;
 use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
-use crate::pilot::{Command, Heard, Pilot};
 use crate::queue::QueuePacer;
 use crate::reaction::ReactionDelay;
 use crate::rollout::{MAX_MEMBERS, Rollout, RolloutDrone, RolloutInput, RolloutPilot};
@@ -29,6 +28,7 @@ use skein_leader::own_state::OwnState;
 use skein_leader::params::{Objective, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
+use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{MAX_PLACES, Plan, QueuePlace, set_tag};
 use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
@@ -374,8 +374,7 @@ impl SwarmPilot {
 
     fn command(&self, acceleration: Vec2, open: &[QueuePlace; MAX_PLACES]) -> Command {
         let first = open.iter().find(|place| place.set != 0);
-        Command {
-            acceleration,
+        Command::acceleration([acceleration.x, acceleration.y, 0.0]).with_status(Status {
             obeyed: self.leading.stamp(),
             part_hash: self.leading.part_hash(),
             group: self.leading.group(),
@@ -383,16 +382,17 @@ impl SwarmPilot {
             term: self.leading.term(),
             phase: self.leading.obeyed().map_or(Phase::Cruise, |bundle| bundle.plan.phase()),
             place: first.map(|place| (place.route, place.rank)),
-        }
+        })
     }
 }
 
 impl Pilot for SwarmPilot {
-    fn step(&mut self, senses: &Senses<'_>, heard: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
+        let say = out.messages_mut();
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
         let own = OwnState { tick: senses.tick, position: senses.position, velocity: senses.velocity };
-        for &Heard { source, message } in heard {
+        for &Heard { source, message } in inbox.heard() {
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(message);
         }

@@ -1,9 +1,8 @@
 //! The trivial pilot, with which the cost of the runtime is measured.
 
-use skein_agent::{Command, Heard, Pilot};
-use skein_protocol::downlink::Senses;
+use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
 use skein_protocol::payload::{MAX_PLACES, Pose, QueuePlace};
-use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp};
 
 /// A pilot that commands no acceleration and broadcasts its pose at a fixed period.
 #[derive(Clone, Copy, Debug)]
@@ -22,9 +21,9 @@ impl BeaconPilot {
 }
 
 impl Pilot for BeaconPilot {
-    fn step(&mut self, senses: &Senses<'_>, _: &[Heard<'_>], say: &mut Vec<Message>) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) -> Command {
         if senses.tick % self.beacon_ticks == u64::from(self.me.0) % self.beacon_ticks {
-            say.push(Message::Pose(Pose {
+            out.message(Message::Pose(Pose {
                 stamp: senses.now,
                 position_m: senses.position.into(),
                 velocity_mps: senses.velocity.into(),
@@ -38,9 +37,5 @@ impl Pilot for BeaconPilot {
             }));
         }
         Command::default()
-    }
-
-    fn pose_ages_s(&self, _: SimTime, ages: &mut Vec<f64>) {
-        ages.clear();
     }
 }

@@ -2,9 +2,10 @@
 
 use crate::beacon::BeaconPilot;
 use crate::mission;
-use crate::pilot_host::PilotHost;
+use crate::pilot_host::{HostParams, PilotHost};
 use crate::pilot_kind::PilotKind;
-use skein_agent::{Pilot, SwarmPilot};
+use skein_agent::SwarmPilot;
+use skein_pilot::Pilot;
 use skein_protocol::radio::Radio;
 use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
@@ -31,7 +32,12 @@ impl<'s> DroneFactory<'s> {
             PilotKind::Swarm => Box::new(SwarmPilot::new(mission::pilot_params(self.scenario, id, incarnation, start))),
             PilotKind::Beacon => Box::new(BeaconPilot::new(id, incarnation, self.beacon_ticks())),
         };
-        PilotHost::new(id, self.scenario.time.dt_s, Arc::clone(&self.radio), pilot)
+        let params = HostParams {
+            me: id,
+            dt_s: self.scenario.time.dt_s,
+            velocity_gain_per_s: self.scenario.guidance.velocity_gain_per_s,
+        };
+        PilotHost::new(params, Arc::clone(&self.radio), pilot)
     }
 
     fn beacon_ticks(&self) -> u64 {

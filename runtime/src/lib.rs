@@ -93,6 +93,6 @@ pub use drone_factory::DroneFactory;
 pub use drone_range::DroneRange;
 pub use error::RuntimeError;
 pub use launch::{Launch, OnReady, ProcessInfo, ProcessRole};
-pub use pilot_host::{PilotHost, StepScratch};
+pub use pilot_host::{HostParams, PilotHost, StepScratch};
 pub use pilot_kind::PilotKind;
 pub use run_end::RunEnd;

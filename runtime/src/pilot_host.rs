@@ -1,7 +1,7 @@
 //! A pilot with its radio receiver, as both runtimes step it.
 
 use crate::radio_receiver::{Pending, RadioReceiver};
-use skein_agent::{Heard, Pilot};
+use skein_pilot::{Command, Heard, Inbox, Out, Pilot};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
 use skein_protocol::slot::{LinkStats, Slot};
@@ -16,25 +16,35 @@ pub struct StepScratch {
     arrived: Vec<Pending>,
     /// The messages of these frames; empty between ticks.
     heard: Vec<Heard<'static>>,
-    said: Vec<Message>,
+    out: Out,
     ages_s: Vec<f64>,
+}
+
+/// What a drone's host knows besides its pilot and its radio.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HostParams {
+    /// The drone.
+    pub me: DroneId,
+    /// Length of a tick, s.
+    pub dt_s: f64,
+    /// Gain of the inner loop that holds a commanded velocity, 1/s.
+    pub velocity_gain_per_s: f64,
 }
 
 /// One drone: its pilot, its radio receiver and its counters.
 pub struct PilotHost {
-    me: DroneId,
-    dt_s: f64,
+    params: HostParams,
     radio_receiver: RadioReceiver,
     pilot: Box<dyn Pilot>,
     frames_total: u64,
 }
 
 impl PilotHost {
-    /// A drone before its first tick. `dt_s` is the length of a tick.
+    /// A drone before its first tick.
     #[must_use]
-    pub fn new(me: DroneId, dt_s: f64, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
-        let radio_receiver = RadioReceiver::new(me, (dt_s * 1e9).round() as i64, radio.into());
-        Self { me, dt_s, radio_receiver, pilot, frames_total: 0 }
+    pub fn new(params: HostParams, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
+        let radio_receiver = RadioReceiver::new(params.me, (params.dt_s * 1e9).round() as i64, radio.into());
+        Self { params, radio_receiver, pilot, frames_total: 0 }
     }
 
     /// Receives the frames of a downlink that came too late to be answered. The pilot hears them in its next step.
@@ -52,14 +62,14 @@ impl PilotHost {
         stats: &mut LinkStats,
     ) -> &'s [Message] {
         scratch.arrived.clear();
-        scratch.said.clear();
-        let Some(senses) = down.senses(self.me) else { return &scratch.said };
+        scratch.out.clear();
+        let Some(senses) = down.senses(self.params.me) else { return scratch.out.messages() };
         self.radio_receiver.receive(down, senses.now, &mut scratch.arrived, stats);
         let mut heard = emptied(std::mem::take(&mut scratch.heard));
         self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
-        let command = self.pilot.step(&senses, &heard, &mut scratch.said);
+        let command = self.pilot.step(&senses, &Inbox::new(&heard), &mut scratch.out);
         scratch.heard = emptied(heard);
-        self.frames_total += scratch.said.len() as u64;
+        self.frames_total += scratch.out.messages().len() as u64;
         self.count_ages(&senses, scratch, stats);
         let tally = self.radio_receiver.tally();
         *slot = Slot {
@@ -70,15 +80,23 @@ impl PilotHost {
             frames_total: self.frames_total,
             ..Slot::default()
         };
-        command.fill(slot);
-        &scratch.said
+        self.fill(&senses, &command, slot);
+        scratch.out.messages()
+    }
+
+    /// Writes a command and its status into the slot.
+    fn fill(&self, senses: &Senses<'_>, command: &Command, slot: &mut Slot) {
+        let velocity_mps = [senses.velocity.x, senses.velocity.y, 0.0];
+        let [x, y, _] = command.acceleration_mps2(velocity_mps, self.params.velocity_gain_per_s);
+        slot.acceleration_mps2 = [x, y];
+        command.status().fill(slot);
     }
 
     /// Whenever the drone sends a pose, counts how old the newest pose of each peer is.
     fn count_ages(&self, senses: &Senses<'_>, scratch: &mut StepScratch, stats: &mut LinkStats) {
-        if scratch.said.iter().any(|message| matches!(message, Message::Pose(_))) {
+        if scratch.out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
             self.pilot.pose_ages_s(senses.now, &mut scratch.ages_s);
-            let ticks = |age_s: &f64| (age_s / self.dt_s).round().max(0.0) as u64;
+            let ticks = |age_s: &f64| (age_s / self.params.dt_s).round().max(0.0) as u64;
             for age_s in &scratch.ages_s {
                 stats.age(ticks(age_s));
             }

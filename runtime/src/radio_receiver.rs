@@ -1,6 +1,6 @@
 //! A drone's radio receiver: which frames it receives, and when.
 
-use skein_agent::Heard;
+use skein_pilot::Heard;
 use skein_protocol::digest::Digest;
 use skein_protocol::downlink::{DownlinkView, Senses, SensesHeader};
 use skein_protocol::frame::AirFrame;

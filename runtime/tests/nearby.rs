@@ -1,26 +1,22 @@
 //! A drone receives and counts the same frames whether the downlink sorts them by place or not.
 
 use proptest::prelude::*;
-use skein_agent::{Command, Heard, Pilot};
-use skein_protocol::downlink::{Downlink, Senses, SensesHeader};
+use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
+use skein_protocol::downlink::{Downlink, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::Leadership;
 use skein_protocol::radio::{ChannelModel, Radio, Range, Rule};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
-use skein_runtime::{PilotHost, StepScratch};
+use skein_runtime::{HostParams, PilotHost, StepScratch};
 
 /// A pilot that does nothing.
 struct Idle;
 
 impl Pilot for Idle {
-    fn step(&mut self, _: &Senses<'_>, _: &[Heard<'_>], _: &mut Vec<Message>) -> Command {
+    fn step(&mut self, _: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
         Command::default()
-    }
-
-    fn pose_ages_s(&self, _: SimTime, ages: &mut Vec<f64>) {
-        ages.clear();
     }
 }
 
@@ -47,7 +43,8 @@ fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
 }
 
 fn receive(me: u32, radio: &Radio, down: &Downlink) -> (Slot, LinkStats) {
-    let mut pilot_host = PilotHost::new(DroneId(me), 0.02, radio.clone(), Box::new(Idle));
+    let params = HostParams { me: DroneId(me), dt_s: 0.02, velocity_gain_per_s: 1.0 };
+    let mut pilot_host = PilotHost::new(params, radio.clone(), Box::new(Idle));
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     pilot_host.step(&down.view(), &mut StepScratch::default(), &mut slot, &mut stats);
     (slot, stats)

@@ -1,7 +1,7 @@
 //! What a rollout needs of a pilot.
 
-use crate::pilot::Pilot;
 use skein_leader::plan_bundle::PlanBundle;
+use skein_pilot::Pilot;
 use skein_protocol::payload::Plan;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
 

@@ -1,7 +1,6 @@
 //! A simulated swarm: the drones' own pilots and point-mass bodies, stepped together on what one leader knows.
 
 use crate::guidance::anchor;
-use crate::pilot::Heard;
 use crate::rollout::forecast::Forecast;
 use crate::rollout::params::RolloutParams;
 use crate::rollout::pilot::RolloutPilot;
@@ -9,6 +8,7 @@ use crate::tuning::ROLLOUT_HORIZON_S;
 use skein_leader::geometry::nearest;
 use skein_leader::params::{Destination, Objective};
 use skein_leader::plan_bundle::PlanBundle;
+use skein_pilot::{Heard, Inbox, Out};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
 use skein_protocol::formation::HOLD_SPEED_MPS;
@@ -123,7 +123,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         self.steps_to_decision = self.steps_to_decision.saturating_sub(1);
         let mut accelerations = Vec::with_capacity(self.drones.len());
         let mut said = Vec::new();
-        let mut messages: Vec<Message> = Vec::new();
+        let mut out = Out::default();
         let before = std::mem::take(&mut self.said);
         // A pilot ignores its own messages.
         let heard: Vec<Heard<'_>> =
@@ -133,10 +133,14 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
             let drone = &mut self.drones[i];
             let body = (drone.position, drone.velocity);
             let senses = Senses::new((self.step, self.now), body, &around.obstacles, &around.neighbours, shapes);
-            messages.clear();
-            accelerations.push(drone.pilot.step(&senses, &heard, &mut messages).acceleration);
+            out.clear();
+            let command = drone.pilot.step(&senses, &Inbox::new(&heard), &mut out);
+            // A velocity is reached within a step.
+            let velocity_mps = [drone.velocity.x, drone.velocity.y, 0.0];
+            let [x, y, _] = command.acceleration_mps2(velocity_mps, 1.0 / self.step_s);
+            accelerations.push(Vec2::new(x, y));
             let source = drone.pilot.id();
-            said.extend(messages.iter().map(|&message| (source, message)));
+            said.extend(out.messages().iter().map(|&message| (source, message)));
         }
         self.said = said;
         self.fly(&accelerations);

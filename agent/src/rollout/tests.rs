@@ -1,13 +1,12 @@
 //! A look-ahead with a minimal pilot: it flies straight on and arrives when it is in its slot.
 
 use super::*;
-use crate::pilot::{Command, Heard, Pilot};
 use crate::test_params::planner;
 use bytemuck::Zeroable;
 use skein_leader::roster::Roster;
-use skein_protocol::downlink::Senses;
+use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
 use skein_protocol::payload::{Assignment, Plan};
-use skein_protocol::{Message, PlanStamp, Vec2};
+use skein_protocol::{PlanStamp, Vec2};
 
 const DT_S: f64 = 0.1;
 
@@ -17,12 +16,8 @@ struct Straight {
 }
 
 impl Pilot for Straight {
-    fn step(&mut self, _senses: &Senses<'_>, _heard: &[Heard<'_>], _say: &mut Vec<Message>) -> Command {
+    fn step(&mut self, _senses: &Senses<'_>, _inbox: &Inbox<'_>, _out: &mut Out) -> Command {
         Command::default()
-    }
-
-    fn pose_ages_s(&self, _now: SimTime, ages: &mut Vec<f64>) {
-        ages.clear();
     }
 }
 
