@@ -3,7 +3,7 @@
 use crate::faults::FaultTarget;
 use crate::node::{Data, Entry, Node, Place};
 use crate::reference;
-use crate::schema_tree::{kind, lengths, present, range, tag, unit, words};
+use crate::schema_tree::{is_free, kind, lengths, present, range, tag, unit, words};
 use crate::strategy::Strategy;
 use serde_json::{Map, Value as Json};
 use std::collections::BTreeMap;
@@ -53,6 +53,7 @@ impl Walk {
             return self.variant(node, variants, key);
         }
         match kind(schema) {
+            "object" if is_free(schema) => self.free(node, key),
             "object" => self.table(node, schema, key),
             "array" => self.list(node, schema, key),
             "integer" => self.integer(node, schema, key),
@@ -183,6 +184,37 @@ impl Walk {
         }
         let known = properties.iter().filter_map(|(name, schema)| Some((name, schema, entries.get(name)?)));
         known.map(|(name, schema, entry)| (name.clone(), self.value(&entry.node, schema, &join(key, name)))).collect()
+    }
+
+    /// A table that may hold any keys.
+    fn free(&mut self, node: &Node, key: &str) -> Json {
+        match &node.data {
+            Data::Table(_) => self.any(node, key),
+            _ => self.wrong(node, key, "a table"),
+        }
+    }
+
+    /// Any value that JSON can hold.
+    fn any(&mut self, node: &Node, key: &str) -> Json {
+        let number = |float: f64| serde_json::Number::from_f64(float).map(Json::Number);
+        match &node.data {
+            Data::Bool(flag) => (*flag).into(),
+            Data::Text(text) => text.clone().into(),
+            Data::Integer(integer) => match i64::try_from(*integer) {
+                Ok(integer) => integer.into(),
+                Err(_) => self.wrong(node, key, "a whole number of 64 bits"),
+            },
+            Data::Float(float) => number(*float).unwrap_or_else(|| self.wrong(node, key, "a number that is finite")),
+            Data::List(items) => {
+                let items = items.iter().enumerate();
+                items.map(|(i, item)| self.any(item, &join(key, &i.to_string()))).collect()
+            }
+            Data::Table(entries) => {
+                let any = |(name, entry): (&String, &Entry)| (name.clone(), self.any(&entry.node, &join(key, name)));
+                entries.iter().map(any).collect()
+            }
+            Data::Other(_) => self.wrong(node, key, "a number, a text, true, false, an array or a table"),
+        }
     }
 
     fn unknown(&mut self, name: &str, entry: &Entry, properties: &Map<String, Json>, table: &str) {

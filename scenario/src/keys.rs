@@ -3,13 +3,15 @@
 
 use crate::faults::{Fault, Faults};
 use crate::guidance::Guidance;
-use crate::limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES};
+use crate::limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES, MAX_PILOTS};
 use crate::objective::Objective;
 use crate::obstacle::Obstacle;
+use crate::pilots::{FreeTable, PilotKeys};
 use crate::radio_keys::RadioKeys;
 use crate::strategy::Strategy;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Map;
 
 /// A mission: the drones, their formation, the obstacles, the radio, the faults. SI units and radians. In the world
 /// frame, x is the flight direction and y is left, m.
@@ -67,6 +69,14 @@ pub struct Scenario {
     #[serde(default, rename = "fault")]
     #[schemars(length(max = MAX_FAULTS))]
     pub fault_plan: Vec<Fault>,
+    /// Pilots, numbered from 0 in the order of the file.
+    #[serde(default, rename = "pilot", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = MAX_PILOTS))]
+    pub pilots: Vec<PilotKeys>,
+    /// Keys of the user's own. Every pilot gets them with the scenario; Skein does not check them.
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    #[schemars(extend("format" = "free"))]
+    pub user: FreeTable,
     /// Obstacles, numbered from 0 in the order of the file.
     #[serde(default, rename = "obstacle")]
     #[schemars(length(max = MAX_OBSTACLES))]

@@ -3,7 +3,7 @@
 //! - [`Scenario::parse`] reads TOML with overrides (`--set KEY=VALUE`). [`Scenario::parse_bytes`] and
 //!   [`Scenario::from_json`] read bytes and JSON. [`ScenarioSource`] names the text.
 //! - [`Scenario`] holds every key, with a table per part of the mission: [`Formation`], [`Mission`], [`Drone`],
-//!   [`RadioKeys`], [`Obstacle`], [`Fault`] and others. Methods give what follows from the keys, such as
+//!   [`RadioKeys`], [`Obstacle`], [`Fault`], [`PilotKeys`] and others. Methods give what follows from the keys, such as
 //!   [`Scenario::starts`], [`Scenario::shapes`] and [`Scenario::radio`].
 //! - [`ScenarioErrors`] holds all errors. Each [`Issue`] names its place, its key, what was found and what was expected.
 //! - [`keys`], [`markdown`] and [`schema`] describe every key: unit, range, default, meaning. They are generated from the
@@ -53,6 +53,8 @@ mod objective;
 mod obstacle;
 mod parse;
 mod passage;
+mod pilot_rules;
+mod pilots;
 mod radio;
 mod radio_keys;
 mod reference;
@@ -69,10 +71,11 @@ pub use guidance::Guidance;
 pub use keys::{
     Avoidance, Drone, End, Formation, FormationShape, Mission, Protocol, Reformation, Scenario, Sensors, Time,
 };
-pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES};
+pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES, MAX_PILOTS};
 pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::ScenarioSource;
+pub use pilots::{DEFAULT_PILOT, FreeTable, PilotKeys};
 pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
 pub use reference::{KeyDoc, keys, markdown, schema};
 pub use strategy::{Strategy, StrategyError};

@@ -70,6 +70,25 @@ pub(crate) fn from_json(json: &serde_json::Value, source: ScenarioSource<'_>) ->
     Text::new("", source, &[]).finish(&Node::from_json(json), Vec::new())
 }
 
+/// See [`Scenario::blame`].
+pub(crate) fn blame(
+    text: &str,
+    source: ScenarioSource<'_>,
+    overrides: &[(String, String)],
+    keys: &[String],
+    message: &str,
+) -> ScenarioErrors {
+    let text_of = Text::new(text, source, overrides);
+    let (table, _) = DeTable::parse_recoverable(text);
+    let mut root = Node { place: Place::File(0..0), data: Node::from_table(table.get_ref(), &Place::File) };
+    for (number, (path, value)) in overrides.iter().enumerate() {
+        // The same override was good before.
+        let _ = root.set(path, value, number);
+    }
+    let broken = BrokenRule { keys: keys.to_vec(), message: message.to_owned() };
+    text_of.errors(vec![text_of.blame(&root, &broken)])
+}
+
 /// The text, and what is needed to give the place of an error in it.
 struct Text<'a> {
     text: &'a str,

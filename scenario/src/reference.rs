@@ -2,7 +2,7 @@
 
 use crate::keys::Scenario;
 use crate::node::number;
-use crate::schema_tree::{kind, present, range, tag, unit, words};
+use crate::schema_tree::{is_free, kind, present, range, tag, unit, words};
 use serde_json::Value as Json;
 // Writing to a string cannot fail, so its result is dropped below.
 use std::fmt::Write as _;
@@ -60,6 +60,7 @@ fn collect(table: &Json, path: &str, keys: &mut Vec<KeyDoc>) {
         let here = present(schema);
         match kind(here) {
             _ if keys.len() > before => {}
+            "object" if is_free(here) => keys.push(key(path, schema, is_required(table, name))),
             "object" => collect(here, &path, keys),
             "array" if kind(&here["items"]) == "object" => collect(&here["items"], &path, keys),
             _ => keys.push(key(path, schema, is_required(table, name))),
@@ -102,6 +103,7 @@ fn values(schema: &Json) -> String {
         "boolean" => "`true`, `false`".to_owned(),
         "integer" | "number" => range(schema),
         "array" => array_values(schema),
+        "object" => "any table".to_owned(),
         _ => "a string".to_owned(),
     }
 }
@@ -114,6 +116,7 @@ fn array_values(schema: &Json) -> String {
         "array" => format!("{count} × [{}]", array_values(items)),
         "integer" => format!("{count} whole numbers {}", range(items)),
         _ if words(items).is_some() => format!("{count} of {}", values(items)),
+        "string" => format!("{count} strings"),
         _ => format!("{count} numbers {}", range(items)),
     }
 }

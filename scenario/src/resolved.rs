@@ -58,6 +58,34 @@ impl Scenario {
         parse::from_json(json, source)
     }
 
+    /// The error of a valid scenario with which something else is wrong, such as a parameter that its pilot refuses. It is placed
+    /// at the first of `keys` that the text or the overrides write. `text` and `overrides` are those of [`Scenario::parse`].
+    #[must_use]
+    pub fn blame(
+        text: &str,
+        source: ScenarioSource<'_>,
+        overrides: &[(String, String)],
+        keys: &[String],
+        message: &str,
+    ) -> ScenarioErrors {
+        parse::blame(text, source, overrides, keys, message)
+    }
+
+    /// The table of `[[pilot]]` that flies each drone, by its number; `None`: the built-in pilot `paper`.
+    #[must_use]
+    pub fn pilot_tables(&self) -> Vec<Option<usize>> {
+        let rest = self.pilots.iter().position(|pilot| pilot.drones.is_none());
+        let mut tables = vec![rest; self.formation.drones as usize];
+        for (number, pilot) in self.pilots.iter().enumerate() {
+            for &drone in pilot.drones.iter().flatten() {
+                if let Some(table) = tables.get_mut(drone as usize) {
+                    *table = Some(number);
+                }
+            }
+        }
+        tables
+    }
+
     /// The shape of the formation.
     #[must_use]
     pub fn formation_shape(&self) -> Shape {
@@ -137,6 +165,17 @@ impl Scenario {
     #[must_use]
     pub fn radio(&self) -> Radio {
         radio::radio(self.seed, &self.radio)
+    }
+
+    /// The topics that pilots declare, each with its key.
+    #[must_use]
+    pub fn declared_topics(&self) -> Vec<(String, &str)> {
+        let mut declared = Vec::new();
+        for (number, pilot) in self.pilots.iter().enumerate() {
+            let names = pilot.topics.iter().enumerate();
+            declared.extend(names.map(|(i, name)| (format!("pilot.{number}.topics.{i}"), name.as_str())));
+        }
+        declared
     }
 
     /// The channel that all drones share; `None` if bandwidth is no limit.

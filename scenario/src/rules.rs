@@ -4,7 +4,7 @@ use crate::broken_rule::{BrokenRule, quantity};
 use crate::keys::{End, Scenario};
 use crate::node::number;
 use crate::strategy::Strategy;
-use crate::{fault_rules, near};
+use crate::{fault_rules, near, pilot_rules};
 use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
@@ -24,6 +24,7 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     rules.obstacles();
     rules.broken.extend(crate::radio::broken(scenario));
     rules.broken.extend(fault_rules::broken(scenario));
+    rules.broken.extend(pilot_rules::broken(scenario));
     rules.broken
 }
 

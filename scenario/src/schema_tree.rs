@@ -21,6 +21,11 @@ pub(crate) fn kind(schema: &Json) -> &str {
     }
 }
 
+/// Whether a table may hold any keys.
+pub(crate) fn is_free(schema: &Json) -> bool {
+    schema["format"] == "free"
+}
+
 /// The words of a schema that allows words only.
 pub(crate) fn words(schema: &Json) -> Option<Vec<&str>> {
     schema["oneOf"].as_array()?.iter().map(|option| option["const"].as_str()).collect()
@@ -38,6 +43,7 @@ pub(crate) fn lengths(schema: &Json) -> String {
         "array" => format!("arrays, each {}", lengths(&schema["items"])),
         "number" => "numbers".to_owned(),
         "integer" => "whole numbers".to_owned(),
+        "string" if words(&schema["items"]).is_none() => "strings".to_owned(),
         _ if words(&schema["items"]).is_some() => "words".to_owned(),
         _ => "tables".to_owned(),
     };
