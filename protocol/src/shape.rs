@@ -70,8 +70,11 @@ impl ConvexShape {
     /// by `rotation_rad`.
     ///
     /// # Errors
-    /// [`ShapeError`] if a number is not finite, if a size is 0, or if exactly one size is negative.
+    /// [`ShapeError`] if a number is not finite, or if a size is 0 or negative.
     pub fn rectangle(centre: Vec2, half: Vec2, rotation_rad: f64) -> Result<Self, ShapeError> {
+        if half.x <= 0.0 || half.y <= 0.0 {
+            return Err(ShapeError::NotConvex);
+        }
         let (sin, cos) = rotation_rad.sin_cos();
         let corner = |x: f64, y: f64| centre + Vec2::new(x * cos - y * sin, x * sin + y * cos);
         let corners =
@@ -97,10 +100,21 @@ impl ConvexShape {
             let (a, b, c) = (self.vertex(i), self.vertex((i + 1) % n), self.vertex((i + 2) % n));
             (b - a).perp(&(c - b))
         };
-        if n >= 3 && (0..n).any(|i| turn(i) <= 0.0) {
+        // Every corner turns left, and all together turn once: a pentagram turns twice.
+        if n >= 3 && ((0..n).any(|i| turn(i) <= 0.0) || self.full_turns() != 1) {
             return Err(ShapeError::NotConvex);
         }
         Ok(())
+    }
+
+    /// How often the edges turn all the way round, if every corner turns left by less than half a turn.
+    fn full_turns(&self) -> usize {
+        let n = self.count as usize;
+        let upwards = |i: usize| {
+            let edge = self.vertex((i + 1) % n) - self.vertex(i);
+            edge.y > 0.0 || (edge.y == 0.0 && edge.x > 0.0)
+        };
+        (0..n).filter(|&i| !upwards(i) && upwards((i + 1) % n)).count()
     }
 
     /// Vertex `i`, world frame, m. The caller must keep `i` below `count`.
@@ -134,6 +148,27 @@ impl ConvexShape {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_polygon_that_turns_twice_is_refused() {
+        let star = |step: f64| -> Vec<Vec2> {
+            (0..5)
+                .map(|i| f64::from(i) * step * std::f64::consts::TAU / 5.0)
+                .map(|a| Vec2::new(a.cos(), a.sin()))
+                .collect()
+        };
+        assert!(ConvexShape::new(&star(1.0), 0.0).is_ok());
+        assert_eq!(ConvexShape::new(&star(2.0), 0.0), Err(ShapeError::NotConvex));
+    }
+
+    #[test]
+    fn a_rectangle_has_positive_sizes() {
+        let of = |x, y| ConvexShape::rectangle(Vec2::zeros(), Vec2::new(x, y), 0.3);
+        assert!(of(1.0, 2.0).is_ok());
+        for (x, y) in [(-1.0, -2.0), (-1.0, 2.0), (0.0, 2.0)] {
+            assert_eq!(of(x, y), Err(ShapeError::NotConvex));
+        }
+    }
 
     #[test]
     fn bounds_include_the_rounding_radius() {
