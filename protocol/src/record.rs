@@ -159,6 +159,17 @@ pub enum ViolationKind {
     BallotWentBack,
 }
 
+impl ViolationKind {
+    /// Whether the invariant is about a distance, which the event then has.
+    #[must_use]
+    pub fn is_distance(self) -> bool {
+        match self {
+            Self::Separation | Self::Clearance => true,
+            Self::ConflictingAssignment | Self::BallotWentBack => false,
+        }
+    }
+}
+
 /// A fault: one that the scenario injects into a drone or a link, or an unscheduled failure of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

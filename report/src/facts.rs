@@ -92,6 +92,12 @@ impl RunFacts {
         sets.into_iter().map(|set| self.set_of(set)).collect()
     }
 
+    /// Abscissa of the last obstacle set's gate, m; `None` without obstacles.
+    #[must_use]
+    pub fn last_gate_x_m(&self) -> Option<f64> {
+        self.sets().last().map(|set| set.gate_x_m)
+    }
+
     fn set_of(&self, mut set: Vec<usize>) -> ObstacleSet {
         set.sort_unstable();
         let sum: f64 = set.iter().map(|&o| self.obstacles[o].centre().x).sum();

@@ -4,17 +4,16 @@ use crate::facts::{ObstacleSet, RunFacts};
 use crate::summary::{Stage, StageGroup};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
-use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
+use skein_protocol::payload::{MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{DroneId, GroupId, Message, Phase, PlanStamp};
+use skein_protocol::{GroupId, Message, Phase, PlanStamp};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// Follows all stages of a mission. A stage is an obstacle set that the swarm passes.
 pub(crate) struct Stages {
     stages: Vec<Progress>,
     plans: BTreeMap<PlanStamp, AvoidPlan>,
-    /// The group leader that each plan assigns to each drone.
-    leaders: BTreeMap<(PlanStamp, u32), DroneId>,
 }
 
 /// What is known of one stage so far.
@@ -35,7 +34,8 @@ struct Flown {
     stamp: PlanStamp,
     group: GroupId,
     route: u16,
-    leader: Option<DroneId>,
+    /// The drone that led it.
+    leader: Option<u32>,
 }
 
 /// A plan to avoid a set, as its leader sent it first.
@@ -60,7 +60,7 @@ impl Stages {
             flown: vec![None; drones],
             beyond: vec![false; drones],
         };
-        Self { stages: facts.sets().into_iter().map(stage).collect(), plans: BTreeMap::new(), leaders: BTreeMap::new() }
+        Self { stages: facts.sets().into_iter().map(stage).collect(), plans: BTreeMap::new() }
     }
 
     /// Notes that a living drone senses the set for the first time. Returns whether it is the first set that any drone
@@ -90,17 +90,12 @@ impl Stages {
 
     /// Takes the plans that were sent in a tick.
     pub(crate) fn take_frames(&mut self, frames: &[AirFrame]) {
-        let planned = |frame: &&AirFrame| [Topic::Plan as u16, Topic::Assignment as u16].contains(&frame.frame.kind);
-        for frame in frames.iter().filter(planned) {
-            match Message::decode(&frame.frame) {
-                Ok(Message::Plan(plan)) if plan.phase() == Phase::Avoid => {
-                    self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
-                }
-                Ok(Message::Assignment(Assignment { id, drone, leader, .. })) => {
-                    self.leaders.insert((id, drone.0), leader);
-                }
-                // Other messages, and frames that no receiver can decode.
-                _ => {}
+        for frame in frames.iter().filter(|frame| frame.frame.kind == Topic::Plan as u16) {
+            // Frames that no receiver can decode are no plans.
+            if let Ok(Message::Plan(plan)) = Message::decode(&frame.frame)
+                && plan.phase() == Phase::Avoid
+            {
+                self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
             }
         }
     }
@@ -114,7 +109,9 @@ impl Stages {
             for stage in ahead {
                 if plan.is_some_and(|plan| plan.obstacles.iter().any(|id| stage.set.obstacles.contains(id))) {
                     let (stamp, group, route) = (row.obeyed, row.group, row.route);
-                    stage.flown[drone] = Some(Flown { stamp, group, route, leader: row.leader() });
+                    let before = stage.flown[drone].filter(|flown| flown.group == group).and_then(|flown| flown.leader);
+                    let leader = leader(rows, row).or(before);
+                    stage.flown[drone] = Some(Flown { stamp, group, route, leader });
                 }
                 stage.beyond[drone] = row.position_m[0] >= stage.set.gate_x_m;
             }
@@ -163,20 +160,10 @@ impl Stages {
             groups.entry((flown.group, flown.route)).or_default().push(drone);
         }
         let group = |((group, route), drones): (_, Vec<u32>)| {
-            let leader = self.leader(stage, &drones);
+            let leader = stage.leader(&drones);
             StageGroup { name: GroupId::to_string(&group), route, leader, drones }
         };
         groups.into_iter().map(group).collect()
-    }
-
-    /// The leader of these drones: the one in their newest assignment, or else the claimant of the ballot that they
-    /// obeyed if it is one of them.
-    fn leader(&self, stage: &Progress, drones: &[u32]) -> Option<u32> {
-        let flown = |drone: &u32| stage.flown[*drone as usize];
-        let newest = drones.iter().max_by_key(|&drone| flown(drone).map(|flown| flown.stamp))?;
-        let assigned = self.leaders.get(&(flown(newest)?.stamp, *newest)).copied().filter(|&id| id != DroneId::NONE);
-        let obeyed = flown(newest)?.leader.filter(|leader| drones.contains(&leader.0));
-        assigned.or(obeyed).map(|leader| leader.0)
     }
 }
 
@@ -185,6 +172,15 @@ impl Progress {
     fn passed_by(&self) -> impl Iterator<Item = (u32, Flown)> + '_ {
         let flown = self.flown.iter().zip(&self.beyond).zip(0..);
         flown.filter_map(|((flown, beyond), drone)| flown.filter(|_| *beyond).map(|flown| (drone, flown)))
+    }
+
+    /// The drone that led most of these drones to the gate; of several, the one with the least number.
+    fn leader(&self, drones: &[u32]) -> Option<u32> {
+        let mut followers: BTreeMap<u32, usize> = BTreeMap::new();
+        for leader in drones.iter().filter_map(|&drone| self.flown[drone as usize]?.leader) {
+            *followers.entry(leader).or_default() += 1;
+        }
+        followers.into_iter().max_by_key(|&(leader, count)| (count, Reverse(leader))).map(|(leader, _)| leader)
     }
 
     /// Number of drones that passed by each route.
@@ -212,6 +208,13 @@ impl AvoidPlan {
             predicted_s: plan.predicted_s.is_finite().then_some(plan.predicted_s),
         }
     }
+}
+
+/// The drone that leads this drone: the claimant of the term that it obeys, if that drone leads a group with it.
+fn leader(rows: &[DroneRow], row: &DroneRow) -> Option<u32> {
+    let claimant = row.term.claimant;
+    let leads = rows.get(claimant.index()).filter(|leader| leader.alive() && leader.leads());
+    leads.filter(|leader| row.term.is_some() && leader.led.contains(row.group)).map(|_| claimant.0)
 }
 
 /// The split past a set with exactly two routes, as `[left, right]`.

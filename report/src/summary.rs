@@ -137,7 +137,7 @@ pub struct StageGroup {
     pub route: u16,
     /// The drones that passed in it.
     pub drones: Vec<u32>,
-    /// Its leader.
+    /// The drone that led it when its drones passed. It can be a drone of another group; null if no drone led it.
     pub leader: Option<u32>,
 }
 
@@ -167,7 +167,7 @@ pub struct Violation {
     pub kind: ViolationKind,
     /// The drones involved.
     pub drones: Vec<u32>,
-    /// The violating distance, m.
+    /// The violating distance, m; 0 if the invariant is not about a distance.
     pub value_m: f64,
 }
 

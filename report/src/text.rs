@@ -1,6 +1,6 @@
 //! The summary as text for a terminal: the outcome first, then the details.
 
-use crate::summary::{Stage, Summary};
+use crate::summary::{Stage, StageGroup, Summary};
 use skein_protocol::record::{Outcome, Percentiles};
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -28,6 +28,13 @@ pub fn summary(summary: &Summary, colour: bool) -> String {
 pub fn printable(text: &str) -> Cow<'_, str> {
     let steers = |c: char| c.is_control() && c != '\n' && c != '\t';
     if text.contains(steers) { text.replace(steers, "\u{fffd}").into() } else { text.into() }
+}
+
+/// A split as the option `fixed:L/R` has it: the number of drones on each route, from the leftmost route to the rightmost,
+/// such as `6/2`. `drones` begins with the rightmost route, as [`Stage::split`] does.
+#[must_use]
+pub fn split(drones: &[u32]) -> String {
+    drones.iter().rev().map(u32::to_string).collect::<Vec<_>>().join("/")
 }
 
 /// The ANSI colour of an outcome.
@@ -58,11 +65,8 @@ fn violations(summary: &Summary) -> String {
     let first = summary.violations.first().map(|violation| {
         let kind = serde_json::to_value(violation.kind).ok();
         let kind = kind.as_ref().and_then(|kind| kind.as_str()).unwrap_or("violation").replace('-', " ");
-        let value = if kind == "separation" || kind == "clearance" {
-            format!(", {:.2} m", violation.value_m)
-        } else {
-            String::new()
-        };
+        let distance = violation.kind.is_distance();
+        let value = if distance { format!(", {:.2} m", violation.value_m) } else { String::new() };
         format!(", first at {:.2} s: {kind} of drones {}{value}", violation.t_s, list(&violation.drones))
     });
     let number = if count == 1 {
@@ -79,8 +83,8 @@ pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     for (number, stage) in summary.stages.iter().enumerate() {
         lines.push((format!("stage {}", number + 1), passed(stage)));
         lines.extend(stage.groups.iter().flatten().map(|group| {
-            let leader = group.leader.map_or(String::new(), |leader| format!(", led by {leader}"));
-            (String::new(), format!("{:<5} route {}: drones {}{leader}", group.name, group.route, list(&group.drones)))
+            let (name, route, drones) = (&group.name, group.route, list(&group.drones));
+            (String::new(), format!("{name:<5} route {route}: drones {drones}{}", led_by(stage, group)))
         }));
     }
     let mut line = |label: &str, text: Option<String>| lines.extend(text.map(|text| (label.to_owned(), text)));
@@ -117,18 +121,24 @@ fn passed(stage: &Stage) -> String {
     let Some(detected) = stage.detected_s else { return "not detected".to_owned() };
     let time = stage.pass_time_s.map_or("not passed by all drones".to_owned(), |time| format!("passed in {time:.2} s"));
     let mut text = format!("{time} from {detected:.2} s");
-    let split = match (&stage.split_left_right, &stage.split) {
-        (Some([left, right]), _) => Some(format!("; {left} left, {right} right")),
-        (None, Some(split)) => {
-            Some(format!("; {} from right to left", split.iter().map(u32::to_string).collect::<Vec<_>>().join(" / ")))
-        }
-        (None, None) => None,
-    };
-    text.extend(split);
+    text.extend(stage.split.as_deref().map(|drones| format!("; split {}, left to right", split(drones))));
     text.extend(stage.predicted_s.map(|predicted_s| format!("; predicted {predicted_s:.2} s")));
     let simulated = stage.candidates_rehearsed.filter(|&count| count > 0);
     text.extend(simulated.map(|count| format!(", {count} groupings simulated")));
     text
+}
+
+/// Who led a group. A leader that passed in another group is named with it.
+fn led_by(stage: &Stage, group: &StageGroup) -> String {
+    let Some(leader) = group.leader else { return ", led by no drone".to_owned() };
+    if group.drones.contains(&leader) {
+        return format!(", led by {leader}");
+    }
+    let own = stage.groups.iter().flatten().find(|group| group.drones.contains(&leader));
+    match own {
+        Some(own) => format!(", led by {leader} of {} on route {}", own.name, own.route),
+        None => format!(", led by {leader}, which did not pass"),
+    }
 }
 
 fn reformation(summary: &Summary) -> Option<String> {

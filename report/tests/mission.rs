@@ -52,7 +52,7 @@ fn completion() -> RunCompletion {
 fn row(tick: u64, drone: usize) -> DroneRow {
     let dead = drone == 3 && tick >= DEATH;
     let t_s = (if dead { DEATH } else { tick + 1 }) as f64 * 0.1;
-    let leads = if tick < DEATH { drone == 3 } else { drone == 0 && tick >= NEW_LEADER };
+    let leads = drone == 2 || if tick < DEATH { drone == 3 } else { drone == 0 && tick >= NEW_LEADER };
     let phase = if tick < 50 { Phase::Avoid } else { Phase::Reform };
     let (group, route) = if drone == 2 { (GroupId::ALL.child(2), 0) } else { (GroupId::ALL.child(1), 1) };
     let queued = (10..50).contains(&tick);
@@ -61,6 +61,8 @@ fn row(tick: u64, drone: usize) -> DroneRow {
         position_m: [10.0 * t_s, [45.0, 75.0, 15.0, 105.0][drone]],
         velocity_mps: if dead { [0.0; 2] } else { [10.0, 0.0] },
         energy_j: 100.0 * t_s,
+        led: group,
+        term: Ballot { round: 1, incarnation: 1, claimant: DroneId(if drone == 2 { 2 } else { 3 }) },
         obeyed: if tick < 10 { PlanStamp::default() } else { STAMP },
         group,
         flags: flags.into_iter().filter(|flag| flag.0).map(|flag| flag.1).sum(),
@@ -97,7 +99,8 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         scope: GroupId::ALL,
         group: GroupId::ALL.child(1),
         drone: DroneId(drone),
-        leader: DroneId(if drone == 2 { 2 } else { 3 }),
+        // The drone that the plan names as leader of N2 never leads.
+        leader: DroneId(if drone == 2 { 0 } else { 3 }),
         slot_m: [0.0; 2],
         arrival_s: 1.0,
         route: 1,
@@ -423,7 +426,7 @@ fn the_text_of_a_summary_starts_with_the_outcome() {
 reached after 10.00 s: the formation is closed and every invariant held
 
   run           disc: 4 drones, congestion-aware, seed 18446744073709551615, processes, lockstep
-  stage 1       passed in 4.00 s from 1.00 s; 3 left, 1 right; predicted 3.60 s, 5 groupings simulated
+  stage 1       passed in 4.00 s from 1.00 s; split 3/1, left to right; predicted 3.60 s, 5 groupings simulated
                 N1    route 1: drones 0 1 3, led by 3
                 N2    route 0: drones 2, led by 2
   reformation   from 5.10 s, closed at 5.10 s

@@ -113,7 +113,7 @@ fn ambiguities() -> [String; 2] {
         "Left and right. In the paper, six drones join the left group when the obstacle is shifted to the left: the majority \
          takes the longer side. In our flights the majority takes the shorter side, as the cost demands. For a swarm that \
          is its own mirror image, the published labels are read as mirrored. Splits in the tables have the paper's labels, \
-         so that they can be compared. `results.csv` has them as flown, rightmost route first."
+         so that they can be compared. `results.csv` has them as flown, from left to right."
             .to_owned(),
     ]
 }
@@ -201,7 +201,7 @@ fn groups(forest: &Forest) -> String {
     };
     let stages: Vec<String> = forest.summary.stages.iter().map(stage).collect();
     format!(
-        "Number of drones on each route, rightmost route first, and the groups they flew in: {}. Two groups on one route \
+        "Number of drones on each route, from left to right, and the groups they flew in: {}. Two groups on one route \
          form one queue.",
         stages.join("; then ")
     )

@@ -3,7 +3,7 @@
 use crate::error::ReproduceError;
 use crate::flight::{Flight, JITTER_M};
 use skein_protocol::record::Outcome;
-use skein_report::Summary;
+use skein_report::{Summary, text};
 use skein_sweep::{Interrupted, Progress, WorkerPool, fly_inline};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -63,7 +63,7 @@ impl Results {
     /// The content of results.csv: one line for each flight. Fields that do not apply are empty. Values that differ by
     /// obstacle set are separated by spaces.
     pub(crate) fn csv(&self) -> String {
-        let mut csv = "scenario,strategy,seed,start_jitter_m,outcome,pass_times_s,splits_rightmost_first,predicted_s,\
+        let mut csv = "scenario,strategy,seed,start_jitter_m,outcome,pass_times_s,splits_left_to_right,predicted_s,\
                        mission_s,energy_total_j,energy_until_passed_j,energy_detection_to_pass_j,min_separation_m,\
                        min_clearance_m,formation_error_m,mean_distance_error_m,digest,command\n"
             .to_owned();
@@ -111,8 +111,7 @@ pub(crate) fn field(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| format!("{value:.4}"))
 }
 
-/// The number of drones on each route, such as `6/2`.
+/// The number of drones on each route from left to right, such as `6/2`; empty if there is none.
 pub(crate) fn split(drones: Option<&[u32]>) -> String {
-    let counts: Vec<String> = drones.unwrap_or_default().iter().map(u32::to_string).collect();
-    counts.join("/")
+    drones.map(text::split).unwrap_or_default()
 }

@@ -52,7 +52,7 @@ pub(crate) fn table(rows: &[Row], prefixes: &[&str]) -> Block {
 
 /// The flights of a study side by side. A flight that did not reach its goal shows its outcome and no energy.
 pub(crate) fn study(study: &Study, results: &Results) -> Block {
-    let columns = ["drones by route", "time to pass (s)", "mission (s)"].map(str::to_owned).into_iter();
+    let columns = ["split, left to right", "time to pass (s)", "mission (s)"].map(str::to_owned).into_iter();
     let energies = CONVENTIONS.iter().map(|convention| format!("{} (kJ)", convention.words));
     let last = ["least separation (m)", "command"].map(str::to_owned);
     let head = study.labels.iter().map(|&label| label.to_owned()).chain(columns).chain(energies).chain(last);

@@ -49,8 +49,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
     let manifest = manifest(&facts, &scenario)?;
-    let ticks = (scenario.timeout_s() / scenario.time.dt_s).ceil() as u64;
-    let flown = begin(args, &folder, &manifest, ticks).and_then(|Begun { reserved, mut sink }| {
+    let flown = begin(args, &folder, &manifest, scenario.timeout_s()).and_then(|Begun { reserved, mut sink }| {
         let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
         Ok((end, reserved, sink.finish()))
     });
@@ -98,15 +97,16 @@ struct Begun {
 }
 
 /// Makes the files that the flight needs. From here on, the folder is this run's.
-fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, ticks: u64) -> Result<Begun, Failure> {
+fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, timeout_s: f64) -> Result<Begun, Failure> {
     folder.begin(manifest).map_err(Failure::environment)?;
     let facts = manifest.facts.clone();
+    let (quiet, gate_x_m) = (args.quiet || args.json, facts.last_gate_x_m());
     let reserved = folder.reserve_summary(facts.drones).map_err(Failure::environment)?;
     let recorder = match args.no_record {
         true => Recorder::in_memory(facts),
         false => Recorder::in_folder(facts, folder).map_err(Failure::environment)?,
     };
-    Ok(Begun { reserved, sink: MissionBar::new(recorder, args.quiet || args.json, ticks) })
+    Ok(Begun { reserved, sink: MissionBar::new(recorder, quiet, timeout_s, gate_x_m) })
 }
 
 /// Refuses process faults if drones share processes: the fault would hit all drones of the process.

@@ -3,6 +3,7 @@
 use crate::grid::Grid;
 use crate::metrics::METRICS;
 use serde::{Deserialize, Serialize};
+use skein_report::text::split;
 use skein_report::{Summary, Violation};
 use skein_scenario::Scenario;
 use std::io::Write;
@@ -73,14 +74,15 @@ impl Row {
 fn violation_text(first: &Violation, count: usize) -> String {
     let kind = serde_json::to_value(first.kind).unwrap_or_default();
     let kind = kind.as_str().unwrap_or_default();
-    format!("{kind} of {:?}: {:.3} m at {} s, {count} in all", first.drones, first.value_m, first.t_s)
+    let value = if first.kind.is_distance() { format!(": {:.3} m", first.value_m) } else { String::new() };
+    format!("{kind} of {:?}{value} at {} s, {count} in all", first.drones, first.t_s)
 }
 
 /// Writes runs.csv: one line for each row. Rows are in the order of their jobs.
 pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> std::io::Result<()> {
     let mut head: Vec<&str> = vec!["scenario", "strategy", "seed"];
     head.extend(grid.keys());
-    head.extend(["outcome", "pass_times_s", "splits"]);
+    head.extend(["outcome", "pass_times_s", "splits_left_to_right"]);
     head.extend(METRICS.iter().map(|metric| metric.name));
     head.extend(["digest", "reason", "command"]);
     line(out, head.iter().map(|&name| name.to_owned()))?;
@@ -99,16 +101,13 @@ fn fields(grid: &Grid<'_>, row: &Row) -> Vec<String> {
     fields.extend(combination.values.iter().map(|value| value.trim_matches('"').to_owned()));
     fields.push(row.outcome.clone());
     fields.push(row.pass_times_s.iter().map(number).collect::<Vec<_>>().join(" "));
-    fields.push(row.splits.iter().map(|split| slashed(split.as_deref())).collect::<Vec<_>>().join(" "));
+    fields.push(
+        row.splits.iter().map(|drones| drones.as_deref().map(split).unwrap_or_default()).collect::<Vec<_>>().join(" "),
+    );
     fields.extend((0..METRICS.len()).map(|i| row.metrics.get(i).map(number).unwrap_or_default()));
     fields.extend([row.digest.clone(), row.reason.clone()].map(Option::unwrap_or_default));
     fields.push(grid.command(row.job));
     fields
-}
-
-fn slashed(split: Option<&[u32]>) -> String {
-    let counts: Vec<String> = split.unwrap_or_default().iter().map(u32::to_string).collect();
-    counts.join("/")
 }
 
 fn line(out: &mut impl Write, fields: impl Iterator<Item = String>) -> std::io::Result<()> {

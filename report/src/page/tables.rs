@@ -89,7 +89,7 @@ fn violations(summary: &Summary) -> Vec<Vec<String>> {
             format!("{:.2}", violation.t_s),
             name(&violation.kind),
             drones.join(", "),
-            format!("{:.2}", violation.value_m),
+            if violation.kind.is_distance() { format!("{:.2}", violation.value_m) } else { "–".to_owned() },
         ]
     };
     summary.violations.iter().map(line).collect()

@@ -49,7 +49,8 @@ pub fn line(event: &RunEvent) -> String {
             format!("{}, {}, is over: {detail}", name(kind), target_text(*target))
         }
         EventKind::Violation { kind, drones, value_m } => {
-            format!("{} violated by drones {}: {value_m:.2}", name(kind), list(drones))
+            let value = if kind.is_distance() { format!(": {value_m:.2} m") } else { String::new() };
+            format!("{} violated by drones {}{value}", name(kind), list(drones))
         }
         EventKind::End { outcome, reason, .. } => format!("{}: {reason}", name(outcome)),
     }
@@ -86,7 +87,7 @@ mod tests {
             value_m: 24.5,
         };
         let violation = RunEvent { t_s: 1.0, what: violation };
-        assert_eq!(line(&violation), "separation violated by drones 1, 2: 24.50");
+        assert_eq!(line(&violation), "separation violated by drones 1, 2: 24.50 m");
         assert_eq!(severity(&violation), Severity::Error);
     }
 }
