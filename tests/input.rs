@@ -41,8 +41,31 @@ fn files_that_hold_no_scenario_are_refused() {
     let place = Place::new();
     std::fs::create_dir(place.join("folder.toml")).unwrap();
     assert_refused(&place, &place.run(&["run", "folder.toml"]), &["folder.toml", "directory", "expected"]);
-    assert_refused(&place, &place.run(&["run", "missing.toml"]), &["missing.toml: No such file", "expected"]);
+    assert_refused(&place, &place.run(&["run", "missing.toml"]), &["missing.toml does not exist", "expected"]);
     assert_refused(&place, &place.run(&["run", "/dev/zero"]), &["/dev/zero", "expected"]);
+}
+
+#[test]
+fn what_does_not_exist_or_is_of_another_kind_is_answered_by_what_was_meant() {
+    let place = Place::new();
+    std::fs::create_dir_all(place.join("scenarios/own")).unwrap();
+    std::fs::write(place.join("scenarios/own/short.toml"), SHORT).unwrap();
+    std::fs::write(place.join("many.toml"), "scenario = \"random\"\nseeds = 2\n").unwrap();
+    let short = "did you mean scenarios/own/short.toml?";
+    let cases: [(&[&str], &[&str]); 9] = [
+        (&["run", "scenarios/own/shrot.toml"], &["scenarios/own/shrot.toml does not exist", short]),
+        (&["check", "short.toml"], &["short.toml does not exist", short]),
+        (&["run", "scenario/own/short.toml"], &["the folder scenario does not exist", short]),
+        (&["sweep", "mayn.toml"], &["mayn.toml does not exist", "did you mean many.toml?"]),
+        (&["run", "many.toml"], &["is an experiment", "`skein sweep many.toml` flies it"]),
+        (&["sweep", "scenarios/own/short.toml"], &["is a scenario", "`skein run scenarios/own/short.toml` flies it"]),
+        (&["report", "runs/nothing-7"], &["the folder runs does not exist", "expected the folder of a run"]),
+        (&["rnu", "many.toml"], &["unrecognized", "'run'"]),
+        (&["man", "repotr"], &["`skein` has no command `repotr`", "did you mean `report`?"]),
+    ];
+    for (args, wanted) in cases {
+        assert_refused(&place, &place.run(args), wanted);
+    }
 }
 
 #[test]
@@ -160,7 +183,7 @@ fn check_prints_the_plan_and_starts_nothing() {
 fn help_version_schemas_completions_and_manual_go_to_stdout() {
     let place = Place::new();
     let version = format!("skein {}", env!("CARGO_PKG_VERSION"));
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 10] = [
         (&["--help"], "Exit codes:"),
         (&["run", "--help"], "skein run scenarios/paper/s2-right.toml"),
         (&["check", "--help"], "Example"),
@@ -168,6 +191,8 @@ fn help_version_schemas_completions_and_manual_go_to_stdout() {
         (&["completions", "bash"], "complete -F _skein"),
         (&["completions", "zsh"], "#compdef skein"),
         (&["man"], ".TH skein 1"),
+        (&["man", "run"], ".TH skein-run 1"),
+        (&["man", "bench", "runtime"], ".TH skein-bench-runtime 1"),
         (&["schema", "scenario"], "spacing_m"),
     ];
     for (args, wanted) in cases {

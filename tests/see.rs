@@ -45,11 +45,19 @@ fn a_running_swarm_shows_in_the_terminal() {
     flight.wait_until(0.5);
     let list = place.run(&["topic", "list"]);
     assert!(list.stdout.lines().count() == 4 && list.stdout.contains("skein/downlink"), "{list:?}");
+    let frames = place.run(&["topic", "echo", "air", "--count", "40"]);
+    assert!(!frames.stdout.contains("4294967295") && !frames.stdout.contains("says"), "{frames:?}");
     let poses = place.run(&["topic", "echo", "air", "--drone", "3", "--kind", "pose", "--count", "2"]);
     let lines: Vec<Value> = poses.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines.iter().all(|line| line["drone"] == 3 && line["kind"] == "pose") && lines.len() == 2, "{poses:?}");
+    assert!(lines.iter().all(|line| line["message"]["position_m"].is_array() && line["error"].is_null()), "{poses:?}");
     let top = place.run(&["top", "--once"]);
     assert!(top.stdout.contains("s2-right.") && top.stdout.contains("8/8"), "{top:?}");
+    let top = place.run(&["top", "--json"]).summary();
+    let swarm = &top["swarms"][0];
+    assert_eq!((&swarm["scenario"], &swarm["alive"]), (&"s2-right".into(), &8.into()), "{top}");
+    let members = swarm["groups"].as_array().unwrap().iter().flat_map(|group| group["drones"].as_array().unwrap());
+    assert_eq!((members.count(), swarm["rows"].as_array().map(Vec::len)), (8, Some(8)), "{top}");
     assert!(place.run(&["top"]).stderr.contains("not a terminal"));
     flight.finish();
 }

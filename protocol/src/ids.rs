@@ -4,9 +4,10 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Identifies a drone by its number, from 0.
+/// Identifies a drone by its number, from 0. In JSON, [`DroneId::NONE`] is null.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(from = "Option<u32>", into = "Option<u32>")]
 pub struct DroneId(pub u32);
 
 impl DroneId {
@@ -17,6 +18,18 @@ impl DroneId {
     #[must_use]
     pub fn index(self) -> usize {
         self.0 as usize
+    }
+}
+
+impl From<Option<u32>> for DroneId {
+    fn from(number: Option<u32>) -> Self {
+        number.map_or(Self::NONE, Self)
+    }
+}
+
+impl From<DroneId> for Option<u32> {
+    fn from(drone: DroneId) -> Self {
+        (drone != DroneId::NONE).then_some(drone.0)
     }
 }
 

@@ -1,7 +1,9 @@
 //! The command line.
 
+use crate::missing::nearest;
 use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::error::{ContextKind, ContextValue};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use skein_runtime::{Clock, PilotKind};
 use std::path::PathBuf;
 
@@ -70,8 +72,11 @@ pub(crate) enum Command {
         /// Shell that uses them
         shell: clap_complete::Shell,
     },
-    /// Print the manual page
-    Man,
+    /// Print the manual page of Skein or of a command
+    Man {
+        /// The command, such as `run` or `bench runtime` [default: all of Skein]
+        command: Vec<String>,
+    },
     /// The world process; started by `run`
     #[command(hide = true)]
     World(WorldArgs),
@@ -81,6 +86,18 @@ pub(crate) enum Command {
     /// A peer process of the benchmark's baseline; started by `bench`
     #[command(hide = true)]
     BaselinePeer(skein_bench::runtime::BaselinePeer),
+}
+
+/// Adds the most similar command to the error of an unknown one, where clap finds none: it misses swapped letters in short
+/// words.
+pub(crate) fn suggest(error: &mut clap::Error) {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return };
+    let program = Cli::command();
+    let known = program.get_subcommands().filter(|sub| !sub.is_hide_set()).map(clap::Command::get_name);
+    if let (None, Some(near)) = (error.get(ContextKind::SuggestedSubcommand), nearest(word, known)) {
+        let near = ContextValue::Strings(vec![near.to_owned()]);
+        error.insert(ContextKind::SuggestedSubcommand, near);
+    }
 }
 
 /// The schemas.

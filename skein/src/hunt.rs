@@ -2,6 +2,7 @@
 
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::missing::missing;
 use crate::options::key_value;
 use crate::progress::RunsBar;
 use crate::sweep::jobs;
@@ -52,6 +53,9 @@ pub(crate) struct HuntArgs {
 
 /// Hunts, writes what was found, and prints the report.
 pub(crate) fn hunt(args: &HuntArgs) -> Result<Exit, Failure> {
+    if let Some(text) = missing(&args.source, "expected an experiment or a scenario (TOML)") {
+        return Err(Failure::usage(text));
+    }
     let experiment = hunt::source(&args.source).map_err(Failure::usage)?;
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;

@@ -15,6 +15,7 @@ mod exit;
 mod hunt;
 mod input;
 mod interrupt;
+mod missing;
 mod options;
 mod output;
 mod progress;
@@ -23,6 +24,7 @@ mod report;
 mod reproduce;
 mod roles;
 mod run;
+mod run_folder;
 mod schema;
 mod sweep;
 mod tap;
@@ -37,7 +39,8 @@ use exit::{Exit, Failure};
 fn main() -> std::process::ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => {
+        Err(mut error) => {
+            cli::suggest(&mut error);
             // clap prints help to stdout and errors to stderr. A closed pipe is not an error.
             let printed = error.print().is_ok_and(|()| std::io::Write::flush(&mut std::io::stdout()).is_ok());
             return match (error.use_stderr(), printed) {
@@ -75,7 +78,7 @@ fn dispatch(command: Command) -> Result<Exit, Failure> {
         Command::Clean => clean::clean(),
         Command::Schema { of } => schema::schema(of),
         Command::Completions { shell } => schema::completions(shell),
-        Command::Man => schema::man(),
+        Command::Man { command } => schema::man(&command),
         Command::World(args) => roles::world(&args),
         Command::Drone(args) => roles::drone(&args),
         Command::BaselinePeer(args) => bench::peer(&args),

@@ -4,10 +4,11 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::options::{PinChoice, RuntimeChoice, WaitChoice};
 use crate::output::print_line;
+use crate::run_folder;
 use clap::Args;
 use serde_json::json;
 use skein_protocol::record::Outcome;
-use skein_report::{Recorder, RunCompletion, RunFolder, Summary};
+use skein_report::{Recorder, RunCompletion, Summary};
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{Clock, Launch, PilotKind, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
@@ -33,7 +34,7 @@ pub(crate) struct ReplayArgs {
 
 /// Flies the run again in lockstep, and compares the digests. Writes nothing.
 pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
-    let folder = RunFolder::open(&args.run_dir).map_err(Failure::report)?;
+    let folder = run_folder::open(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let recorded = folder.read_summary().map_err(Failure::report)?;
     let scenario: Scenario = serde_json::from_value(manifest.scenario).map_err(|error| {

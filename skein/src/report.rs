@@ -5,6 +5,7 @@ use crate::cli::ReportArgs;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output;
+use crate::run_folder;
 use skein_report::ReportError::{self, Content, NoSummary};
 use skein_report::{FlightRecord, Interrupted, Manifest, RunFolder, Summary, page, text};
 use std::io::IsTerminal;
@@ -13,7 +14,7 @@ use std::path::PathBuf;
 /// Writes the files of the run again, and prints the summary.
 pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    let folder = RunFolder::open(&args.run_dir).map_err(Failure::report)?;
+    let folder = run_folder::open(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let stop = || interrupt.signal().is_some();
     match write(&folder, &manifest, &Interrupted::when(&stop)) {

@@ -2,6 +2,7 @@
 
 use crate::cli::{Cli, SchemaOf};
 use crate::exit::{Exit, Failure};
+use crate::missing::nearest;
 use crate::output;
 use clap::CommandFactory;
 
@@ -22,11 +23,32 @@ pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> 
     print(&text)
 }
 
-/// Prints the manual page.
-pub(crate) fn man() -> Result<Exit, Failure> {
+/// Prints the manual page of a command, named by its words; without words, of the whole program.
+pub(crate) fn man(words: &[String]) -> Result<Exit, Failure> {
+    let mut command = Cli::command();
+    command.build();
+    let mut name = command.get_name().to_owned();
+    for word in words {
+        let Some(found) = command.find_subcommand(word) else { return Err(unknown(&command, &name, word)) };
+        name = format!("{name}-{}", found.get_name());
+        command = found.clone();
+    }
     let mut text = Vec::new();
-    clap_mangen::Man::new(Cli::command()).render(&mut text).map_err(Failure::environment)?;
+    let page = clap_mangen::Man::new(command).title(&name);
+    page.render(&mut text).map_err(Failure::environment)?;
     print(&text)
+}
+
+/// The failure for a word that is no command of `command`.
+fn unknown(command: &clap::Command, name: &str, word: &str) -> Failure {
+    let known: Vec<&str> =
+        command.get_subcommands().filter(|sub| !sub.is_hide_set()).map(clap::Command::get_name).collect();
+    let hint = match (nearest(word, known.iter().copied()), known.is_empty()) {
+        (Some(near), _) => format!("did you mean `{near}`?"),
+        (None, false) => format!("expected one of {}", known.join(", ")),
+        (None, true) => "it has no commands of its own".to_owned(),
+    };
+    Failure::usage(format!("`{}` has no command `{word}`; {hint}", name.replace('-', " ")))
 }
 
 fn print(text: impl AsRef<[u8]>) -> Result<Exit, Failure> {

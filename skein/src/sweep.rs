@@ -2,6 +2,7 @@
 
 use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
+use crate::input;
 use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
 use crate::output;
@@ -87,6 +88,7 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
 
 /// Flies the runs of an experiment that are not done yet, and prints the results once all are done.
 pub(crate) fn sweep(args: &SweepArgs) -> Result<Exit, Failure> {
+    input::check_experiment(&args.experiment)?;
     let experiment = Experiment::read(&args.experiment).map_err(Failure::usage)?;
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;

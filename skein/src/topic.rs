@@ -12,6 +12,7 @@ use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::record::RecordView;
 use skein_protocol::{Message, SimTime};
+use skein_report::scene::message_json;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -262,12 +263,15 @@ fn frames(frames: &[AirFrame], filter: &Filter, dt_s: f64) -> Vec<Value> {
         if filter.kind.as_ref().is_some_and(|only| *only != kind) {
             continue;
         }
-        let says = Message::decode(&frame.frame).map_or_else(|error| error.to_string(), |said| format!("{said:?}"));
+        let (message, error) = match Message::decode(&frame.frame) {
+            Ok(message) => (message_json(&message), None),
+            Err(error) => (Value::Null, Some(error.to_string())),
+        };
         let sent_s = SimTime((frame.tick as f64 * dt_s * 1e9).round() as i64).secs();
         let topic = if filter.topic == Name::Air { "air" } else { "uplink" };
         lines.push(json!({
             "topic": topic, "kind": kind, "tick": frame.tick, "t_s": sent_s, "drone": frame.source,
-            "sequence": frame.sequence, "bytes": frame.frame.len, "says": says,
+            "sequence": frame.sequence, "bytes": frame.frame.len, "message": message, "error": error,
         }));
     }
     lines

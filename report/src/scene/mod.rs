@@ -4,11 +4,13 @@
 
 pub mod event_text;
 mod frames;
+mod message_json;
 mod observer;
 mod sample;
 mod slots;
 
 pub use crate::scene_facts::{SceneFacts, SetOutline};
+pub use message_json::message_json;
 pub use observer::{MAX_LISTED_DRONES, Observer};
 pub(crate) use sample::rounded;
 pub use sample::{EnergySample, RadioSample, Sample, SentFrame, State};

@@ -1,6 +1,7 @@
 //! `skein top`: the running swarms in the terminal.
 
 mod display_state;
+mod json;
 mod screen;
 mod swarm_view;
 
@@ -20,13 +21,17 @@ use swarm_view::SwarmView;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   skein top
-  skein top --once     watch for one second and print text, for scripts
+  skein top --once     watch for one second and print text
+  skein top --json     the same as one JSON object, for scripts
 
 Keys: up and down select a swarm, d shows its drones, space pauses, q quits.")]
 pub(crate) struct TopArgs {
     /// Watch for one second, print the result as text, and exit
     #[arg(long)]
     pub(crate) once: bool,
+    /// As --once, but print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Time between two redraws.
@@ -39,11 +44,13 @@ const ONCE: Duration = Duration::from_secs(1);
 /// Shows the swarms until the user quits.
 pub(crate) fn top(args: &TopArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    if args.once {
-        return once(&interrupt);
+    if args.once || args.json {
+        return once(args, &interrupt);
     }
     if !std::io::stdout().is_terminal() {
-        return Err(Failure::usage("stdout is not a terminal; `skein top --once` prints text"));
+        return Err(Failure::usage(
+            "stdout is not a terminal; `skein top --once` prints text, `skein top --json` prints JSON",
+        ));
     }
     let mut screen = Screen::open().map_err(Failure::environment)?;
     let (mut swarms, mut shown) = (Vec::new(), DisplayState::default());
@@ -70,7 +77,7 @@ pub(crate) fn top(args: &TopArgs) -> Result<Exit, Failure> {
     Ok(interrupt.signal().map_or(Exit::Reached, Exit::Interrupted))
 }
 
-fn once(interrupt: &Interrupt) -> Result<Exit, Failure> {
+fn once(args: &TopArgs, interrupt: &Interrupt) -> Result<Exit, Failure> {
     let mut swarms = Vec::new();
     attach(&mut swarms)?;
     let since = Instant::now();
@@ -80,6 +87,10 @@ fn once(interrupt: &Interrupt) -> Result<Exit, Failure> {
     }
     for swarm in &mut swarms {
         swarm.turn();
+    }
+    if args.json {
+        output::print_line(json::page(&swarms))?;
+        return Ok(Exit::Reached);
     }
     let lines = page(&swarms, DisplayState { drones: true, ..DisplayState::default() });
     let text: String = lines.iter().map(|line| format!("{}\n", line.text)).collect();

@@ -10,11 +10,12 @@ use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::print_line;
+use crate::run_folder;
 use clap::Args;
 use live_feed::LiveFeed;
 use request::Door;
 use server::Content;
-use skein_report::{Interrupted, RunFolder, page};
+use skein_report::{Interrupted, page};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -70,7 +71,7 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
 }
 
 fn recorded(path: &std::path::Path) -> Result<String, Failure> {
-    let folder = RunFolder::open(path).map_err(Failure::report)?;
+    let folder = run_folder::open(path)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let summary = folder.read_summary().map_err(Failure::report)?;
     page::report(&folder, &manifest, &summary, &Interrupted::never()).map_err(Failure::report)
