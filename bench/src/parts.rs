@@ -9,7 +9,7 @@ use serde::Serialize;
 use skein_leader::split::ArrivalTable;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message, SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec2};
 use skein_runtime::{DroneFactory, PilotKind, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use std::hint::black_box;
@@ -148,8 +148,8 @@ fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, BenchError> {
             let down = world.downlink().view();
             let started = Instant::now();
             for host in &mut hosts {
-                let messages = host.step(&down, &mut scratch, &mut slot, &mut stats);
-                answers.push((slot, messages.iter().map(Message::encode).collect::<Vec<_>>()));
+                let said = host.step(&down, &mut scratch, &mut slot, &mut stats);
+                answers.push((slot, said.frames().collect::<Vec<_>>()));
             }
             spent_s += started.elapsed().as_secs_f64();
             for ((slot, frames), id) in answers.iter().zip(0..) {

@@ -6,10 +6,14 @@ use crate::Vec2;
 use crate::frame::{AirFrame, NEVER_TRANSMITTED};
 use crate::link_faults::LinkFaults;
 use crate::message::Topic;
+use crate::topic_name::OWN_TOPIC;
 use bytemuck::{Pod, Zeroable};
 
 /// Up to this number of frames, examining all of them is cheaper than building the index.
 const FEW: usize = 32;
+
+/// The bit of [`Locality::topics`] for all topics that pilots define.
+const OWN_BIT: u32 = 31;
 
 /// The topics that no drone hears beyond a limited range. [`crate::radio::Radio::locality`] computes them for a radio.
 #[repr(C)]
@@ -17,7 +21,7 @@ const FEW: usize = 32;
 pub struct Locality {
     /// Side of a square cell, m. No frame of these topics is heard from farther away.
     pub cell_m: f64,
-    /// One bit per topic, at the topic's number on the wire. 0: no topic is limited in range, and the index stays empty.
+    /// One bit per built-in topic, at the topic's number on the wire, and one for all topics that pilots define. 0: no topic is limited in range, and the index stays empty.
     pub topics: u32,
     /// Number of frames of other topics. They come first in the order, and every drone must examine them.
     pub everywhere: u32,
@@ -27,13 +31,26 @@ impl Locality {
     /// Whether frames of this kind are limited in range. `kind` is a topic's number on the wire.
     #[must_use]
     pub fn holds(&self, kind: u16) -> bool {
-        kind < 32 && self.topics >> kind & 1 == 1
+        let bit = if kind & OWN_TOPIC != 0 { OWN_BIT } else { u32::from(kind) };
+        (kind & OWN_TOPIC != 0 || bit < OWN_BIT) && self.topics >> bit & 1 == 1
     }
 
     /// Adds a topic that is heard up to `range_m`, m. The cells grow to that size if they are smaller.
     #[must_use]
     pub fn with(self, topic: Topic, range_m: f64) -> Self {
         Self { cell_m: self.cell_m.max(range_m), topics: self.topics | 1 << topic as u16, ..self }
+    }
+
+    /// Adds all topics that pilots define, as [`Locality::with`] does.
+    #[must_use]
+    pub fn with_own(self, range_m: f64) -> Self {
+        Self { cell_m: self.cell_m.max(range_m), topics: self.topics | 1 << OWN_BIT, ..self }
+    }
+
+    /// Whether frames of topics that pilots define are limited in range.
+    #[must_use]
+    pub fn holds_own(&self) -> bool {
+        self.holds(OWN_TOPIC)
     }
 
     fn cell(&self, point: Vec2) -> (i32, i32) {
@@ -153,12 +170,14 @@ mod tests {
     proptest! {
         #[test]
         fn each_frame_in_range_or_of_unlimited_range_is_visited_exactly_once(
-            points in prop::collection::vec(([-400f64..400.0, -400f64..400.0], 1u16..8), 0..300),
+            points in prop::collection::vec(([-400f64..400.0, -400f64..400.0], prop_oneof![1u16..8, OWN_TOPIC..=u16::MAX, Just(32u16)]), 0..300),
+            own in any::<bool>(),
             here in [-500f64..500.0, -500f64..500.0],
         ) {
             let frames: Vec<AirFrame> =
                 points.iter().zip(0..).map(|(&(point, kind), id)| frame(id, point, kind)).collect();
             let locality = Locality::default().with(Topic::Pose, 60.0).with(Topic::Obstacle, 90.0);
+            let locality = if own { locality.with_own(90.0) } else { locality };
             let mut index = FrameIndex::default();
             index.build(locality, &frames);
             prop_assume!(index.locality.topics != 0);
@@ -166,7 +185,8 @@ mod tests {
             index.view().each(here.into(), |place| visits[place] += 1);
             for (frame, visits) in frames.iter().zip(visits) {
                 let near = (frame.position() - Vec2::from(here)).norm() <= 90.0;
-                if near || frame.frame.kind > 2 {
+                let local = frame.frame.kind <= 2 || own && frame.frame.kind & OWN_TOPIC != 0;
+                if near || !local {
                     prop_assert_eq!(visits, 1);
                 }
                 prop_assert!(visits <= 1);

@@ -8,8 +8,9 @@ use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{
     BLOCK_BURSTS, Burst, BurstScope, ChannelModel, Delay, DelayModel, Delivery, DropReason, Link, Radio, Range, Rule,
+    TopicSet,
 };
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, TopicName, Vec2};
 use std::collections::BTreeSet;
 
 /// Number of standard errors by which a statistic may differ from its model.
@@ -360,7 +361,7 @@ fn the_factors_of_the_two_directions_of_a_link_are_inverse() {
 #[test]
 fn the_last_rule_that_covers_a_frame_applies() {
     let rule = |topics: &[Topic], to: &[u32], delay_s| Rule {
-        topics: (!topics.is_empty()).then(|| topics.iter().copied().collect::<BTreeSet<_>>()),
+        topics: (!topics.is_empty()).then(|| topics.iter().copied().collect::<TopicSet>()),
         from: None,
         to: (!to.is_empty()).then(|| to.iter().copied().map(DroneId).collect::<BTreeSet<_>>()),
         channel: ChannelModel { delay: Delay { mean_s: delay_s, ..Delay::default() }, ..ChannelModel::default() },
@@ -380,15 +381,60 @@ fn the_last_rule_that_covers_a_frame_applies() {
     assert_eq!([due_s(pose, 3), due_s(assignment, 3), due_s(unknown, 3)], [2.0, 2.0, 2.0]);
 }
 
+/// A topic that pilots define.
+fn gossip() -> TopicName {
+    TopicName::new("gossip").unwrap()
+}
+
+#[test]
+fn a_rule_names_the_topics_of_pilots_too() {
+    let delayed = |delay_s| {
+        let delay = Delay { mean_s: delay_s, ..Delay::default() };
+        ChannelModel { delay, ..ChannelModel::default() }
+    };
+    let rule = Rule { topics: Some(TopicSet::from_iter([gossip()])), channel: delayed(1.0), ..Rule::default() };
+    let radio = Radio { rules: vec![rule], ..Radio::default() };
+    let due = |topic| radio.outcome(Link { topic, ..link(0, 1, 0) }, Vec2::zeros(), SimTime::ZERO);
+    assert_eq!(due(gossip().kind()), Delivery::Deliver { due: SimTime::from_secs(1.0), again: None });
+    for other in [gossip().kind() ^ 1, Topic::Pose as u16] {
+        assert_eq!(due(other), Delivery::Deliver { due: SimTime::ZERO, again: None });
+    }
+}
+
+#[test]
+fn topics_of_pilots_are_local_if_all_of_them_are_heard_no_farther_than_beacons() {
+    let within = |half_m: Option<f64>| {
+        let range = half_m.map(|half_m| Range { half_m, shadowing_db: 0.0, exponent: 2.0 });
+        ChannelModel { range, ..ChannelModel::default() }
+    };
+    let gossip_range = |half_m| {
+        let topics = Some(TopicSet::from_iter([gossip()]));
+        let rules = vec![Rule { topics, channel: within(half_m), ..Rule::default() }];
+        Radio { channel: within(Some(100.0)), rules, ..Radio::default() }
+    };
+    assert!(gossip_range(Some(80.0)).locality().holds_own());
+    let far = gossip_range(None);
+    assert!(!far.locality().holds_own() && far.locality().holds(Topic::Pose as u16));
+    assert_eq!(far.own_reach_m(DroneId(0)), f64::INFINITY);
+    assert_eq!(gossip_range(Some(120.0)).own_reach_m(DroneId(0)), 120.0);
+    assert_eq!(gossip_range(Some(80.0)).own_reach_m(DroneId(0)), 100.0, "other topics are heard from there");
+}
+
 proptest! {
     #[test]
     fn channels_looked_up_beforehand_give_the_same_delivery(
-        conditions in prop::collection::vec((0u8..128, 0u8..16, 0u8..16), 0..5),
-        kind in 0u16..9,
+        conditions in prop::collection::vec((any::<u8>(), 0u8..16, 0u8..16), 0..5),
+        kind in prop_oneof![0u16..9, Just(gossip().kind()), Just(gossip().kind() ^ 1)],
         (source, destination) in (0u32..4, 0u32..4),
     ) {
         let drones = |bits: u8| (bits > 7).then(|| (0..3).filter(|i| bits >> i & 1 == 1).map(DroneId).collect());
-        let topics = |bits: u8| (bits > 15).then(|| Topic::ALL.into_iter().filter(|&t| bits >> t as u16 & 1 == 1).collect());
+        let topics = |bits: u8| (bits > 15).then(|| {
+            let mut set: TopicSet = Topic::ALL.into_iter().filter(|&t| bits >> t as u16 & 1 == 1).collect();
+            if bits & 1 == 1 {
+                set.insert_own(gossip());
+            }
+            set
+        });
         // Each channel model has its own delay, which identifies it.
         let with_delay = |s: usize| {
             let delay = Delay { mean_s: 1.0 + s as f64, ..Delay::default() };

@@ -14,7 +14,7 @@ use skein_bus::{
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Message, SimTime, Tick};
+use skein_protocol::{DroneId, SimTime, Tick};
 use skein_scenario::Scenario;
 use std::sync::Arc;
 
@@ -180,8 +180,8 @@ impl DroneHandle {
         let said = self.pilot_host.step(down, scratch, &mut self.slot, self.barrier.stats_mut());
         if !said.is_empty() {
             let encode_all = |out: &mut [Frame]| {
-                for (frame, message) in out.iter_mut().zip(said) {
-                    *frame = Message::encode(message);
+                for (place, frame) in out.iter_mut().zip(said.frames()) {
+                    *place = frame;
                 }
             };
             match uplink.send(header, said.len(), encode_all) {

@@ -11,7 +11,7 @@ use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::RecordSink;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message, SimTime};
+use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
@@ -155,6 +155,6 @@ impl InlineDrone {
         let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
         let said = pilot_host.step(down, scratch, &mut self.slot, &mut self.stats);
         self.frames.clear();
-        self.frames.extend(said.iter().map(Message::encode));
+        self.frames.extend(said.frames());
     }
 }

@@ -1,11 +1,12 @@
 //! A pilot with its radio receiver, as both runtimes step it.
 
 use crate::radio_receiver::{Pending, RadioReceiver};
+use crate::said::Said;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
-use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message, SimTime};
+use skein_protocol::slot::{LinkStats, SLOT_DONE, Slot};
+use skein_protocol::{DroneId, Message, SimTime, flag};
 use std::sync::Arc;
 
 /// Memory for the work of one tick. Drones that are stepped one after the other share it. It therefore stays in the cache,
@@ -53,23 +54,23 @@ impl PilotHost {
     }
 
     /// Receives the frames of the newest downlink and steps the pilot on it. Fills the drone's slot, counts in `stats`, and
-    /// returns the messages to send, one frame per message.
+    /// returns what to send.
     pub fn step<'s>(
         &mut self,
         down: &DownlinkView<'_>,
         scratch: &'s mut StepScratch,
         slot: &mut Slot,
         stats: &mut LinkStats,
-    ) -> &'s [Message] {
+    ) -> Said<'s> {
         scratch.arrived.clear();
         scratch.out.clear();
-        let Some(senses) = down.senses(self.params.me) else { return scratch.out.messages() };
+        let Some(senses) = down.senses(self.params.me) else { return Said::of(&scratch.out) };
         self.radio_receiver.receive(down, senses.now, &mut scratch.arrived, stats);
         let mut heard = emptied(std::mem::take(&mut scratch.heard));
         self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
         let command = self.pilot.step(&senses, &Inbox::new(&heard), &mut scratch.out);
         scratch.heard = emptied(heard);
-        self.frames_total += scratch.out.messages().len() as u64;
+        self.frames_total += Said::of(&scratch.out).len() as u64;
         self.count_ages(&senses, scratch, stats);
         let tally = self.radio_receiver.tally();
         *slot = Slot {
@@ -81,7 +82,8 @@ impl PilotHost {
             ..Slot::default()
         };
         self.fill(&senses, &command, slot);
-        scratch.out.messages()
+        slot.flags |= flag(scratch.out.is_done(), SLOT_DONE);
+        Said::of(&scratch.out)
     }
 
     /// Writes a command and its status into the slot.

@@ -42,6 +42,8 @@ pub(crate) struct RadioReceiver {
     channels: ReceiverChannels,
     /// Greatest distance from which it receives each topic, m.
     reach_m: [f64; Topic::ALL.len()],
+    /// Greatest distance from which it receives any topic that pilots define, m.
+    own_reach_m: f64,
     /// Frames that are due in a later tick than they came in, the earliest first.
     pending: BinaryHeap<Reverse<Pending>>,
     /// Copies of the pending frames.
@@ -70,7 +72,8 @@ impl RadioReceiver {
         Self {
             me,
             dt_ns,
-            reach_m: Topic::ALL.map(|topic| radio.reach_m(topic, me)),
+            reach_m: Topic::ALL.map(|topic| radio.reach_m(topic as u16, me)),
+            own_reach_m: radio.own_reach_m(me),
             channels: radio.channels_at(me),
             radio,
             pending: BinaryHeap::new(),
@@ -113,7 +116,8 @@ impl RadioReceiver {
     /// Whether this drone receives the topics that are sorted by place from nearby cells only.
     fn hears_nearby(&self, locality: &Locality) -> bool {
         let within = |(topic, reach_m): (Topic, f64)| !locality.holds(topic as u16) || reach_m <= locality.cell_m;
-        locality.topics != 0 && Topic::ALL.into_iter().zip(self.reach_m).all(within)
+        let own = !locality.holds_own() || self.own_reach_m <= locality.cell_m;
+        locality.topics != 0 && own && Topic::ALL.into_iter().zip(self.reach_m).all(within)
     }
 
     /// Decides about one frame. Returns whether there is such a frame and another drone has sent it.

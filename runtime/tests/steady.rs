@@ -4,8 +4,8 @@
 
 mod support;
 
+use skein_protocol::DroneId;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message};
 use skein_runtime::{PilotHost, StepScratch, mission};
 use skein_scenario::Scenario;
 use skein_world::World;
@@ -84,10 +84,10 @@ impl Swarm {
         let mut said = Vec::with_capacity(self.pilot_hosts.len());
         for (pilot_host, slot) in self.pilot_hosts.iter_mut().zip(&mut self.slots) {
             let before = COUNT.get();
-            let messages = pilot_host.step(&down.view(), &mut self.scratch, slot, &mut self.stats);
+            let sent = pilot_host.step(&down.view(), &mut self.scratch, slot, &mut self.stats);
             count(0, before);
             // Encoding is the runtime's part, and does not count.
-            said.push(messages.iter().map(Message::encode).collect::<Vec<_>>());
+            said.push(sent.frames().collect::<Vec<_>>());
         }
         let before = COUNT.get();
         for ((slot, frames), id) in self.slots.iter().zip(&said).zip(0..) {

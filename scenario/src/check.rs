@@ -241,7 +241,8 @@ fn join(key: &str, name: &str) -> String {
     if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") }
 }
 
-fn did_you_mean<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> String {
+/// A question for the most similar word, or nothing.
+pub(crate) fn did_you_mean<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> String {
     closest(found, words).map(|word| format!("; did you mean `{word}`?")).unwrap_or_default()
 }
 

@@ -76,6 +76,6 @@ pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::ScenarioSource;
 pub use pilots::{DEFAULT_PILOT, FreeTable, PilotKeys};
-pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys, TopicKey};
+pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys};
 pub use reference::{KeyDoc, keys, markdown, schema};
 pub use strategy::{Strategy, StrategyError};

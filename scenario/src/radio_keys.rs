@@ -146,9 +146,12 @@ pub enum BurstScope {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RuleKeys {
-    /// Condition: the frame has one of these topics; absent: any topic.
+    /// Condition: the frame has one of these topics; absent: any topic. The built-in topics are `"pose"` (the position of a drone
+    /// and what it obeys), `"obstacle"` (one that a drone sensed), `"leadership"` (a claim to lead, or a heartbeat), `"plan"`
+    /// (of a leader), `"assignment"` (one drone's part in a plan), `"arrivals"` (when one member of a group can reach the next
+    /// gate) and `"passed"` (which drones are past which obstacle set). All others are those that a `[[pilot]]` declares.
     #[schemars(length(min = 1, max = 16))]
-    pub topics: Option<Vec<TopicKey>>,
+    pub topics: Option<Vec<String>>,
     /// Condition: one of these drones sends the frame; absent: any drone.
     #[schemars(length(min = 1, max = MAX_DRONES), inner(range(min = 0, max = MAX_DRONES - 1)))]
     pub from: Option<Vec<u32>>,
@@ -177,24 +180,4 @@ pub struct RuleKeys {
     pub duplicate: Option<f64>,
     /// Instead of `radio.burst`. With a `share` of 0 there are no bursts.
     pub burst: Option<BurstKeys>,
-}
-
-/// The topic of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TopicKey {
-    /// The position of a drone and what it obeys.
-    Pose,
-    /// An obstacle that a drone sensed.
-    Obstacle,
-    /// A claim to lead, or a heartbeat.
-    Leadership,
-    /// The plan of a leader.
-    Plan,
-    /// One drone's assignment in a plan.
-    Assignment,
-    /// When one member of a group can reach the next gate.
-    Arrivals,
-    /// Which drones are past which obstacle set.
-    Passed,
 }

@@ -3,7 +3,7 @@
 
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Burst, BurstScope, ChannelModel, Delay, DelayModel, Link, Radio, Range, SharedChannel};
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{DroneId, TopicName, Vec2};
 use skein_scenario::{Preset, Scenario, ScenarioErrors, ScenarioSource};
 
 const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "r.toml", stem: "r" };
@@ -84,6 +84,23 @@ fn the_last_matching_rule_counts_and_inherits_the_rest() {
 }
 
 #[test]
+fn a_rule_names_topics_that_pilots_declare() {
+    let with = |rule: &str| format!("[[radio.rule]]\n{rule}\n[[pilot]]\ntopics = [\"gossip\"]");
+    let radio = parse(&with("topics = [\"gossip\", \"pose\"]\nloss = 1"), &[]).radio();
+    let gossip = Link { topic: TopicName::new("gossip").unwrap().kind(), ..link(0, 1, Topic::Pose) };
+    assert!(radio.rules[0].covers(gossip) && radio.rules[0].covers(link(0, 1, Topic::Pose)));
+    assert!(!radio.rules[0].covers(link(0, 1, Topic::Plan)));
+    let message = try_parse(&with("topics = [\"gosip\"]\nloss = 1"), &[]).unwrap_err().to_string();
+    assert!(message.starts_with("r.toml:5:11: radio.rule.0.topics.0: found \"gosip\""), "{message}");
+    assert!(message.ends_with("; did you mean `gossip`?"), "{message}");
+    let message = try_parse("[[pilot]]\ntopics = [\"pose\"]", &[]).unwrap_err().to_string();
+    assert!(
+        message.contains("r.toml:5:11: pilot.0.topics.0: the topic name \"pose\" is that of a built-in"),
+        "{message}"
+    );
+}
+
+#[test]
 fn invalid_keys_are_rejected_with_their_place() {
     let rejected = [
         ("preset = \"wfi\"", "r.toml:4:10: radio.preset: found \"wfi\", expected one of \"ideal\", \"wifi\""),
@@ -104,10 +121,13 @@ fn invalid_keys_are_rejected_with_their_place() {
         ("burst = 0.3", "radio.burst: found 0.3, expected a table"),
         ("bursts = 0.3", "radio.bursts: unknown key"),
         (
-            "[[radio.rule]]\ntopics = [\"poses\"]",
+            "[[radio.rule]]\ntopics = [\"poses\"]\nloss = 1",
             "r.toml:5:11: radio.rule.0.topics.0: found \"poses\", expected one of \"pose\"",
         ),
-        ("[[radio.rule]]\ntopics = []", "radio.rule.0.topics: found an array of 0, expected an array of 1 to 16 words"),
+        (
+            "[[radio.rule]]\ntopics = []",
+            "radio.rule.0.topics: found an array of 0, expected an array of 1 to 16 strings",
+        ),
         ("[[radio.rule]]\nto = [0]", "r.toml:4:1: radio.rule.0: sets nothing: expected delay_s"),
         (
             "[[radio.rule]]\nloss = 1\nfrom = [0, 8]",

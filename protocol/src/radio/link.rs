@@ -2,7 +2,6 @@
 
 use crate::frame::AirFrame;
 use crate::ids::DroneId;
-use crate::message::Topic;
 
 /// Identifies one frame at one of its receivers. It is part of the key of every random number about that reception.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +21,5 @@ impl Link {
     #[must_use]
     pub fn of(frame: &AirFrame, destination: DroneId) -> Self {
         Self { source: frame.source, destination, topic: frame.frame.kind, sequence: frame.sequence }
-    }
-
-    /// The frame's topic; `None` if its kind is unknown.
-    #[must_use]
-    pub fn topic(&self) -> Option<Topic> {
-        Topic::from_wire(self.topic)
     }
 }

@@ -9,6 +9,7 @@ mod key;
 mod link;
 mod rule;
 mod shared_channel;
+mod topic_set;
 
 pub use crate::drop_reason::{DROP_REASONS, DropReason};
 pub use crate::frame::NEVER_TRANSMITTED;
@@ -18,6 +19,7 @@ pub use delivery::Delivery;
 pub use link::Link;
 pub use rule::Rule;
 pub use shared_channel::{ChannelQueue, HEAD_BYTES, SharedChannel};
+pub use topic_set::TopicSet;
 
 use crate::Vec2;
 use crate::frame::AirFrame;
@@ -26,6 +28,7 @@ use crate::message::Topic;
 use crate::nearby::Locality;
 use crate::record::RecordView;
 use crate::time::SimTime;
+use crate::topic_name::OWN_TOPIC;
 use key::KeyedRng;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +57,8 @@ pub struct ReceiverChannels {
     receiver: DroneId,
     /// For each topic, the index of the rule that applies. `None`: the rule depends on the sender.
     places: [Option<u16>; Topic::ALL.len()],
+    /// The same for all topics that pilots define. `None`: it depends on the sender or on the topic.
+    own: Option<u16>,
 }
 
 impl Radio {
@@ -104,7 +109,10 @@ impl Radio {
     #[must_use]
     pub fn delivery_at(&self, channels: &ReceiverChannels, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, channels.receiver);
-        let place = channels.places.get(usize::from(link.topic).wrapping_sub(1)).copied().flatten();
+        let place = match channels.places.get(usize::from(link.topic).wrapping_sub(1)) {
+            Some(place) => *place,
+            None => channels.own.filter(|_| link.topic & OWN_TOPIC != 0),
+        };
         let known = place.and_then(|place| match place {
             GENERAL => Some(&self.channel),
             rule => self.rules.get(usize::from(rule)).map(|rule| &rule.channel),
@@ -131,12 +139,14 @@ impl Radio {
     #[must_use]
     pub fn channels_at(&self, receiver: DroneId) -> ReceiverChannels {
         let applies =
-            |rule: &Rule, topic| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
-        let place = |topic| {
-            let Some(last) = self.rules.iter().rposition(|rule| applies(rule, topic)) else { return Some(GENERAL) };
+            |rule: &Rule, kind| rule.is_about(kind) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
+        let place = |kind| {
+            let Some(last) = self.rules.iter().rposition(|rule| applies(rule, kind)) else { return Some(GENERAL) };
             u16::try_from(last).ok().filter(|&place| place != GENERAL && self.rules[last].from.is_none())
         };
-        ReceiverChannels { receiver, places: Topic::ALL.map(place) }
+        let (named, other) = self.own_kinds();
+        let own = if named.is_empty() { place(other) } else { None };
+        ReceiverChannels { receiver, places: Topic::ALL.map(|topic| place(topic as u16)), own }
     }
 
     /// Recomputes the outcome of every frame in a tick's record at every other drone that was alive at the end of the tick.
@@ -158,20 +168,40 @@ impl Radio {
     /// compare its own [`Radio::reach_m`].
     #[must_use]
     pub fn locality(&self) -> Locality {
-        let reach_m = |topic| {
-            let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(topic);
+        let reach_m = |kind| {
+            let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(kind);
             self.rules.iter().rev().find(general).map_or(&self.channel, |rule| &rule.channel).reach_m()
         };
-        let cell_m = reach_m(Topic::Pose);
-        let local = |topic: &Topic| cell_m.is_finite() && reach_m(*topic) <= cell_m;
-        Topic::ALL.into_iter().filter(local).fold(Locality::default(), |locality, topic| locality.with(topic, cell_m))
+        let cell_m = reach_m(Topic::Pose as u16);
+        let local = |kind: u16| cell_m.is_finite() && reach_m(kind) <= cell_m;
+        let built_in = Topic::ALL.into_iter().filter(|topic| local(*topic as u16));
+        let locality = built_in.fold(Locality::default(), |locality, topic| locality.with(topic, cell_m));
+        let (mut named, other) = self.own_kinds();
+        named.push(other);
+        if named.into_iter().all(local) { locality.with_own(cell_m) } else { locality }
     }
 
-    /// Greatest distance at which `receiver` can hear a topic from any sender, m; infinite without a hard range.
+    /// Greatest distance at which `receiver` can hear any topic that pilots define, m; infinite without a hard range.
     #[must_use]
-    pub fn reach_m(&self, topic: Topic, receiver: DroneId) -> f64 {
+    pub fn own_reach_m(&self, receiver: DroneId) -> f64 {
+        let (named, other) = self.own_kinds();
+        named.into_iter().map(|kind| self.reach_m(kind, receiver)).fold(self.reach_m(other, receiver), f64::max)
+    }
+
+    /// The numbers of the topics of pilots that rules name, and one that no rule names. It stands for all others.
+    fn own_kinds(&self) -> (Vec<u16>, u16) {
+        let named = self.rules.iter().filter_map(|rule| rule.topics.as_ref()).flat_map(TopicSet::own_kinds);
+        let named: Vec<u16> = named.collect();
+        let other = (OWN_TOPIC..=u16::MAX).find(|kind| !named.contains(kind)).unwrap_or(OWN_TOPIC);
+        (named, other)
+    }
+
+    /// Greatest distance at which `receiver` can hear the topic of this number on the wire from any sender, m; infinite
+    /// without a hard range.
+    #[must_use]
+    pub fn reach_m(&self, kind: u16, receiver: DroneId) -> f64 {
         let mut reach_m = 0f64;
-        let applies = |rule: &&Rule| rule.is_about(topic) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
+        let applies = |rule: &&Rule| rule.is_about(kind) && rule.to.as_ref().is_none_or(|to| to.contains(&receiver));
         for rule in self.rules.iter().rev().filter(applies) {
             reach_m = reach_m.max(rule.channel.reach_m());
             if rule.from.is_none() {

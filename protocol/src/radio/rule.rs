@@ -2,8 +2,8 @@
 
 use super::channel_model::ChannelModel;
 use super::link::Link;
+use super::topic_set::TopicSet;
 use crate::ids::DroneId;
-use crate::message::Topic;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
     /// Topics of the frames; `None`: all topics.
-    pub topics: Option<BTreeSet<Topic>>,
+    pub topics: Option<TopicSet>,
     /// Drones that send the frames; `None`: all drones.
     pub from: Option<BTreeSet<DroneId>>,
     /// Drones that receive the frames; `None`: all drones.
@@ -22,10 +22,10 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// Whether the rule's topics include this one, regardless of senders and receivers.
+    /// Whether the rule's topics include that of this number on the wire, regardless of senders and receivers.
     #[must_use]
-    pub fn is_about(&self, topic: Topic) -> bool {
-        self.topics.as_ref().is_none_or(|set| set.contains(&topic))
+    pub fn is_about(&self, kind: u16) -> bool {
+        self.topics.as_ref().is_none_or(|set| set.contains(kind))
     }
 
     /// Whether the rule covers this frame at this receiver. A frame of an unknown kind has no topic, so a rule with a list of
@@ -33,8 +33,6 @@ impl Rule {
     #[must_use]
     pub fn covers(&self, link: Link) -> bool {
         let includes = |set: &Option<BTreeSet<DroneId>>, id| set.as_ref().is_none_or(|set| set.contains(&id));
-        includes(&self.from, link.source)
-            && includes(&self.to, link.destination)
-            && self.topics.as_ref().is_none_or(|set| link.topic().is_some_and(|topic| set.contains(&topic)))
+        includes(&self.from, link.source) && includes(&self.to, link.destination) && self.is_about(link.topic)
     }
 }

@@ -4,7 +4,7 @@
 use skein_protocol::frame::Frame;
 use skein_protocol::record::FaultKind;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, Message, SimTime, Tick};
+use skein_protocol::{DroneId, SimTime, Tick};
 use skein_runtime::{DroneFactory, PilotHost, PilotKind, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
@@ -41,7 +41,7 @@ pub(crate) fn fly_to_the_end(scenario: &Scenario, killed: Option<(DroneId, Tick)
         for (pilot_host, id) in pilot_hosts.iter_mut().zip(0..).filter(|(_, id)| !is_dead(*id)) {
             let mut slot = Slot::default();
             let said = pilot_host.step(&down, &mut scratch, &mut slot, &mut stats);
-            answers.push((DroneId(id), slot, said.iter().map(Message::encode).collect()));
+            answers.push((DroneId(id), slot, said.frames().collect()));
         }
         if let Some((dead, _)) = killed.filter(|(_, at)| tick == *at) {
             world.mark_dead(dead, FaultKind::Kill, false, "");
