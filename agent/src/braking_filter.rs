@@ -13,6 +13,42 @@
 //! Braking paths are compared at ticks whose number is a multiple of a stride. These ticks are the same for all drones, so the
 //! invariant is exact there. [`BrakingFilterParams::margin_m`] covers the loss of distance between the compared ticks.
 
+//!
+//! # Example
+//!
+//! Two drones fly at each other at 10 m/s and wish to accelerate. The rule makes this one brake in time.
+//!
+//! ```
+//! use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
+//! use skein_protocol::Vec2;
+//!
+//! let mut filter = BrakingFilter::new(BrakingFilterParams {
+//!     safe_distance_m: 10.0,
+//!     clearance_m: 5.0,
+//!     acceleration_max_mps2: 5.0,
+//!     braking_mps2: 5.0,
+//!     speed_max_mps: 20.0,
+//!     dt_s: 0.02,
+//! });
+//! let (position, velocity) = (Vec2::zeros(), Vec2::new(10.0, 0.0));
+//! let own = OwnMotion {
+//!     tick: 0,
+//!     sensed_position: position,
+//!     sensed_velocity: velocity,
+//!     position,
+//!     velocity,
+//!     speed_limit_mps: 20.0,
+//!     lag: 0,
+//! };
+//! let wish = Vec2::new(5.0, 0.0);
+//! let mut command = |ahead_m: f64| {
+//!     let other = Moving { position_m: Vec2::new(ahead_m, 0.0), velocity_mps: -velocity };
+//!     filter.filter(&own, wish, [].into_iter(), [other].into_iter())
+//! };
+//! assert_eq!(command(500.0), wish, "there is room");
+//! assert!(command(30.15).x < -4.0, "each needs 10 m to stop, and 10 m must remain");
+//! ```
+
 use crate::braking_path::{BrakingLaw, BrakingPath};
 use crate::program::{HalfPlane, Program};
 use skein_protocol::Vec2;

@@ -1,6 +1,24 @@
 //! The drone's own path around all obstacles that it knows of. The path leads to the drone's target: a slot, or the end of its
 //! route past an obstacle set.
 
+//!
+//! # Example
+//!
+//! ```
+//! use skein_agent::navigator::{Heading, Navigator};
+//! use skein_protocol::Vec2;
+//! use skein_protocol::shape::ConvexShape;
+//!
+//! // Paths keep 5 m from obstacles, and at least 3 m where they must.
+//! let mut navigator = Navigator::new(3.0, 5.0);
+//! let tree = ConvexShape::circle(Vec2::new(50.0, 1.0), 4.0)?;
+//! navigator.learn(1, [&tree].into_iter());
+//! let goal = Vec2::new(100.0, 0.0);
+//! let Heading::Via(corner) = navigator.head(0, Vec2::zeros(), goal) else { panic!("the tree is in the way") };
+//! assert!(corner.y < -2.0, "the shorter way is on the right");
+//! # Ok::<(), skein_protocol::shape::ShapeError>(())
+//! ```
+
 use crate::visibility::VisibilityMap;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;

@@ -11,6 +11,27 @@
 //! A ballot has only one leader by construction: it names its claimant, and the launcher gives each start of a process an
 //! incarnation of its own.
 
+//!
+//! # Example
+//!
+//! A drone that hears nobody asks for a pre-vote, waits for a rejection, and then leads.
+//!
+//! ```
+//! use skein_leader::election::{Election, ElectionParams, Input};
+//! use skein_protocol::{DroneId, SimTime};
+//!
+//! let params = ElectionParams { heartbeat_period_s: 0.2, leader_timeout_s: 1.0, wait_s: 0.2 };
+//! let mut election = Election::new(DroneId(3), 1, params, SimTime::ZERO);
+//! let mut said = Vec::new();
+//! for tick in 0..200 {
+//!     let now = SimTime::from_secs(f64::from(tick) * 0.02);
+//!     said.extend(election.handle(now, 0, Input::Tick { closer: 0, delay_s: 0.02 }));
+//! }
+//! assert!(election.leads());
+//! assert_eq!(election.obeyed().claimant, DroneId(3));
+//! assert!(said.len() > 2, "a pre-vote, a claim and heartbeats");
+//! ```
+
 use crate::adaptive_timeout::AdaptiveTimeout;
 use crate::tuning::{NEWCOMER_TIMEOUTS, PARTED_TIMEOUTS, SAME_BEAT};
 use skein_protocol::payload::Leadership;

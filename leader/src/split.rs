@@ -6,6 +6,22 @@
 //! that reach it, the one of least total arrival is taken. This is exact and takes polynomial time. Times are counted in
 //! whole microseconds, so that ties are exact.
 
+//!
+//! # Example
+//!
+//! Three drones, two routes. All would arrive first on route 0, but they would have to queue there.
+//!
+//! ```
+//! use skein_leader::split::ArrivalTable;
+//!
+//! let arrivals = [vec![10.0, 11.0], vec![10.0, 11.0], vec![10.0, 14.0]];
+//! let table = ArrivalTable::new(&arrivals, &[2.0, 2.0])?;
+//! let best = table.split();
+//! assert_eq!(best.makespan_s, 12.0);
+//! assert_eq!(table.shortest().makespan_s, 14.0);
+//! # Ok::<(), skein_leader::split::SplitError>(())
+//! ```
+
 use crate::matroid_intersection::{Cost, place};
 use thiserror::Error;
 
