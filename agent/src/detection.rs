@@ -31,7 +31,7 @@ impl Braking {
     /// has to keep `clearance_m` away from the obstacle.
     #[must_use]
     pub fn detect(&self, position: Vec2, velocity: Vec2, obstacle: &SensedObstacle, clearance_m: f64) -> Detection {
-        let (to, speed) = (Vec2::from(obstacle.nearest_m) - position, velocity.norm());
+        let (to, speed) = (obstacle.nearest() - position, velocity.norm());
         let heading = if speed > 0.0 { velocity } else { Vec2::x() };
         Detection {
             distance_m: obstacle.distance_m,
@@ -80,8 +80,8 @@ mod tests {
     #[test]
     fn a_detection_has_distance_bearing_time_to_impact_and_danger() {
         let braking = Braking { deceleration_mps2: 5.0, reaction_time_s: 0.0 };
-        let obstacle = |nearest_m: [f64; 2]| {
-            let distance_m = Vec2::from(nearest_m).norm();
+        let obstacle = |[x, y]: [f64; 2]| {
+            let (nearest_m, distance_m) = ([x, y, 0.0], Vec2::new(x, y).norm());
             SensedObstacle { nearest_m, distance_m, shape: 0, reserved: 0 }
         };
         let detect = |nearest_m, velocity| braking.detect(Vec2::zeros(), velocity, &obstacle(nearest_m), 15.0);

@@ -5,7 +5,7 @@ use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::peers::{Peers, extrapolated};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
-use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, PlanStamp, SimTime};
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,8 +53,8 @@ impl NeighbourTable {
         for sensed in senses.neighbours {
             self.neighbours.push(Neighbour {
                 id: sensed.drone,
-                position_m: sensed.position_m.into(),
-                velocity_mps: sensed.velocity_mps.into(),
+                position_m: sensed.position(),
+                velocity_mps: sensed.velocity(),
                 age_s: 0.0,
                 sensed: true,
                 least_m: 0.0,
@@ -64,11 +64,11 @@ impl NeighbourTable {
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         for (id, pose) in view.peers.living(view.now) {
-            let position_m = extrapolated(pose, senses.now) - senses.position;
+            let position_m = extrapolated(pose, senses.now) - senses.position();
             if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
             }
-            let velocity_mps = Vec2::from(pose.velocity_mps) - senses.velocity;
+            let velocity_mps = pose.velocity() - senses.velocity();
             let (age_s, share) = (senses.now.since(pose.stamp), self.share(view, id));
             self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
         }
@@ -123,8 +123,8 @@ mod tests {
             peers.hear(stamp, DroneId(1), Pose { stamp, queue, ..Pose::zeroed() });
         }
         let neighbours =
-            [SensedNeighbour { position_m: [40.0, 0.0], velocity_mps: [0.0; 2], drone: DroneId(1), reserved: 0 }];
-        let senses = Senses::new((500, now), (Vec2::zeros(), Vec2::zeros()), &[], &neighbours, &[]);
+            [SensedNeighbour { position_m: [40.0, 0.0, 0.0], velocity_mps: [0.0; 3], drone: DroneId(1), reserved: 0 }];
+        let senses = Senses::new((500, now), ([0.0; 3], [0.0; 3]), &[], &neighbours, &[]);
         let mut places = [QueuePlace::default(); MAX_PLACES];
         places[0] = mine.map_or_else(QueuePlace::default, place);
         let mut table = NeighbourTable::new(PARAMS);

@@ -1,8 +1,8 @@
 //! The queue of drones on a shared route. The foremost drone has precedence; the others merge behind it (paper, results).
 
 use skein_leader::peers::Peers;
+use skein_protocol::SimTime;
 use skein_protocol::payload::QueuePlace;
-use skein_protocol::{SimTime, Vec2};
 
 /// A drone ahead in a queue, as far as this drone knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct QueueParams {
 pub fn ahead_of(mine: QueuePlace, peers: &Peers, now: SimTime, queue: &mut Vec<Ahead>) {
     queue.clear();
     for (_, pose) in peers.living(now) {
-        let flown_m = Vec2::from(pose.velocity_mps).norm() * now.since(pose.stamp);
+        let flown_m = pose.velocity().norm() * now.since(pose.stamp);
         let same = |place: &&QueuePlace| place.set == mine.set && place.route == mine.route && place.rank < mine.rank;
         queue.extend(
             pose.queue.iter().filter(same).map(|p| Ahead { rank: p.rank, remaining_m: p.remaining_m - flown_m }),

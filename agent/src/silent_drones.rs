@@ -19,10 +19,10 @@ impl SilentDrones {
         let braking = 2.0 * braking_mps2;
         let ranged = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
         self.positions.clear();
-        self.positions.extend(ranged.map(|n| senses.position + Vec2::from(n.position_m)));
+        self.positions.extend(ranged.map(|n| senses.position() + n.position()));
         for (_, pose) in peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id)) {
-            let velocity = Vec2::from(pose.velocity_mps);
-            self.positions.push(Vec2::from(pose.position_m) + velocity * (velocity.norm() / braking));
+            let velocity = pose.velocity();
+            self.positions.push(pose.position() + velocity * (velocity.norm() / braking));
         }
     }
 

@@ -31,7 +31,7 @@ use skein_leader::routes::Routes;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{MAX_PLACES, Plan, QueuePlace, set_tag};
-use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
 
 /// The pilot of one drone, composed of machines that each own their state.
 #[derive(Clone, Debug)]
@@ -202,7 +202,7 @@ impl SwarmPilot {
         let planner = &self.params.planner;
         let routes = Routes::new(&shapes, &planner.routes);
         let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: planner.course_y_m };
-        if let Some(route) = EmergencyRoute::shortest(tag, routes, senses.position, &flight) {
+        if let Some(route) = EmergencyRoute::shortest(tag, routes, senses.position(), &flight) {
             self.route.set_emergency(route);
         }
     }
@@ -211,7 +211,7 @@ impl SwarmPilot {
     /// least time to impact.
     fn urgent_obstacle(&self, senses: &Senses<'_>) -> Option<ObstacleId> {
         let (me, clearance_m) = (self.params.me, self.params.safety.clearance_m);
-        let detect = |o| self.params.braking.detect(senses.position, senses.velocity, o, clearance_m);
+        let detect = |o| self.params.braking.detect(senses.position(), senses.velocity(), o, clearance_m);
         let near = senses.obstacles.iter().filter_map(|o| Some((detect(o), senses.shape(o)?.id)));
         let planned = |id| self.leading.planned_sets().iter().any(|s| s.ids.contains(&id) && s.parts.contains(me));
         let past = |id| self.leading.obstacles().has_passed(me, id);
@@ -226,7 +226,7 @@ impl SwarmPilot {
         if self.route.is_blocked() {
             return Vec2::new(-BACK_OUT_SPEED * guidance.speed_mps, 0.0);
         }
-        if let Some(steering) = self.route.steering(senses.position) {
+        if let Some(steering) = self.route.steering(senses.position()) {
             let direction = self.detour(senses, steering.total_m).unwrap_or(steering.direction);
             return direction * self.queue_speed_mps(senses.now, open);
         }
@@ -249,7 +249,7 @@ impl SwarmPilot {
             }
             _ => {
                 let peers = self.leading.peers();
-                Vec2::new(self.lone_flight.speed_mps(senses.now, senses.position, peers, &guidance), 0.0)
+                Vec2::new(self.lone_flight.speed_mps(senses.now, senses.position(), peers, &guidance), 0.0)
             }
         }
     }
@@ -260,32 +260,32 @@ impl SwarmPilot {
     fn detour(&mut self, senses: &Senses<'_>, route_m: f64) -> Option<Vec2> {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
-            let blocked = self.route.end_if_blocked(senses.position, |a, b| self.navigator.is_free(a, b));
+            let blocked = self.route.end_if_blocked(senses.position(), |a, b| self.navigator.is_free(a, b));
             let begun = self.detour_to.filter(|to| self.route.end() == Some(*to));
-            let shorter = || self.navigator.left_m(senses.position).is_some_and(|left_m| left_m < route_m);
+            let shorter = || self.navigator.left_m(senses.position()).is_some_and(|left_m| left_m < route_m);
             let is_clear = |a, b| self.navigator.is_clear(a, b);
-            let near = || self.route.end_if_blocked(senses.position, is_clear).is_some();
+            let near = || self.route.end_if_blocked(senses.position(), is_clear).is_some();
             self.detour_to = blocked.or_else(|| begun.filter(|_| shorter() && near()));
         }
         let target = self.detour_to?;
-        let next = match self.navigator.head(senses.tick, senses.position, target) {
+        let next = match self.navigator.head(senses.tick, senses.position(), target) {
             Heading::Straight => target,
             Heading::Via(corner) => corner,
             Heading::NoPath => return None,
         };
-        (next - senses.position).try_normalize(1e-9)
+        (next - senses.position()).try_normalize(1e-9)
     }
 
     /// The velocity that takes the drone to a slot, round whatever is in the way, m/s.
     fn velocity_to_slot(&mut self, senses: &Senses<'_>, slot: Vec2, slot_velocity: Vec2) -> Vec2 {
         self.update_map();
         let guidance = self.params.guidance;
-        match self.navigator.head(senses.tick, senses.position, slot) {
+        match self.navigator.head(senses.tick, senses.position(), slot) {
             Heading::Via(corner) => {
                 let speed_mps = guidance.speed_mps.max(slot_velocity.norm()).min(guidance.reform_speed_max_mps);
-                (corner - senses.position).try_normalize(1e-9).unwrap_or_default() * speed_mps
+                (corner - senses.position()).try_normalize(1e-9).unwrap_or_default() * speed_mps
             }
-            Heading::Straight | Heading::NoPath => guidance.to_slot(slot - senses.position, slot_velocity),
+            Heading::Straight | Heading::NoPath => guidance.to_slot(slot - senses.position(), slot_velocity),
         }
     }
 
@@ -319,9 +319,13 @@ impl SwarmPilot {
         let obstacles = senses
             .obstacles
             .iter()
-            .map(|o| NearObstacle { nearest_m: Vec2::from(o.nearest_m) - senses.position, distance_m: o.distance_m });
-        let smooth =
-            self.safety.filter((wanted - senses.velocity) * gain, senses.velocity, obstacles, self.neighbours.iter());
+            .map(|o| NearObstacle { nearest_m: o.nearest() - senses.position(), distance_m: o.distance_m });
+        let smooth = self.safety.filter(
+            (wanted - senses.velocity()) * gain,
+            senses.velocity(),
+            obstacles,
+            self.neighbours.iter(),
+        );
         self.keep_braking_path(smooth, now, senses)
     }
 
@@ -331,18 +335,18 @@ impl SwarmPilot {
         let lag = (self.reaction.delay_s() / self.params.dt_s).round() as u32;
         let own = OwnMotion {
             tick: now.tick,
-            sensed_position: now.position,
-            sensed_velocity: now.velocity,
-            position: then.position,
-            velocity: then.velocity,
+            sensed_position: now.position(),
+            sensed_velocity: now.velocity(),
+            position: then.position(),
+            velocity: then.velocity(),
             speed_limit_mps: self.params.speed_on_sight_mps(lag),
             lag,
         };
         let obstacles = then.obstacles.iter().filter_map(|o| Some((&then.shape(o)?.shape, o.distance_m)));
-        let neighbours = now.neighbours.iter().map(|n| Moving {
-            position_m: n.position_m.into(),
-            velocity_mps: Vec2::from(n.velocity_mps) + now.velocity,
-        });
+        let neighbours = now
+            .neighbours
+            .iter()
+            .map(|n| Moving { position_m: n.position(), velocity_mps: n.velocity() + now.velocity() });
         self.braking_filter.filter(&own, wanted, obstacles, neighbours)
     }
 
@@ -351,7 +355,7 @@ impl SwarmPilot {
         let mut predictor = std::mem::take(&mut self.predictor);
         let delay_s = self.reaction.delay_s();
         let then = if delay_s > 0.0 {
-            predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity));
+            predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity()));
             predictor.predicted(senses)
         } else {
             *senses
@@ -359,7 +363,7 @@ impl SwarmPilot {
         let wanted = self.wanted_velocity(&then, open);
         let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
-        let wanted = self.escape.steer(then.now, then.velocity, wanted, patience_s, slow_mps);
+        let wanted = self.escape.steer(then.now, then.velocity(), wanted, patience_s, slow_mps);
         self.neighbours.update(&NeighbourView {
             now: senses.now,
             senses: &then,
@@ -374,7 +378,7 @@ impl SwarmPilot {
 
     fn command(&self, acceleration: Vec2, open: &[QueuePlace; MAX_PLACES]) -> Command {
         let first = open.iter().find(|place| place.set != 0);
-        Command::acceleration([acceleration.x, acceleration.y, 0.0]).with_status(Status {
+        Command::acceleration(raised(acceleration, 0.0)).with_status(Status {
             obeyed: self.leading.stamp(),
             part_hash: self.leading.part_hash(),
             group: self.leading.group(),
@@ -391,7 +395,13 @@ impl Pilot for SwarmPilot {
         let say = out.messages_mut();
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
-        let own = OwnState { tick: senses.tick, position: senses.position, velocity: senses.velocity };
+        let own = OwnState {
+            tick: senses.tick,
+            position: senses.position(),
+            velocity: senses.velocity(),
+            altitude_m: senses.position_m[2],
+            climb_mps: senses.velocity_mps[2],
+        };
         for &Heard { source, message } in inbox.heard() {
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(message);
@@ -403,9 +413,9 @@ impl Pilot for SwarmPilot {
         self.lead(senses, &own, say);
         self.emergency_avoidance(senses);
         let bodies = self.silent.bodies(SILENT_DRONE_RADIUS * safety.safe_distance_m);
-        self.route.update(self.leading.ledger(), senses.position, &bodies);
-        self.leading.note_passed(senses.position);
-        let places = self.route.places(senses.position);
+        self.route.update(self.leading.ledger(), senses.position(), &bodies);
+        self.leading.note_passed(senses.position());
+        let places = self.route.places(senses.position());
         let open = self.route.open_places(places);
         let safe = self.steer(senses, &open);
         let acceleration = self.reaction.push(safe);

@@ -9,7 +9,7 @@ use serde::Serialize;
 use skein_leader::split::ArrivalTable;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec3};
 use skein_runtime::{DroneFactory, PilotKind, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use std::hint::black_box;
@@ -107,7 +107,7 @@ fn radio(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Benc
     for preset in ["ideal", "wifi", "mesh-lossy", "lte", "jammed", "satellite"] {
         let radio = scenario(drones, &format!("[radio]\npreset = {preset:?}\n"))?.radio();
         let link = |sequence| Link { source: DroneId(1), destination: DroneId(0), topic: 1, sequence };
-        let (path, aired) = (Vec2::new(40.0, 30.0), |sequence| SimTime(i64::from(sequence) * 20_000_000));
+        let (path, aired) = (Vec3::new(40.0, 30.0, 0.0), |sequence| SimTime(i64::from(sequence) * 20_000_000));
         let us = timed(rounds, f64::from(FRAMES), || {
             for n in 0..FRAMES {
                 black_box(radio.outcome(link(n), path, aired(n)));

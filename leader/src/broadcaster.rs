@@ -7,7 +7,7 @@ use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use skein_protocol::payload::{MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
-use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag};
+use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
 
 /// The broadcasts of one drone: their periods, and what was said when.
@@ -159,8 +159,8 @@ impl Broadcaster {
 fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_PLACES]) -> Pose {
     Pose {
         stamp: now,
-        position_m: own.position.into(),
-        velocity_mps: own.velocity.into(),
+        position_m: raised(own.position, own.altitude_m),
+        velocity_mps: raised(own.velocity, own.climb_mps),
         queue: *places,
         obeyed: k.ledger().stamp(),
         group: k.ledger().group(),

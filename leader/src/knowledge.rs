@@ -138,7 +138,7 @@ impl Knowledge {
             let pending = plans.into_iter().flatten().filter(|bundle| will_obey(&bundle.plan.id));
             let group = pending.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
             let group = group.unwrap_or(pose.group);
-            let velocity = Vec2::from(pose.velocity_mps);
+            let velocity = pose.velocity();
             let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());
             Member { id, position, speed_mps: velocity.norm(), velocity, group, follows }
         })

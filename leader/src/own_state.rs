@@ -7,8 +7,12 @@ use skein_protocol::Vec2;
 pub struct OwnState {
     /// Number of the tick.
     pub tick: u64,
-    /// Position, world frame, m.
+    /// Horizontal part of the position, world frame, m.
     pub position: Vec2,
-    /// Velocity, world frame, m/s.
+    /// Horizontal part of the velocity, world frame, m/s.
     pub velocity: Vec2,
+    /// Height above the ground, m.
+    pub altitude_m: f64,
+    /// Vertical velocity, upward, m/s.
+    pub climb_mps: f64,
 }

@@ -135,7 +135,7 @@ impl Peers {
 /// Where a drone is at `now` if it has kept the velocity of its beacon, world frame, m.
 #[must_use]
 pub fn extrapolated(pose: &Pose, now: SimTime) -> Vec2 {
-    Vec2::from(pose.position_m) + Vec2::from(pose.velocity_mps) * now.since(pose.stamp)
+    pose.position() + pose.velocity() * now.since(pose.stamp)
 }
 
 #[cfg(test)]
@@ -146,8 +146,8 @@ mod tests {
     fn pose(stamp_s: f64, x: f64) -> Pose {
         Pose {
             stamp: SimTime::from_secs(stamp_s),
-            position_m: [x, 0.0],
-            velocity_mps: [10.0, 0.0],
+            position_m: [x, 0.0, 50.0],
+            velocity_mps: [10.0, 0.0, 0.0],
             incarnation: 1,
             ..Pose::zeroed()
         }

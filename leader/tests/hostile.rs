@@ -67,19 +67,24 @@ fn shape() -> impl Strategy<Value = ConvexShape> {
     prop_oneof![disc, bar].prop_map(move |shape| shape.unwrap_or(other))
 }
 
+fn point() -> impl Strategy<Value = [f64; 3]> {
+    (number(), number(), number()).prop_map(|(x, y, z)| [x, y, z])
+}
+
 fn pose() -> impl Strategy<Value = Pose> {
-    ((instant(), number(), number(), number(), number()), stamp(), group(), ballot(), any::<u32>(), any::<u32>())
-        .prop_map(|((stamp, x, y, vx, vy), obeyed, group, term, incarnation, flags)| Pose {
+    ((instant(), point(), point()), stamp(), group(), ballot(), any::<u32>(), any::<u32>()).prop_map(
+        |((stamp, position_m, velocity_mps), obeyed, group, term, incarnation, flags)| Pose {
             stamp,
-            position_m: [x, y],
-            velocity_mps: [vx, vy],
+            position_m,
+            velocity_mps,
             obeyed,
             group,
             term,
             incarnation,
             flags,
             ..Pose::zeroed()
-        })
+        },
+    )
 }
 
 fn plan() -> impl Strategy<Value = Plan> {

@@ -12,20 +12,20 @@
 //!
 //! ```
 //! use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
-//! use skein_protocol::{SimTime, Vec2};
+//! use skein_protocol::SimTime;
 //!
 //! struct Brake;
 //!
 //! impl Pilot for Brake {
 //!     fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
-//!         Command::acceleration([-senses.velocity.x, -senses.velocity.y, 0.0])
+//!         Command::acceleration(senses.velocity_mps.map(|v| -v))
 //!     }
 //! }
 //!
-//! let (position, velocity) = (Vec2::zeros(), Vec2::new(2.0, 0.0));
-//! let senses = Senses::new((0, SimTime(0)), (position, velocity), &[], &[], &[]);
+//! let (position_m, velocity_mps) = ([0.0, 0.0, 50.0], [2.0, 0.0, 0.0]);
+//! let senses = Senses::new((0, SimTime(0)), (position_m, velocity_mps), &[], &[], &[]);
 //! let command = Brake.step(&senses, &Inbox::default(), &mut Out::default());
-//! assert_eq!(command, Command::acceleration([-2.0, 0.0, 0.0]));
+//! assert_eq!(command, Command::acceleration([-2.0, -0.0, -0.0]));
 //! ```
 
 mod birth;

@@ -16,6 +16,7 @@ use crate::ids::{DroneId, ObstacleId};
 use crate::link_faults::LinkFaults;
 use crate::nearby::{FrameCell, FrameIndex, Locality, NearbyFrames};
 use crate::shape::ConvexShape;
+use crate::space::horizontal;
 use crate::time::{SimTime, Tick};
 use crate::wire::BrokenSensors;
 use bytemuck::{Pod, Zeroable};
@@ -54,9 +55,9 @@ pub struct DownlinkHeader {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensesHeader {
     /// The drone's position as its sensors report it, world frame, m.
-    pub position_m: [f64; 2],
+    pub position_m: [f64; 3],
     /// The drone's velocity as its sensors report it, world frame, m/s.
-    pub velocity_mps: [f64; 2],
+    pub velocity_mps: [f64; 3],
     /// Index of the drone's first [`SensedObstacle`].
     pub obstacle_first: u32,
     /// Number of the drone's [`SensedObstacle`]s.
@@ -93,7 +94,7 @@ impl SensesHeader {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensedObstacle {
     /// Point of the obstacle's surface that is nearest to the drone, world frame, m.
-    pub nearest_m: [f64; 2],
+    pub nearest_m: [f64; 3],
     /// Distance from the drone to that point, m; negative if the drone is inside the obstacle.
     pub distance_m: f64,
     /// Index of the obstacle's outline among the [`SensedShape`]s.
@@ -102,18 +103,43 @@ pub struct SensedObstacle {
     pub reserved: u32,
 }
 
+impl SensedObstacle {
+    /// The horizontal part of [`Self::nearest_m`], world frame, m.
+    #[must_use]
+    #[inline]
+    pub fn nearest(&self) -> Vec2 {
+        horizontal(self.nearest_m)
+    }
+}
+
 /// Another drone within ranging distance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SensedNeighbour {
     /// Its position relative to the sensing drone, axes of the world frame, m.
-    pub position_m: [f64; 2],
+    pub position_m: [f64; 3],
     /// Its velocity relative to the sensing drone, axes of the world frame, m/s.
-    pub velocity_mps: [f64; 2],
+    pub velocity_mps: [f64; 3],
     /// The neighbour's id.
     pub drone: DroneId,
     /// Always 0.
     pub reserved: u32,
+}
+
+impl SensedNeighbour {
+    /// The horizontal part of the relative position, axes of the world frame, m.
+    #[must_use]
+    #[inline]
+    pub fn position(&self) -> Vec2 {
+        horizontal(self.position_m)
+    }
+
+    /// The horizontal part of the relative velocity, axes of the world frame, m/s.
+    #[must_use]
+    #[inline]
+    pub fn velocity(&self) -> Vec2 {
+        horizontal(self.velocity_mps)
+    }
 }
 
 /// The outline of a sensed obstacle.
@@ -267,10 +293,11 @@ impl<'a> DownlinkView<'a> {
     pub fn senses(&self, drone: DroneId) -> Option<Senses<'a>> {
         let head = self.drones.get(drone.index())?;
         Some(Senses {
+            now_s: self.head.now.secs(),
             now: self.head.now,
             tick: self.head.tick,
-            position: Vec2::from(head.position_m),
-            velocity: Vec2::from(head.velocity_mps),
+            position_m: head.position_m,
+            velocity_mps: head.velocity_mps,
             extra_reaction_s: head.extra_reaction_s,
             broken: BrokenSensors::from_wire(head.broken),
             obstacles: range(self.obstacles, head.obstacle_first, head.obstacle_count),
@@ -283,14 +310,16 @@ impl<'a> DownlinkView<'a> {
 /// What one drone senses in one tick, and when.
 #[derive(Clone, Copy, Debug)]
 pub struct Senses<'a> {
-    /// Simulated time at which the tick begins.
+    /// Simulated time at which the tick begins, s.
+    pub now_s: f64,
+    /// The same time, exact.
     pub now: SimTime,
     /// Number of the tick.
     pub tick: Tick,
     /// The drone's position as its sensors report it, world frame, m.
-    pub position: Vec2,
+    pub position_m: [f64; 3],
     /// The drone's velocity as its sensors report it, world frame, m/s.
-    pub velocity: Vec2,
+    pub velocity_mps: [f64; 3],
     /// Time that faults add to the drone's reaction time, s.
     pub extra_reaction_s: f64,
     /// The sensors that report nothing.
@@ -308,16 +337,17 @@ impl<'a> Senses<'a> {
     #[must_use]
     pub fn new(
         (tick, now): (Tick, SimTime),
-        (position, velocity): (Vec2, Vec2),
+        (position_m, velocity_mps): ([f64; 3], [f64; 3]),
         obstacles: &'a [SensedObstacle],
         neighbours: &'a [SensedNeighbour],
         shapes: &'a [SensedShape],
     ) -> Self {
         Self {
+            now_s: now.secs(),
             now,
             tick,
-            position,
-            velocity,
+            position_m,
+            velocity_mps,
             extra_reaction_s: 0.0,
             broken: BrokenSensors::default(),
             obstacles,
@@ -332,14 +362,28 @@ impl<'a> Senses<'a> {
     pub fn at<'b>(
         &self,
         now: SimTime,
-        (position, velocity): (Vec2, Vec2),
+        (position_m, velocity_mps): ([f64; 3], [f64; 3]),
         obstacles: &'b [SensedObstacle],
         neighbours: &'b [SensedNeighbour],
     ) -> Senses<'b>
     where
         'a: 'b,
     {
-        Senses { now, position, velocity, obstacles, neighbours, ..*self }
+        Senses { now_s: now.secs(), now, position_m, velocity_mps, obstacles, neighbours, ..*self }
+    }
+
+    /// The horizontal part of the drone's position as its sensors report it, world frame, m.
+    #[must_use]
+    #[inline]
+    pub fn position(&self) -> Vec2 {
+        horizontal(self.position_m)
+    }
+
+    /// The horizontal part of the drone's velocity as its sensors report it, world frame, m/s.
+    #[must_use]
+    #[inline]
+    pub fn velocity(&self) -> Vec2 {
+        horizontal(self.velocity_mps)
     }
 
     /// The outline of a sensed obstacle; `None` if its index is out of range.
@@ -366,16 +410,16 @@ mod tests {
     #[test]
     fn a_written_sample_is_read_back() {
         let mut down = Downlink::default();
-        down.drones.push(SensesHeader { neighbour_count: 1, position_m: [1.0, 2.0], ..SensesHeader::default() });
+        down.drones.push(SensesHeader { neighbour_count: 1, position_m: [1.0, 2.0, 3.0], ..SensesHeader::default() });
         down.neighbours.push(SensedNeighbour { drone: DroneId(5), ..SensedNeighbour::default() });
         down.seal(3, SimTime(60));
         let mut words = vec![0u64; down.byte_len().div_ceil(8)];
         down.write_to(bytemuck::cast_slice_mut(&mut words));
         let view = DownlinkView::parse(bytemuck::cast_slice(&words)).unwrap();
         let senses = view.senses(DroneId(0)).unwrap();
-        assert_eq!(senses.position, Vec2::new(1.0, 2.0));
+        assert_eq!((senses.position_m, senses.position()), ([1.0, 2.0, 3.0], Vec2::new(1.0, 2.0)));
         assert_eq!(senses.neighbours[0].drone, DroneId(5));
-        assert_eq!((view.head.tick, view.head.now), (3, SimTime(60)));
+        assert_eq!((view.head.tick, view.head.now, senses.now_s), (3, SimTime(60), 6e-8));
         assert!(view.senses(DroneId(1)).is_none());
     }
 

@@ -1,7 +1,7 @@
 //! The layout of a frame. It contains no enum, because its bytes come from memory that another process wrote, and an arbitrary
 //! number need not be a valid enum value.
 
-use crate::Vec2;
+use crate::Vec3;
 use crate::ids::DroneId;
 use crate::link_faults::LinkFaults;
 use crate::time::Tick;
@@ -41,7 +41,7 @@ pub struct AirFrame {
     /// Sequence number of the frame among all frames that its source has sent in this mission, from 0.
     pub sequence: u32,
     /// True position of the sender at the time of sending, world frame, m.
-    pub position_m: [f64; 2],
+    pub position_m: [f64; 3],
     /// Time the frame waited for the shared channel plus its airtime, ns; [`NEVER_TRANSMITTED`] if it was not transmitted.
     pub queue_ns: u64,
     /// Faults of the sender's radio at the time of sending.
@@ -53,7 +53,7 @@ pub struct AirFrame {
 impl AirFrame {
     /// True position of the sender at the time of sending, world frame, m.
     #[must_use]
-    pub fn position(&self) -> Vec2 {
-        Vec2::new(self.position_m[0], self.position_m[1])
+    pub fn position(&self) -> Vec3 {
+        Vec3::from(self.position_m)
     }
 }

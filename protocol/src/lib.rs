@@ -22,7 +22,7 @@
 //! use skein_protocol::message::DecodeError;
 //! use skein_protocol::payload::Leadership;
 //! use skein_protocol::radio::{Delivery, Link, Radio};
-//! use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec2};
+//! use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec3};
 //!
 //! let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(3) };
 //! let kind = LeadershipKind::Claim.to_wire();
@@ -38,7 +38,7 @@
 //!
 //! // The default radio is ideal: each frame is heard once and without delay.
 //! let link = Link { source: DroneId(3), destination: DroneId(4), topic: frame.kind, sequence: 0 };
-//! let delivery = Radio::default().outcome(link, Vec2::new(1000.0, 0.0), SimTime::ZERO);
+//! let delivery = Radio::default().outcome(link, Vec3::new(1000.0, 0.0, 0.0), SimTime::ZERO);
 //! assert_eq!(delivery, Delivery::Deliver { due: SimTime::ZERO, again: None });
 //! ```
 
@@ -62,6 +62,7 @@ pub mod record;
 pub mod shape;
 mod short_text;
 pub mod slot;
+mod space;
 pub mod telemetry;
 pub mod thin_plate;
 pub mod time;
@@ -74,10 +75,14 @@ pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 pub use message::{Message, MessageRef};
 pub use metric_name::{MetricName, MetricNameError};
 pub use short_text::{ShortText, TEXT_FIELD};
+pub use space::{horizontal, raised};
 pub use time::{SimTime, Tick};
 pub use topic_name::{OWN_TOPIC, TopicName, TopicNameError};
 pub use user_message::{TooLong, USER_BYTES, UserMessage};
 pub use wire::{ArrivalsKind, LeadershipKind, Phase, flag};
 
-/// A planar vector or point, metres (or m/s, m/s²), world frame.
+/// A horizontal vector or point, metres (or m/s, m/s²), world frame.
 pub type Vec2 = nalgebra::Vector2<f64>;
+
+/// A vector or point in space, metres (or m/s, m/s²), world frame: x and y as in [`Vec2`], z up.
+pub type Vec3 = nalgebra::Vector3<f64>;

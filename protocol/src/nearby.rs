@@ -6,6 +6,7 @@ use crate::Vec2;
 use crate::frame::{AirFrame, NEVER_TRANSMITTED};
 use crate::link_faults::LinkFaults;
 use crate::message::Topic;
+use crate::space::horizontal;
 use crate::topic_name::OWN_TOPIC;
 use bytemuck::{Pod, Zeroable};
 
@@ -102,7 +103,7 @@ impl FrameIndex {
         }
         for (frame, place) in frames.iter().zip(0..) {
             if locality.holds(frame.frame.kind) {
-                self.sorted.push((locality.cell(frame.position()), place));
+                self.sorted.push((locality.cell(horizontal(frame.position_m)), place));
             } else {
                 self.order.push(place);
             }
@@ -137,8 +138,8 @@ pub struct NearbyFrames<'a> {
 }
 
 impl<'a> NearbyFrames<'a> {
-    /// Calls `visit` with the position in the tick's list of each frame that could be heard at `here` (world frame, m). All
-    /// other frames are out of range.
+    /// Calls `visit` with the position in the tick's list of each frame that could be heard above or below the place `here` (world
+    /// frame, m). All other frames are out of range.
     pub fn each(&self, here: Vec2, mut visit: impl FnMut(usize)) {
         let mut run = |first: usize, count: usize| {
             let places = self.order.get(first..first.saturating_add(count)).unwrap_or_default();
@@ -161,8 +162,8 @@ mod tests {
     use crate::ids::DroneId;
     use proptest::prelude::*;
 
-    fn frame(source: u32, position_m: [f64; 2], kind: u16) -> AirFrame {
-        let mut frame = AirFrame { source: DroneId(source), position_m, ..AirFrame::zeroed() };
+    fn frame(source: u32, [x, y]: [f64; 2], kind: u16) -> AirFrame {
+        let mut frame = AirFrame { source: DroneId(source), position_m: [x, y, 20.0], ..AirFrame::zeroed() };
         frame.frame.kind = kind;
         frame
     }
@@ -184,7 +185,7 @@ mod tests {
             let mut visits = vec![0; frames.len()];
             index.view().each(here.into(), |place| visits[place] += 1);
             for (frame, visits) in frames.iter().zip(visits) {
-                let near = (frame.position() - Vec2::from(here)).norm() <= 90.0;
+                let near = (horizontal(frame.position_m) - Vec2::from(here)).norm() <= 90.0;
                 let local = frame.frame.kind <= 2 || own && frame.frame.kind & OWN_TOPIC != 0;
                 if near || !local {
                     prop_assert_eq!(visits, 1);

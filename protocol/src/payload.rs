@@ -6,13 +6,14 @@
 use crate::Vec2;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::shape::ConvexShape;
+use crate::space::horizontal;
 use crate::time::SimTime;
 use crate::wire::{ArrivalsKind, LeadershipKind, Phase};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
 /// Version of all layouts in this module. A receiver rejects a frame of another version.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
@@ -64,9 +65,9 @@ pub struct Pose {
     /// Time of the state.
     pub stamp: SimTime,
     /// Position, world frame, m.
-    pub position_m: [f64; 2],
+    pub position_m: [f64; 3],
     /// Velocity, world frame, m/s.
-    pub velocity_mps: [f64; 2],
+    pub velocity_mps: [f64; 3],
     /// The drone's places in queues, nearest set first.
     pub queue: [QueuePlace; MAX_PLACES],
     /// The plan that the drone obeys.
@@ -84,6 +85,18 @@ pub struct Pose {
 }
 
 impl Pose {
+    /// The horizontal part of the position, world frame, m.
+    #[must_use]
+    pub fn position(&self) -> Vec2 {
+        horizontal(self.position_m)
+    }
+
+    /// The horizontal part of the velocity, world frame, m/s.
+    #[must_use]
+    pub fn velocity(&self) -> Vec2 {
+        horizontal(self.velocity_mps)
+    }
+
     /// Whether the drone believes that it leads.
     #[must_use]
     pub fn leads(&self) -> bool {

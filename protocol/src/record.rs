@@ -52,9 +52,9 @@ pub const ROW_FROZEN: u32 = 16;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DroneRow {
     /// True position, world frame, m.
-    pub position_m: [f64; 2],
+    pub position_m: [f64; 3],
     /// True velocity, world frame, m/s.
-    pub velocity_mps: [f64; 2],
+    pub velocity_mps: [f64; 3],
     /// Energy used since the start of the mission, J.
     pub energy_j: f64,
     /// The plan that the drone obeys.

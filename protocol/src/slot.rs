@@ -20,7 +20,7 @@ pub const SLOT_FAILED: u32 = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Slot {
     /// Commanded acceleration, world frame, m/s².
-    pub acceleration_mps2: [f64; 2],
+    pub acceleration_mps2: [f64; 3],
     /// Number of frames that the drone has sent since its process started. All of them are in its uplink once its done
     /// word is set.
     pub frames_total: u64,
@@ -54,7 +54,7 @@ pub struct Slot {
     /// The term that the drone obeys, or in which it leads.
     pub term: Ballot,
     /// Always 0.
-    pub reserved: [u32; 14],
+    pub reserved: [u32; 12],
 }
 
 impl Slot {

@@ -6,7 +6,7 @@ use skein_protocol::message::Topic;
 use skein_protocol::radio::{
     ChannelModel, ChannelQueue, Delay, Delivery, DropReason, NEVER_TRANSMITTED, Radio, SharedChannel,
 };
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec3};
 
 /// A frame that occupies 100 bytes on the channel.
 fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
@@ -15,7 +15,7 @@ fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
         tick,
         source: DroneId(source),
         sequence,
-        position_m: [0.0; 2],
+        position_m: [0.0; 3],
         queue_ns: 0,
         link_faults: Default::default(),
         frame,
@@ -66,7 +66,7 @@ fn no_drone_gets_the_channel_first_because_of_its_id() {
 fn queue_time_adds_to_the_delay_and_a_frame_never_transmitted_is_dropped_as_queue() {
     let channel = ChannelModel { delay: Delay { mean_s: 0.1, ..Delay::default() }, ..ChannelModel::default() };
     let radio = Radio { seed: 3, channel, ..Radio::default() };
-    let delivery = |frame: AirFrame| radio.delivery(&frame, DroneId(1), Vec2::zeros(), 20_000_000);
+    let delivery = |frame: AirFrame| radio.delivery(&frame, DroneId(1), Vec3::zeros(), 20_000_000);
     let due = SimTime(5 * 20_000_000 + 3_000_000 + 100_000_000);
     assert_eq!(delivery(AirFrame { queue_ns: 3_000_000, ..sent(5, 0, 0) }), Delivery::Deliver { due, again: None });
     assert_eq!(delivery(AirFrame { queue_ns: NEVER_TRANSMITTED, ..sent(5, 0, 0) }), Delivery::Drop(DropReason::Queue));

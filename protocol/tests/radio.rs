@@ -10,7 +10,7 @@ use skein_protocol::radio::{
     BLOCK_BURSTS, Burst, BurstScope, ChannelModel, Delay, DelayModel, Delivery, DropReason, Link, Radio, Range, Rule,
     TopicSet,
 };
-use skein_protocol::{DroneId, SimTime, TopicName, Vec2};
+use skein_protocol::{DroneId, SimTime, TopicName, Vec3};
 use std::collections::BTreeSet;
 
 /// Number of standard errors by which a statistic may differ from its model.
@@ -31,7 +31,7 @@ fn radio(channel: ChannelModel) -> Radio {
 /// The outcomes of frames on one link, one frame every [`PERIOD_S`], over the distance `path_m`.
 fn deliveries(radio: &Radio, (source, destination): (u32, u32), path_m: f64) -> Vec<Delivery> {
     let at = |sequence| SimTime::from_secs(f64::from(sequence) * PERIOD_S);
-    (0..MANY).map(|s| radio.outcome(link(source, destination, s), Vec2::new(path_m, 0.0), at(s))).collect()
+    (0..MANY).map(|s| radio.outcome(link(source, destination, s), Vec3::new(path_m, 0.0, 0.0), at(s))).collect()
 }
 
 /// For each outcome, whether the frame was dropped for this reason.
@@ -89,7 +89,7 @@ fn assert_moments(what: &str, values: &[f64], wanted_mean: f64, wanted_variance:
 
 #[test]
 fn an_ideal_radio_delivers_each_frame_once_and_without_delay() {
-    let delivery = Radio::default().outcome(link(0, 1, 0), Vec2::new(1e6, 0.0), SimTime(5));
+    let delivery = Radio::default().outcome(link(0, 1, 0), Vec3::new(1e6, 0.0, 0.0), SimTime(5));
     assert_eq!(delivery, Delivery::Deliver { due: SimTime(5), again: None });
 }
 
@@ -103,14 +103,14 @@ fn deliveries_do_not_depend_on_the_order_of_the_calls() {
         duplicate: 0.2,
     };
     let radio = Radio { asymmetry: 1.0, ..radio(channel) };
-    let outcome = |s| radio.outcome(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s)));
+    let outcome = |s| radio.outcome(link(2, 3, s), Vec3::new(60.0, 0.0, 0.0), SimTime::from_secs(f64::from(s)));
     let forward: Vec<_> = (0..200).map(outcome).collect();
     let mut backward: Vec<_> = (0..200).rev().map(outcome).collect();
     backward.reverse();
     assert_eq!(forward, backward);
     let other = Radio { seed: 4, ..radio.clone() };
     let differ = (0..200).filter(|&s| {
-        other.outcome(link(2, 3, s), Vec2::new(60.0, 0.0), SimTime::from_secs(f64::from(s))) != outcome(s)
+        other.outcome(link(2, 3, s), Vec3::new(60.0, 0.0, 0.0), SimTime::from_secs(f64::from(s))) != outcome(s)
     });
     assert!(differ.count() > 100, "another seed gives other outcomes");
 }
@@ -121,7 +121,7 @@ fn deliveries_do_not_depend_on_the_order_of_the_calls() {
 fn bernoulli_losses_equal_those_of_the_first_version() {
     let radio = Radio { seed: 9, channel: ChannelModel { loss: 0.5, ..ChannelModel::default() }, ..Radio::default() };
     let lost: String = (0..32)
-        .map(|s| match radio.outcome(link(2, 3, s), Vec2::zeros(), SimTime::ZERO) {
+        .map(|s| match radio.outcome(link(2, 3, s), Vec3::zeros(), SimTime::ZERO) {
             Delivery::Drop(DropReason::Loss) => 'x',
             _ => '.',
         })
@@ -283,7 +283,7 @@ fn a_hard_range_drops_frames_beyond_its_distance() {
         range: Some(Range { half_m: 100.0, shadowing_db: 0.0, exponent: 2.0 }),
         ..ChannelModel::default()
     });
-    let at = |x| radio.outcome(link(0, 1, 0), Vec2::new(x, 0.0), SimTime::ZERO);
+    let at = |x| radio.outcome(link(0, 1, 0), Vec3::new(x, 0.0, 0.0), SimTime::ZERO);
     assert_eq!(at(100.0), Delivery::Deliver { due: SimTime::ZERO, again: None });
     assert_eq!(at(100.1), Delivery::Drop(DropReason::Range));
 }
@@ -370,7 +370,7 @@ fn the_last_rule_that_covers_a_frame_applies() {
     let radio = Radio { rules, ..Radio::default() };
     let due_s = |topic: u16, destination| match radio.outcome(
         Link { topic, ..link(0, destination, 0) },
-        Vec2::zeros(),
+        Vec3::zeros(),
         SimTime::ZERO,
     ) {
         Delivery::Deliver { due, .. } => due.secs(),
@@ -394,7 +394,7 @@ fn a_rule_names_the_topics_of_pilots_too() {
     };
     let rule = Rule { topics: Some(TopicSet::from_iter([gossip()])), channel: delayed(1.0), ..Rule::default() };
     let radio = Radio { rules: vec![rule], ..Radio::default() };
-    let due = |topic| radio.outcome(Link { topic, ..link(0, 1, 0) }, Vec2::zeros(), SimTime::ZERO);
+    let due = |topic| radio.outcome(Link { topic, ..link(0, 1, 0) }, Vec3::zeros(), SimTime::ZERO);
     assert_eq!(due(gossip().kind()), Delivery::Deliver { due: SimTime::from_secs(1.0), again: None });
     for other in [gossip().kind() ^ 1, Topic::Pose as u16] {
         assert_eq!(due(other), Delivery::Deliver { due: SimTime::ZERO, again: None });
@@ -449,7 +449,7 @@ proptest! {
         let radio = Radio { rules: conditions.iter().enumerate().map(rule).collect(), ..Radio::default() };
         let mut frame: AirFrame = bytemuck::Zeroable::zeroed();
         (frame.source, frame.frame.kind) = (DroneId(source), kind);
-        let (receiver, here) = (DroneId(destination), Vec2::zeros());
+        let (receiver, here) = (DroneId(destination), Vec3::zeros());
         let channels = radio.channels_at(receiver);
         prop_assert_eq!(radio.delivery_at(&channels, &frame, here, 20), radio.delivery(&frame, receiver, here, 20));
     }

@@ -13,7 +13,7 @@ use crate::summary::{Dropped, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, S
 use crate::tuning::METRICS_PERIOD_S;
 use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
-use skein_protocol::{DroneId, Phase, Vec2};
+use skein_protocol::{DroneId, Phase, Vec2, horizontal};
 
 /// Accumulates everything that the summary of a run contains.
 pub(crate) struct Accumulator {
@@ -162,7 +162,7 @@ impl Accumulator {
         }
         self.stages.take_rows(rows);
         self.leading.take(t_s, dt_s, rows, self.facts.radio_range_m);
-        self.vicinity.take(rows, dt_s);
+        self.vicinity.take(rows);
         self.gather_living(rows);
         if tick.is_multiple_of((METRICS_PERIOD_S / self.facts.dt_s).round().max(1.0) as u64) {
             self.metrics.take(&self.positions, &self.velocities);
@@ -176,8 +176,8 @@ impl Accumulator {
         self.positions.clear();
         self.velocities.clear();
         for row in rows.iter().filter(|row| row.alive()) {
-            self.positions.push(Vec2::from(row.position_m));
-            self.velocities.push(Vec2::from(row.velocity_mps));
+            self.positions.push(horizontal(row.position_m));
+            self.velocities.push(horizontal(row.velocity_mps));
         }
     }
 

@@ -41,8 +41,6 @@ pub struct RunFacts {
     pub arrival_error_m: f64,
     /// Radio range, m; `None` if it has no limit.
     pub radio_range_m: Option<f64>,
-    /// How long a dead drone remains a body after it has come to rest, s; `None` if it hovers forever.
-    pub landing_s: Option<f64>,
     /// The obstacles; the id of an obstacle is its index.
     #[serde(with = "outlines")]
     pub obstacles: Vec<ConvexShape>,

@@ -2,7 +2,7 @@
 
 use crate::summary::{LeaderEntry, Term};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{Ballot, DroneId, GroupId, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, horizontal};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Follows leadership over a mission.
@@ -79,7 +79,7 @@ impl Leading {
             }
             !led
         });
-        let place = |drone: usize| Vec2::from(rows[drone].position_m);
+        let place = |drone: usize| horizontal(rows[drone].position_m);
         let hear = |a: usize, b: usize| range_m.is_none_or(|range| (place(a) - place(b)).norm() <= range);
         let term = |drone: usize| self.terms.get(&DroneId(drone as u32));
         let over = |(led, a): (GroupId, usize), b: usize| term(a) > term(b) && led.contains(rows[b].group);

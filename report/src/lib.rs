@@ -40,7 +40,6 @@
 //!     planning_distance_m: 20.0,
 //!     arrival_error_m: 0.8,
 //!     radio_range_m: None,
-//!     landing_s: None,
 //!     obstacles: Vec::new(),
 //!     scene: Default::default(),
 //! };

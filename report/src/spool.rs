@@ -188,7 +188,7 @@ mod tests {
     fn ticks(path: &Path) -> Vec<u64> {
         let mut ticks = Vec::new();
         let take = |record: RecordView<'_>| {
-            assert_eq!(record.rows[3].position_m, [record.head.tick as f64, 3.0]);
+            assert_eq!(record.rows[3].position_m, [record.head.tick as f64, 3.0, 50.0]);
             assert_eq!(record.events.len() as u64, record.head.tick % 11);
             ticks.push(record.head.tick);
             Ok(())

@@ -23,7 +23,6 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
         planning_distance_m: 20.0,
         arrival_error_m: 0.8,
         radio_range_m: None,
-        landing_s: None,
         obstacles: Vec::new(),
         scene: Default::default(),
     }
@@ -31,5 +30,5 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
 
 /// A living drone at rest.
 pub(crate) fn row(x_m: f64, y_m: f64) -> DroneRow {
-    DroneRow { position_m: [x_m, y_m], flags: ROW_ALIVE, ..DroneRow::default() }
+    DroneRow { position_m: [x_m, y_m, 50.0], flags: ROW_ALIVE, ..DroneRow::default() }
 }

@@ -30,7 +30,7 @@ impl<W: Write> TraceWriter<W> {
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
             self.field(t_s);
             write!(self.lines, "{drone},")?;
-            for value in row.position_m.into_iter().chain(row.velocity_mps) {
+            for value in [row.position_m, row.velocity_mps].into_iter().flat_map(|[x, y, _]| [x, y]) {
                 self.field(value);
             }
             write!(self.lines, "{},", row.group)?;
@@ -112,8 +112,8 @@ mod tests {
     fn rows() -> [DroneRow; 3] {
         let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(2) };
         let row = DroneRow {
-            position_m: [0.1, -35.0],
-            velocity_mps: [10.0, 1e-7],
+            position_m: [0.1, -35.0, 50.0],
+            velocity_mps: [10.0, 1e-7, 0.0],
             energy_j: 2.5,
             flags: ROW_ALIVE,
             ..DroneRow::default()

@@ -3,18 +3,15 @@
 use crate::close::Sweep;
 use crate::facts::RunFacts;
 use crate::geometry::clearance;
-use skein_protocol::Vec2;
 use skein_protocol::record::DroneRow;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Vec2, horizontal};
 
 /// The least distances so far. A dead drone counts as a body until it has landed.
 pub(crate) struct Vicinity {
     separation_m: Option<f64>,
     clearance_m: Option<f64>,
     obstacles: Vec<BoxedShape>,
-    landing_s: Option<f64>,
-    /// For each drone, how long it has been dead and without motion, s.
-    still_s: Vec<f64>,
     /// Positions of all bodies in the tick that was taken last, m.
     bodies: Vec<Vec2>,
     sweep: Sweep,
@@ -38,8 +35,6 @@ impl Vicinity {
             separation_m: None,
             clearance_m: None,
             obstacles: facts.obstacles.iter().map(bounded).collect(),
-            landing_s: facts.landing_s,
-            still_s: vec![0.0; facts.drones as usize],
             bodies: Vec::new(),
             sweep: Sweep::default(),
         }
@@ -55,16 +50,11 @@ impl Vicinity {
         self.clearance_m
     }
 
-    /// Takes the rows of a tick that lasted `dt_s`.
-    pub(crate) fn take(&mut self, rows: &[DroneRow], dt_s: f64) {
+    /// Takes the rows of a tick.
+    pub(crate) fn take(&mut self, rows: &[DroneRow]) {
         self.bodies.clear();
-        for (row, still_s) in rows.iter().zip(&mut self.still_s) {
-            let landed = self.landing_s.is_some_and(|landing_s| *still_s > landing_s - dt_s / 2.0);
-            if !landed {
-                self.bodies.push(Vec2::from(row.position_m));
-            }
-            *still_s = if !row.alive() && row.velocity_mps == [0.0; 2] { *still_s + dt_s } else { 0.0 };
-        }
+        let landed = |row: &&DroneRow| !row.alive() && row.position_m[2] <= 0.0;
+        self.bodies.extend(rows.iter().filter(|row| !landed(row)).map(|row| horizontal(row.position_m)));
         let separation = self.sweep.least_distance(&self.bodies);
         self.separation_m = least(self.separation_m, separation);
         for &body in &self.bodies {
@@ -89,19 +79,12 @@ mod tests {
 
     #[test]
     fn dead_drones_are_bodies_until_they_have_landed() {
-        let dead = DroneRow { flags: 0, ..row(0.0, 0.0) };
-        let far = [row(50.0, 0.0), dead];
-        let near = [row(4.0, 0.0), dead];
-        let mut hover = Vicinity::new(&facts(2));
-        let mut land = Vicinity::new(&RunFacts { landing_s: Some(1.0), ..facts(2) });
-        for vicinity in [&mut hover, &mut land] {
-            for _ in 0..51 {
-                vicinity.take(&far, 0.02);
-            }
-            vicinity.take(&near, 0.02);
-        }
-        assert_eq!((hover.separation_m, land.separation_m), (Some(4.0), Some(50.0)));
-        assert_eq!(hover.clearance_m, None);
+        let dead = |z_m| DroneRow { flags: 0, position_m: [0.0, 0.0, z_m], ..row(0.0, 0.0) };
+        let mut vicinity = Vicinity::new(&facts(2));
+        vicinity.take(&[row(4.0, 0.0), dead(0.0)]);
+        assert_eq!(vicinity.separation_m, None);
+        vicinity.take(&[row(50.0, 0.0), dead(50.0)]);
+        assert_eq!((vicinity.separation_m, vicinity.clearance_m), (Some(50.0), None));
     }
 
     #[test]
@@ -109,7 +92,7 @@ mod tests {
         let obstacles = vec![ConvexShape::circle(Vec2::new(0.0, 0.0), 2.0).unwrap()];
         let mut vicinity = Vicinity::new(&RunFacts { obstacles, ..facts(2) });
         for x in [-9.0, -6.0, -8.0] {
-            vicinity.take(&[row(x, 0.0), row(x - 30.0, 0.0)], 0.02);
+            vicinity.take(&[row(x, 0.0), row(x - 30.0, 0.0)]);
         }
         assert_eq!((vicinity.clearance_m, vicinity.separation_m), (Some(4.0), Some(30.0)));
     }

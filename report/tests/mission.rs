@@ -38,7 +38,6 @@ fn facts() -> RunFacts {
         planning_distance_m: 20.0,
         arrival_error_m: 0.8,
         radio_range_m: None,
-        landing_s: None,
         obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
         scene: Default::default(),
     }
@@ -58,8 +57,8 @@ fn row(tick: u64, drone: usize) -> DroneRow {
     let queued = (10..50).contains(&tick);
     let flags = [(!dead, ROW_ALIVE), (leads && !dead, ROW_LEADS), (queued, ROW_QUEUED)];
     DroneRow {
-        position_m: [10.0 * t_s, [45.0, 75.0, 15.0, 105.0][drone]],
-        velocity_mps: if dead { [0.0; 2] } else { [10.0, 0.0] },
+        position_m: [10.0 * t_s, [45.0, 75.0, 15.0, 105.0][drone], 50.0],
+        velocity_mps: if dead { [0.0; 3] } else { [10.0, 0.0, 0.0] },
         energy_j: 100.0 * t_s,
         led: group,
         term: Ballot { round: 1, incarnation: 1, claimant: DroneId(if drone == 2 { 2 } else { 3 }) },
@@ -112,7 +111,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         tick,
         source: DroneId(0),
         sequence: sequence as u32,
-        position_m: [0.0; 2],
+        position_m: [0.0; 3],
         queue_ns: 0,
         link_faults: Default::default(),
         frame: message.encode(),

@@ -25,8 +25,8 @@ impl Pilot for BeaconPilot {
         if senses.tick % self.beacon_ticks == u64::from(self.me.0) % self.beacon_ticks {
             out.message(Message::Pose(Pose {
                 stamp: senses.now,
-                position_m: senses.position.into(),
-                velocity_mps: senses.velocity.into(),
+                position_m: senses.position_m,
+                velocity_mps: senses.velocity_mps,
                 queue: [QueuePlace::default(); MAX_PLACES],
                 obeyed: PlanStamp::default(),
                 group: GroupId::ALL,

@@ -10,7 +10,7 @@ use skein_leader::election::ElectionParams;
 use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
-use skein_protocol::{DroneId, SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec2, Vec3};
 use skein_scenario::{End, Failsafe, FaultKind, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
 use skein_world::{World, WorldParams};
 
@@ -26,7 +26,8 @@ pub fn dt_ns(scenario: &Scenario) -> i64 {
     (scenario.time.dt_s * 1e9).round() as i64
 }
 
-/// The world at the start of the mission: every drone is at its start and flies at nominal speed along x.
+/// The world at the start of the mission: every drone is at its start, at the formation's altitude, and flies at nominal
+/// speed along x.
 ///
 /// # Errors
 /// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`]. A checked scenario gives no error.
@@ -59,8 +60,9 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         spacing_m: scenario.formation.spacing_m,
         faults: fault_plan(scenario),
     };
-    let velocity = Vec2::new(drone.speed_mps, 0.0);
-    let starts: Vec<(Vec2, Vec2)> = scenario.starts().into_iter().map(|position| (position, velocity)).collect();
+    let velocity = Vec3::new(drone.speed_mps, 0.0, 0.0);
+    let start = |place: Vec2| (place.push(scenario.formation.altitude_m), velocity);
+    let starts: Vec<(Vec3, Vec3)> = scenario.starts().into_iter().map(start).collect();
     let shapes = scenario.shapes().map_err(RuntimeError::Shape)?;
     Ok(World::new(params, &starts, &shapes)?)
 }

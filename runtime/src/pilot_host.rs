@@ -88,9 +88,7 @@ impl PilotHost {
 
     /// Writes a command and its status into the slot.
     fn fill(&self, senses: &Senses<'_>, command: &Command, slot: &mut Slot) {
-        let velocity_mps = [senses.velocity.x, senses.velocity.y, 0.0];
-        let [x, y, _] = command.acceleration_mps2(velocity_mps, self.params.velocity_gain_per_s);
-        slot.acceleration_mps2 = [x, y];
+        slot.acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, self.params.velocity_gain_per_s);
         command.status().fill(slot);
     }
 

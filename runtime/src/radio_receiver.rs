@@ -9,7 +9,7 @@ use skein_protocol::message::Topic;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio, ReceiverChannels};
 use skein_protocol::slot::LinkStats;
-use skein_protocol::{DroneId, MessageRef, SimTime};
+use skein_protocol::{DroneId, MessageRef, SimTime, horizontal};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -106,7 +106,7 @@ impl RadioReceiver {
             return;
         }
         let mut examined = 0;
-        let here = own.position_m.into();
+        let here = horizontal(own.position_m);
         down.nearby.each(here, |index| examined += usize::from(self.receive_frame(&air, index, arrived, stats)));
         let from = |id| down.frames.partition_point(|frame| frame.source.0 < id);
         let others = down.frames.len() - (from(self.me.0 + 1) - from(self.me.0));

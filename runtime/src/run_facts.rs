@@ -7,8 +7,7 @@ use skein_protocol::shape::ShapeError;
 use skein_protocol::{DroneId, ObstacleId, SimTime};
 use skein_report::scene::{SceneFacts, SetOutline};
 use skein_report::{MissionEnd, RunFacts};
-use skein_scenario::{End, Failsafe, Scenario};
-use skein_world::landing_s;
+use skein_scenario::{End, Scenario};
 
 /// An obstacle set, and the routes past it that a leader finds which knows all obstacles of the scenario.
 #[derive(Clone, Debug)]
@@ -64,7 +63,6 @@ pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunF
         planning_distance_m: scenario.avoidance.planning_distance_m,
         arrival_error_m: scenario.mission.arrival_error_m,
         radio_range_m: scenario.radio.range_m,
-        landing_s: (scenario.faults.failsafe == Failsafe::Land).then(landing_s),
         obstacles: scenario.shapes()?,
         scene: scene(scenario)?,
     })

@@ -29,10 +29,14 @@ fn message(leads: bool) -> Message {
 }
 
 fn downlink(points: &[([f64; 2], bool)]) -> Downlink {
-    let sense = |&(position_m, _): &([f64; 2], bool)| SensesHeader { position_m, alive: 1, ..SensesHeader::default() };
-    let frame = |(&(position_m, leads), id): (&([f64; 2], bool), u32)| AirFrame {
+    let sense = |&([x, y], _): &([f64; 2], bool)| SensesHeader {
+        position_m: [x, y, 50.0],
+        alive: 1,
+        ..SensesHeader::default()
+    };
+    let frame = |(&([x, y], leads), id): (&([f64; 2], bool), u32)| AirFrame {
         source: DroneId(id),
-        position_m,
+        position_m: [x, y, 50.0],
         frame: message(leads).encode(),
         ..bytemuck::Zeroable::zeroed()
     };

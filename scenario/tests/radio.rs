@@ -3,7 +3,7 @@
 
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Burst, BurstScope, ChannelModel, Delay, DelayModel, Link, Radio, Range, SharedChannel};
-use skein_protocol::{DroneId, TopicName, Vec2};
+use skein_protocol::{DroneId, TopicName, Vec3};
 use skein_scenario::{Preset, Scenario, ScenarioErrors, ScenarioSource};
 
 const SOURCE: ScenarioSource<'_> = ScenarioSource { name: "r.toml", stem: "r" };
@@ -78,9 +78,9 @@ fn the_last_matching_rule_counts_and_inherits_the_rest() {
     assert_eq!(radio.rules[1].channel.burst, radio.channel.burst);
     assert_eq!(Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), s);
     // Both rules match this frame. Its delivery is that of the last rule alone.
-    let due = radio.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO);
+    let due = radio.outcome(link(0, 2, Topic::Pose), Vec3::zeros(), skein_protocol::SimTime::ZERO);
     let last_rule = Radio { channel: radio.rules[1].channel, rules: Vec::new(), ..radio };
-    assert_eq!(due, last_rule.outcome(link(0, 2, Topic::Pose), Vec2::zeros(), skein_protocol::SimTime::ZERO));
+    assert_eq!(due, last_rule.outcome(link(0, 2, Topic::Pose), Vec3::zeros(), skein_protocol::SimTime::ZERO));
 }
 
 #[test]

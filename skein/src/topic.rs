@@ -228,10 +228,9 @@ fn of_downlink(down: &DownlinkView<'_>, filter: &Filter, dt_s: f64) -> Vec<Value
                 |near| json!({ "drone": near.drone, "position_m": near.position_m, "velocity_mps": near.velocity_mps }),
             )
             .collect();
-        let (position, velocity) = ([senses.position.x, senses.position.y], [senses.velocity.x, senses.velocity.y]);
         Some(json!({
             "topic": "senses", "tick": senses.tick, "t_s": senses.now.secs(), "drone": drone,
-            "position_m": position, "velocity_mps": velocity, "obstacles": obstacles, "neighbours": neighbours,
+            "position_m": senses.position_m, "velocity_mps": senses.velocity_mps, "obstacles": obstacles, "neighbours": neighbours,
         }))
     };
     (0..down.drones.len() as u32).filter(wanted).filter_map(sensed).collect()

@@ -133,7 +133,7 @@ mod tests {
             tick: 0,
             source: DroneId(2),
             sequence: 0,
-            position_m: [0.0; 2],
+            position_m: [0.0; 3],
             queue_ns: 0,
             link_faults: Default::default(),
             frame: message.encode(),

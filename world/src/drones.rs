@@ -4,7 +4,7 @@ use crate::body::{Body, admissible};
 use crate::params::WorldParams;
 use crate::process::Process;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{DroneId, Vec3};
 
 /// All drones. Calls about a drone that does not exist have no effect.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub(crate) struct DroneTable {
 
 impl DroneTable {
     /// Living drones at these positions (m) with these velocities (m/s), world frame, by id.
-    pub(crate) fn new(starts: &[(Vec2, Vec2)]) -> Self {
+    pub(crate) fn new(starts: &[(Vec3, Vec3)]) -> Self {
         let bodies: Vec<Body> = starts.iter().map(|&(position, velocity)| Body::new(position, velocity)).collect();
         Self { processes: vec![Process::default(); bodies.len()], bodies }
     }
@@ -86,7 +86,7 @@ impl DroneTable {
     }
 
     /// The sequence number of the drone's next frame, and where the drone is, m. `None` if its process is dead.
-    pub(crate) fn next_frame(&mut self, id: DroneId) -> Option<(u32, Vec2)> {
+    pub(crate) fn next_frame(&mut self, id: DroneId) -> Option<(u32, Vec3)> {
         let body = self.bodies.get(id.index()).filter(|body| body.is_alive())?;
         Some((self.processes[id.index()].next_sequence(), body.position()))
     }
@@ -128,7 +128,7 @@ impl DroneTable {
 
     /// Moves every body by one tick: as its process commands, or as its autopilot flies without a command. `wind_mps2`
     /// is added to the commands. Returns how many commands were rejected because they were not finite.
-    pub(crate) fn fly(&mut self, params: &WorldParams, wind_mps2: impl Fn(DroneId) -> Vec2) -> u64 {
+    pub(crate) fn fly(&mut self, params: &WorldParams, wind_mps2: impl Fn(DroneId) -> Vec3) -> u64 {
         let mut rejected = 0;
         for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
             if !body.is_alive() {
@@ -156,7 +156,7 @@ impl DroneTable {
 
     /// Puts a drone somewhere else.
     #[cfg(test)]
-    pub(crate) fn place(&mut self, drone: usize, position: Vec2) {
+    pub(crate) fn place(&mut self, drone: usize, position: Vec3) {
         let alive = self.bodies[drone].is_alive();
         self.bodies[drone] = Body::new(position, self.bodies[drone].velocity());
         if !alive {

@@ -1,4 +1,5 @@
-//! The end condition of a mission, by the true state and not by what drones believe.
+//! The end condition of a mission, by the true state and not by what drones believe. A formation is closed if it is closed seen
+//! from above: the altitudes of the drones do not matter.
 
 use crate::body::Body;
 use crate::grid::Grid;
@@ -70,7 +71,7 @@ impl EndCondition {
 
     /// Where the front slot is when the formation fits the living drones best (least squares), m.
     fn anchor(&self, bodies: &[Body], living: usize) -> Vec2 {
-        let sum: Vec2 = bodies.iter().filter(|body| body.is_alive()).map(|body| body.position()).sum();
+        let sum: Vec2 = bodies.iter().filter(|body| body.is_alive()).map(|body| body.position().xy()).sum();
         sum / living as f64 - self.middle
     }
 
@@ -79,7 +80,7 @@ impl EndCondition {
     fn filled(&mut self, bodies: &[Body], anchor: Vec2, error_m: f64) -> bool {
         self.taken.fill(false);
         bodies.iter().filter(|body| body.is_alive()).all(|body| {
-            let place = body.position() - anchor;
+            let place = body.position().xy() - anchor;
             let mut best: Option<(f64, usize)> = None;
             self.grid.each_near(place, |slot| {
                 let square = (self.slots[slot as usize] - place).norm_squared();
@@ -98,16 +99,18 @@ mod tests {
     use super::*;
     use crate::geometry::Outline;
     use crate::testing::{params, rectangle, starts};
+    use skein_protocol::Vec3;
     use skein_protocol::formation::Shape;
 
     /// Eight drones at rest in a nested V with its front at this point, m.
     fn formed(front: Vec2) -> Vec<Body> {
-        starts(8).into_iter().map(|(slot, _)| Body::new(slot + front, Vec2::zeros())).collect()
+        let front = Vec3::new(front.x, front.y, 0.0);
+        starts(8).into_iter().map(|(slot, _)| Body::new(slot + front, Vec3::zeros())).collect()
     }
 
     /// The body, shifted to the left by this, m.
     fn moved(body: Body, left_m: f64) -> Body {
-        Body::new(body.position() + Vec2::new(0.0, left_m), body.velocity())
+        Body::new(body.position() + Vec3::new(0.0, left_m, 0.0), body.velocity())
     }
 
     fn hold(stop_x_m: f64) -> WorldParams {
@@ -163,9 +166,9 @@ mod tests {
     #[test]
     fn a_fast_drone_or_one_beside_an_obstacle_prevents_the_end() {
         let mut all = formed(Vec2::zeros());
-        all[7] = Body::new(all[7].position(), Vec2::new(0.0, 1.01));
+        all[7] = Body::new(all[7].position(), Vec3::new(0.0, 1.01, 0.0));
         assert!(!is_met(&hold(0.0), &all, &open()));
-        all[7] = Body::new(all[7].position(), Vec2::new(0.0, 1.0));
+        all[7] = Body::new(all[7].position(), Vec3::new(0.0, 1.0, 0.0));
         assert!(is_met(&hold(0.0), &all, &open()));
         let last = all.iter().map(|body| body.position().x).fold(f64::INFINITY, f64::min);
         let behind = |gap: f64| Stages::new(&[Outline::new(&rectangle(last - gap - 10.0, 0.0, 10.0, 5.0))], 40.0);

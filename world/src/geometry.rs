@@ -3,8 +3,8 @@
 use parry2d_f64::math::Vector;
 use parry2d_f64::query::PointQuery;
 use parry2d_f64::shape::Segment;
-use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Vec2, Vec3};
 
 /// An obstacle's outline, prepared for distance queries.
 #[derive(Clone, Debug)]
@@ -14,13 +14,15 @@ pub(crate) struct Outline {
     radius_m: f64,
     low: Vec2,
     high: Vec2,
+    floor_m: f64,
+    top_m: f64,
 }
 
 /// The point of an obstacle's surface nearest to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Nearest {
     /// World frame, m.
-    pub(crate) point: Vec2,
+    pub(crate) point: Vec3,
     /// Distance to the surface, m; negative if the query point is inside.
     pub(crate) distance_m: f64,
 }
@@ -37,6 +39,8 @@ impl Outline {
             radius_m: shape.radius_m,
             low,
             high,
+            floor_m: f64::NEG_INFINITY,
+            top_m: f64::INFINITY,
         }
     }
 
@@ -50,13 +54,40 @@ impl Outline {
         self.high
     }
 
-    /// Square of the distance to the bounding box, m². The distance to the outline itself is never shorter.
-    pub(crate) fn box_distance_squared(&self, point: Vec2) -> f64 {
-        (point - point.sup(&self.low).inf(&self.high)).norm_squared()
+    /// Square of the distance to the bounding box, m². The distance to the obstacle itself is never shorter.
+    pub(crate) fn box_distance_squared(&self, point: Vec3) -> f64 {
+        let (place, gap) = (point.xy(), self.gap_m(point.z).max(0.0));
+        (place - place.sup(&self.low).inf(&self.high)).norm_squared() + gap * gap
     }
 
     /// The nearest point of the surface, exact up to rounding.
-    pub(crate) fn nearest(&self, point: Vec2) -> Nearest {
+    pub(crate) fn nearest(&self, point: Vec3) -> Nearest {
+        let (place, beside_m) = self.nearest_on_outline(point.xy());
+        let gap_m = self.gap_m(point.z);
+        if beside_m <= 0.0 && gap_m > beside_m {
+            return Nearest { point: Vec3::new(point.x, point.y, self.face_m(point.z)), distance_m: gap_m };
+        }
+        if gap_m <= 0.0 {
+            return Nearest { point: Vec3::new(place.x, place.y, point.z), distance_m: beside_m };
+        }
+        Nearest {
+            point: Vec3::new(place.x, place.y, self.face_m(point.z)),
+            distance_m: (beside_m * beside_m + gap_m * gap_m).sqrt(),
+        }
+    }
+
+    /// How far an altitude is above the top or below the floor, m; negative between them.
+    fn gap_m(&self, altitude_m: f64) -> f64 {
+        (self.floor_m - altitude_m).max(altitude_m - self.top_m)
+    }
+
+    /// The altitude of the floor or of the top, whichever is nearer, m.
+    fn face_m(&self, altitude_m: f64) -> f64 {
+        if self.floor_m - altitude_m > altitude_m - self.top_m { self.floor_m } else { self.top_m }
+    }
+
+    /// The nearest point of the outline in the plane, and the distance to it, m; negative inside.
+    fn nearest_on_outline(&self, point: Vec2) -> (Vec2, f64) {
         let query = Vector::new(point.x, point.y);
         let (mut best, mut inside) = ((f64::INFINITY, Vec2::zeros(), Vec2::zeros()), self.edges.len() > 2);
         for edge in &self.edges {
@@ -72,7 +103,7 @@ impl Outline {
         let distance = square.sqrt();
         let side = if inside { -1.0 } else { 1.0 };
         let outward = if distance > 0.0 { (point - foot) * (side / distance) } else { face(normal) };
-        Nearest { point: foot + outward * self.radius_m, distance_m: side * distance - self.radius_m }
+        (foot + outward * self.radius_m, side * distance - self.radius_m)
     }
 }
 
@@ -88,8 +119,8 @@ mod tests {
     use crate::testing::rectangle;
     use proptest::prelude::*;
 
-    fn nearest(shape: &ConvexShape, x: f64, y: f64) -> Nearest {
-        Outline::new(shape).nearest(Vec2::new(x, y))
+    fn nearest(shape: &ConvexShape, x: f64, y: f64) -> (Vec2, f64) {
+        Outline::new(shape).nearest_on_outline(Vec2::new(x, y))
     }
 
     fn rounded_square() -> ConvexShape {
@@ -100,29 +131,29 @@ mod tests {
     #[test]
     fn the_distance_is_negative_inside_a_rectangle() {
         let shape = rectangle(0.0, 0.0, 10.0, 75.0);
-        assert_eq!(nearest(&shape, -30.0, 5.0), Nearest { point: Vec2::new(-10.0, 5.0), distance_m: 20.0 });
-        assert_eq!(nearest(&shape, 8.0, 5.0), Nearest { point: Vec2::new(10.0, 5.0), distance_m: -2.0 });
-        assert_eq!(nearest(&shape, 13.0, 79.0), Nearest { point: Vec2::new(10.0, 75.0), distance_m: 5.0 });
-        assert_eq!(nearest(&shape, 10.0, 0.0).distance_m, 0.0);
+        assert_eq!(nearest(&shape, -30.0, 5.0), (Vec2::new(-10.0, 5.0), 20.0));
+        assert_eq!(nearest(&shape, 8.0, 5.0), (Vec2::new(10.0, 5.0), -2.0));
+        assert_eq!(nearest(&shape, 13.0, 79.0), (Vec2::new(10.0, 75.0), 5.0));
+        assert_eq!(nearest(&shape, 10.0, 0.0).1, 0.0);
     }
 
     #[test]
     fn the_radius_grows_the_shape_on_every_side() {
-        assert_eq!(nearest(&rounded_square(), 5.0, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: 2.0 });
-        assert_eq!(nearest(&rounded_square(), 2.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -0.5 });
-        assert_eq!(nearest(&rounded_square(), 1.5, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -1.5 });
-        assert_eq!(nearest(&rounded_square(), 2.0, 1.0), Nearest { point: Vec2::new(3.0, 1.0), distance_m: -1.0 });
+        assert_eq!(nearest(&rounded_square(), 5.0, 1.0), (Vec2::new(3.0, 1.0), 2.0));
+        assert_eq!(nearest(&rounded_square(), 2.5, 1.0), (Vec2::new(3.0, 1.0), -0.5));
+        assert_eq!(nearest(&rounded_square(), 1.5, 1.0), (Vec2::new(3.0, 1.0), -1.5));
+        assert_eq!(nearest(&rounded_square(), 2.0, 1.0), (Vec2::new(3.0, 1.0), -1.0));
     }
 
     #[test]
     fn discs_and_capsules_have_distances() {
         let disc = ConvexShape::circle(Vec2::new(3.0, 4.0), 2.0).unwrap();
-        assert_eq!(nearest(&disc, 0.0, 0.0).distance_m, 3.0);
-        assert_eq!(nearest(&disc, 3.0, 4.0), Nearest { point: Vec2::new(1.0, 4.0), distance_m: -2.0 });
+        assert_eq!(nearest(&disc, 0.0, 0.0).1, 3.0);
+        assert_eq!(nearest(&disc, 3.0, 4.0), (Vec2::new(1.0, 4.0), -2.0));
         let capsule = ConvexShape::new(&[Vec2::zeros(), Vec2::new(10.0, 0.0)], 1.0).unwrap();
-        assert_eq!(nearest(&capsule, 5.0, -3.0), Nearest { point: Vec2::new(5.0, -1.0), distance_m: 2.0 });
-        assert_eq!(nearest(&capsule, 5.0, 0.0).distance_m, -1.0);
-        assert_eq!(nearest(&capsule, 13.0, 4.0).distance_m, 4.0);
+        assert_eq!(nearest(&capsule, 5.0, -3.0), (Vec2::new(5.0, -1.0), 2.0));
+        assert_eq!(nearest(&capsule, 5.0, 0.0).1, -1.0);
+        assert_eq!(nearest(&capsule, 13.0, 4.0).1, 4.0);
     }
 
     /// Points of the surface at close intervals: along the edges, moved outward, and around the corners.
@@ -149,15 +180,15 @@ mod tests {
             let core = ConvexShape::rectangle(Vec2::new(3.0, -2.0), Vec2::new(hx, hy), turn).unwrap();
             let shape = ConvexShape { radius_m: radius, ..core };
             let (point, outline) = (Vec2::new(x, y), Outline::new(&shape));
-            let found = outline.nearest(point);
+            let found = outline.nearest_on_outline(point);
             // The arcs also sample points inside the rounded outline. From a point outside, those can only be farther away.
             let sampled = surface(&shape).iter().map(|s| (s - point).norm()).fold(f64::INFINITY, f64::min);
-            if found.distance_m > 0.0 {
-                prop_assert!((found.distance_m - sampled).abs() < 0.05, "{found:?}, sampled {sampled}");
+            if found.1 > 0.0 {
+                prop_assert!((found.1 - sampled).abs() < 0.05, "{found:?}, sampled {sampled}");
             }
-            prop_assert!(((found.point - point).norm() - found.distance_m.abs()).abs() < 1e-9);
-            prop_assert!(outline.nearest(found.point).distance_m.abs() < 1e-9);
-            prop_assert!(outline.box_distance_squared(point).sqrt() <= found.distance_m.max(0.0) + 1e-9);
+            prop_assert!(((found.0 - point).norm() - found.1.abs()).abs() < 1e-9);
+            prop_assert!(outline.nearest_on_outline(found.0).1.abs() < 1e-9);
+            prop_assert!(outline.box_distance_squared(point.push(7.0)).sqrt() <= found.1.max(0.0) + 1e-9);
         }
 
         #[test]
@@ -168,7 +199,7 @@ mod tests {
             let point = centre + nalgebra::Rotation2::new(turn) * local;
             let depth = (half.x - local.x.abs()).min(half.y - local.y.abs()) + radius;
             let found = nearest(&ConvexShape { radius_m: radius, ..core }, point.x, point.y);
-            prop_assert!((found.distance_m + depth).abs() < 1e-9, "{found:?}, depth {depth}");
+            prop_assert!((found.1 + depth).abs() < 1e-9, "{found:?}, depth {depth}");
         }
     }
 }

@@ -15,7 +15,7 @@
 //! The crate is pure: no clock, thread, process or randomness of the operating system. The same calls give the same
 //! bits. It does not know what drones think, whether a radio delivers a frame, or what a process is.
 //!
-//! World frame: x along the flight, y to its left. SI units.
+//! World frame: x along the flight, y to its left, z up from the ground. SI units.
 //!
 //! # Example
 //!
@@ -25,7 +25,7 @@
 //! use skein_protocol::formation::Shape;
 //! use skein_protocol::nearby::Locality;
 //! use skein_protocol::slot::Slot;
-//! use skein_protocol::{DroneId, Vec2};
+//! use skein_protocol::{DroneId, Vec3};
 //! use skein_world::faults::FaultPlan;
 //! use skein_world::{End, Failsafe, World, WorldParams};
 //!
@@ -50,16 +50,16 @@
 //!     spacing_m: 35.0,
 //!     faults: FaultPlan::default(),
 //! };
-//! let start = (Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0));
+//! let start = (Vec3::new(0.0, 0.0, 50.0), Vec3::new(10.0, 0.0, 0.0));
 //! let mut world = World::new(params, &[start], &[])?;
 //!
 //! assert!(world.process_commands().is_empty());
 //! assert_eq!(world.downlink().drones.len(), 1);
-//! world.take_slot(DroneId(0), &Slot { acceleration_mps2: [1.0, 0.0], ..Slot::default() });
+//! world.take_slot(DroneId(0), &Slot { acceleration_mps2: [1.0, 0.0, 0.0], ..Slot::default() });
 //! world.advance();
 //!
 //! let row = world.record().rows[0];
-//! assert_eq!(row.velocity_mps, [10.02, 0.0]);
+//! assert_eq!(row.velocity_mps, [10.02, 0.0, 0.0]);
 //! assert_eq!(world.tick(), 1);
 //! assert_eq!(world.ended(), None);
 //! # Ok::<(), skein_world::WorldError>(())
@@ -93,5 +93,5 @@ mod tuning;
 mod uplink;
 mod world;
 
-pub use params::{End, Failsafe, WorldError, WorldParams, landing_s};
+pub use params::{End, Failsafe, WorldError, WorldParams};
 pub use world::World;

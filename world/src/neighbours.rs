@@ -43,11 +43,11 @@ impl Neighbours {
     fn find_by_grid(&mut self, bodies: &[Body], radius_m: f64) {
         self.restart();
         let flying = bodies.iter().enumerate().filter(|(_, body)| body.flies());
-        self.grid.fill(radius_m, flying.map(|(i, body)| (i as u32, body.position())));
+        self.grid.fill(radius_m, flying.map(|(i, body)| (i as u32, body.position().xy())));
         for (i, body) in bodies.iter().enumerate() {
             let first = self.ids.len();
             if body.flies() {
-                self.grid.each_near(body.position(), |j| {
+                self.grid.each_near(body.position().xy(), |j| {
                     if j as usize != i && near(body, &bodies[j as usize], radius_m) {
                         self.ids.push(j);
                     }

@@ -1,7 +1,6 @@
 //! The parameters of a world. SI units, world frame.
 
 use crate::fault_plan::FaultPlan;
-use crate::tuning::{DESCENT_MPS, FLIGHT_ALTITUDE_M};
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::SharedChannel;
@@ -16,12 +15,6 @@ pub enum Failsafe {
     Hover,
     /// Brakes to a stop and descends. Once it is down, it is no body any more.
     Land,
-}
-
-/// How long a landing drone stays a body after it has stopped, s.
-#[must_use]
-pub fn landing_s() -> f64 {
-    FLIGHT_ALTITUDE_M / DESCENT_MPS
 }
 
 /// When the mission is over.

@@ -5,7 +5,7 @@ use crate::sensor_fault::SensorFault;
 use crate::sweep::{Contact, SensorSweep};
 use skein_protocol::downlink::{Downlink, SensedNeighbour, SensedObstacle, SensedShape, SensesHeader};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, ObstacleId, Vec2};
+use skein_protocol::{DroneId, ObstacleId, Vec2, Vec3, raised};
 
 /// Marks a shape that the downlink does not hold yet.
 const NOT_WRITTEN: u32 = u32::MAX;
@@ -49,8 +49,8 @@ impl SenseWriter {
                 write_neighbours(body, bodies, sweep.neighbours_of(drone), range, down);
             }
             down.drones.push(SensesHeader {
-                position_m: (body.position() + sensor_fault.position_error_m).into(),
-                velocity_mps: (body.velocity() + sensor_fault.velocity_error_mps).into(),
+                position_m: shifted(body.position(), sensor_fault.position_error_m),
+                velocity_mps: shifted(body.velocity(), sensor_fault.velocity_error_mps),
                 obstacle_first,
                 obstacle_count: down.obstacles.len() as u32 - obstacle_first,
                 neighbour_first,
@@ -74,12 +74,17 @@ impl SenseWriter {
             down.shapes.push(SensedShape { shape, id, reserved: 0 });
         }
         down.obstacles.push(SensedObstacle {
-            nearest_m: (contact.nearest.point + error_m).into(),
+            nearest_m: shifted(contact.nearest.point, error_m),
             distance_m: contact.nearest.distance_m,
             shape: self.places[obstacle],
             reserved: 0,
         });
     }
+}
+
+/// A point or vector with a horizontal error.
+fn shifted(value: Vec3, error: Vec2) -> [f64; 3] {
+    raised(value.xy() + error, value.z)
 }
 
 fn write_neighbours(body: &Body, bodies: &[Body], ids: &[u32], range_m: f64, down: &mut Downlink) {
@@ -132,7 +137,7 @@ mod tests {
         let view = down.view();
         let first = view.senses(DroneId(0)).unwrap();
         assert_eq!(first.obstacles.len(), 1);
-        assert_eq!((first.obstacles[0].nearest_m, first.obstacles[0].distance_m), ([90.0, 0.0], 90.0));
+        assert_eq!((first.obstacles[0].nearest_m, first.obstacles[0].distance_m), ([90.0, 0.0, 50.0], 90.0));
         assert_eq!(first.shape(&first.obstacles[0]).unwrap().id, ObstacleId(1));
         assert!(view.senses(DroneId(1)).unwrap().obstacles.is_empty());
         assert_eq!(view.senses(DroneId(2)).unwrap().obstacles[0].distance_m, 70.0);
@@ -145,7 +150,7 @@ mod tests {
         all[1].kill();
         let down = sensed(&all, &[rectangle(80.0, 0.0, 10.0, 10.0)], Some(66.0));
         let (living, dead) = (down.view().senses(DroneId(0)).unwrap(), down.view().senses(DroneId(1)).unwrap());
-        assert_eq!((living.obstacles.len(), living.neighbours[0].position_m), (1, [50.0, 0.0]));
+        assert_eq!((living.obstacles.len(), living.neighbours[0].position_m), (1, [50.0, 0.0, 0.0]));
         assert!(dead.obstacles.is_empty() && dead.neighbours.is_empty());
         assert_eq!((down.drones[0].alive, down.drones[1].alive), (1, 0));
     }
@@ -157,9 +162,9 @@ mod tests {
         let all = bodies(&[[0.0, 0.0], [50.0, 0.0]]);
         let down = sensed_with(&all, &[rectangle(80.0, 0.0, 10.0, 10.0)], Some(66.0), sensor_fault);
         let senses = down.view().senses(DroneId(0)).unwrap();
-        assert_eq!((senses.position, senses.velocity), (position_error_m, velocity_error_mps));
-        assert_eq!((senses.obstacles[0].nearest_m, senses.obstacles[0].distance_m), ([73.0, -1.0], 70.0));
-        assert_eq!(senses.neighbours[0].position_m, [50.0, 0.0]);
+        assert_eq!((senses.position_m, senses.velocity_mps), ([3.0, -1.0, 50.0], [0.5, 0.0, 0.0]));
+        assert_eq!((senses.obstacles[0].nearest_m, senses.obstacles[0].distance_m), ([73.0, -1.0, 50.0], 70.0));
+        assert_eq!(senses.neighbours[0].position_m, [50.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -113,7 +113,7 @@ mod tests {
     use crate::event_log::tests::read;
     use crate::geometry::Nearest;
     use crate::testing::{bodies, event_kinds, rectangle};
-    use skein_protocol::Vec2;
+    use skein_protocol::Vec3;
 
     /// The forest of the paper, its second set listed first.
     fn forest() -> Stages {
@@ -126,7 +126,7 @@ mod tests {
     }
 
     fn contact(drone: u32, obstacle: u32) -> Contact {
-        Contact { drone, obstacle, nearest: Nearest { point: Vec2::zeros(), distance_m: 60.0 } }
+        Contact { drone, obstacle, nearest: Nearest { point: Vec3::zeros(), distance_m: 60.0 } }
     }
 
     #[test]
@@ -172,7 +172,7 @@ mod tests {
         stages.pass(&all, SimTime(2), &mut log);
         stages.pass(&all, SimTime(3), &mut log);
         assert_eq!(event_kinds(read(&mut log)), [EventKind::Passed { stage: 0 }]);
-        all[0] = Body::new(Vec2::new(700.0, 0.0), Vec2::zeros());
+        all[0] = Body::new(Vec3::new(700.0, 0.0, 50.0), Vec3::zeros());
         all[0].kill();
         stages.pass(&all, SimTime(4), &mut log);
         assert_eq!(read(&mut log), [], "without living drones no set is passed");

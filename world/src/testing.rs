@@ -9,7 +9,7 @@ use skein_protocol::nearby::Locality;
 use skein_protocol::record::{EventKind, RunEvent};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{DroneId, Vec2, Vec3};
 
 /// The paper's first scene: spacing 35 m, safe distance 33 m, ticks of 20 ms.
 pub(crate) fn params() -> WorldParams {
@@ -36,17 +36,19 @@ pub(crate) fn params() -> WorldParams {
     }
 }
 
-/// A nested V of `count` drones with its front at the origin, flying at 10 m/s.
-pub(crate) fn starts(count: usize) -> Vec<(Vec2, Vec2)> {
-    Shape::NestedV.slots(count, 35.0).into_iter().map(|slot| (slot, Vec2::new(10.0, 0.0))).collect()
+/// A nested V of `count` drones with its front above the origin, flying at 10 m/s, 50 m above the ground.
+pub(crate) fn starts(count: usize) -> Vec<(Vec3, Vec3)> {
+    let slots = Shape::NestedV.slots(count, 35.0).into_iter();
+    slots.map(|slot| (Vec3::new(slot.x, slot.y, 50.0), Vec3::new(10.0, 0.0, 0.0))).collect()
 }
 
 pub(crate) fn rectangle(x: f64, y: f64, half_x: f64, half_y: f64) -> ConvexShape {
     ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(half_x, half_y), 0.0).unwrap()
 }
 
-pub(crate) fn bodies(positions: &[[f64; 2]]) -> Vec<Body> {
-    positions.iter().map(|&p| Body::new(Vec2::from(p), Vec2::zeros())).collect()
+/// Bodies at rest above these places, 50 m above the ground.
+pub(crate) fn bodies(places: &[[f64; 2]]) -> Vec<Body> {
+    places.iter().map(|&[x, y]| Body::new(Vec3::new(x, y, 50.0), Vec3::zeros())).collect()
 }
 
 /// Lets every drone answer `slot` and advances one tick. Gives its events.
@@ -71,5 +73,5 @@ pub(crate) fn event_kinds(events: Vec<RunEvent>) -> Vec<EventKind> {
 
 /// A slot that commands an acceleration.
 pub(crate) fn command(x: f64, y: f64) -> Slot {
-    Slot { acceleration_mps2: [x, y], ..Slot::default() }
+    Slot { acceleration_mps2: [x, y, 0.0], ..Slot::default() }
 }

@@ -30,7 +30,7 @@ impl TickDigest {
         self.word(tick);
         for (body, process) in drones.bodies().iter().zip(drones.processes()) {
             let (position, velocity) = (body.position(), body.velocity());
-            for value in [position.x, position.y, velocity.x, velocity.y, body.energy_j()] {
+            for value in [position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, body.energy_j()] {
                 self.word(value.to_bits());
             }
             self.word(u64::from(body.is_alive()));

@@ -1,10 +1,8 @@
 //! Every tuned number of this crate, with its unit, how it was found, and the command that finds it again.
 
-/// Altitude from which a drone without a process lands, m. Chosen by hand; no command measures it.
-pub(crate) const FLIGHT_ALTITUDE_M: f64 = 20.0;
-
-/// Speed at which a landing drone descends, m/s. Chosen by hand; no command measures it.
-pub(crate) const DESCENT_MPS: f64 = 2.0;
+/// Speed at which a drone without a process comes down, m/s. Chosen by hand, as that of a drone under a parachute; no command
+/// measures it.
+pub(crate) const DESCENT_MPS: f64 = 5.0;
 
 /// Up to this number of bodies, comparing every pair is faster than filling a grid.
 ///

@@ -22,7 +22,7 @@ use skein_protocol::nearby::Locality;
 use skein_protocol::record::{EventKind, FaultKind, Outcome, Percentiles, RecordView};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
-use skein_protocol::{DroneId, SimTime, Tick, Vec2};
+use skein_protocol::{DroneId, SimTime, Tick, Vec3};
 
 /// The true state of one mission.
 ///
@@ -63,7 +63,7 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError`] names the parameter, start or obstacle that is invalid.
-    pub fn new(params: WorldParams, starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<Self, WorldError> {
+    pub fn new(params: WorldParams, starts: &[(Vec3, Vec3)], obstacles: &[ConvexShape]) -> Result<Self, WorldError> {
         params.check()?;
         check_bodies(starts, obstacles)?;
         let outlines: Vec<Outline> = obstacles.iter().map(Outline::new).collect();
@@ -325,7 +325,7 @@ impl World {
 
     fn move_bodies(&mut self, opening: SimTime) {
         let faults = self.faults.schedule();
-        let rejected = self.drones.fly(&self.params, |id| faults.wind_mps2(id, opening));
+        let rejected = self.drones.fly(&self.params, |id| faults.wind_mps2(id, opening).push(0.0));
         self.counters.count_rejected(rejected);
     }
 
@@ -371,8 +371,8 @@ impl World {
     }
 }
 
-fn check_bodies(starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]) -> Result<(), WorldError> {
-    let finite = |v: &Vec2| v.iter().all(|part| part.is_finite());
+fn check_bodies(starts: &[(Vec3, Vec3)], obstacles: &[ConvexShape]) -> Result<(), WorldError> {
+    let finite = |v: &Vec3| v.iter().all(|part| part.is_finite());
     if let Some(drone) = starts.iter().position(|(position, velocity)| !finite(position) || !finite(velocity)) {
         return Err(WorldError::Start(drone));
     }

@@ -12,7 +12,7 @@ use skein_pilot::{Heard, Inbox, Out};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
 use skein_protocol::formation::HOLD_SPEED_MPS;
-use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2, horizontal, raised};
 
 /// One simulated drone.
 #[derive(Clone, Debug)]
@@ -131,14 +131,13 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         for i in 0..self.drones.len() {
             let around = self.look_around(i, shapes);
             let drone = &mut self.drones[i];
-            let body = (drone.position, drone.velocity);
+            let body = (raised(drone.position, 0.0), raised(drone.velocity, 0.0));
             let senses = Senses::new((self.step, self.now), body, &around.obstacles, &around.neighbours, shapes);
             out.clear();
             let command = drone.pilot.step(&senses, &Inbox::new(&heard), &mut out);
             // A velocity is reached within a step.
-            let velocity_mps = [drone.velocity.x, drone.velocity.y, 0.0];
-            let [x, y, _] = command.acceleration_mps2(velocity_mps, 1.0 / self.step_s);
-            accelerations.push(Vec2::new(x, y));
+            let acceleration_mps2 = command.acceleration_mps2(raised(drone.velocity, 0.0), 1.0 / self.step_s);
+            accelerations.push(horizontal(acceleration_mps2));
             let source = drone.pilot.id();
             said.extend(out.messages().iter().map(|&message| (source, message)));
         }
@@ -156,7 +155,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
             let distance_m = to_core.norm() - shape.shape.radius_m;
             self.safe &= distance_m >= self.params.clearance_m;
             if distance_m < self.params.detection_range_m {
-                let nearest_m = (position + to_core * (distance_m / to_core.norm().max(1e-9))).into();
+                let nearest_m = raised(position + to_core * (distance_m / to_core.norm().max(1e-9)), 0.0);
                 around.obstacles.push(SensedObstacle { nearest_m, distance_m, shape: entry, reserved: 0 });
             }
         }
@@ -164,8 +163,13 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
             let offset = other.position - position;
             self.safe &= offset.norm() >= self.params.safe_distance_m;
             if offset.norm() <= self.params.ranging_m {
-                let (drone, velocity_mps) = (other.pilot.id(), (other.velocity - velocity).into());
-                around.neighbours.push(SensedNeighbour { position_m: offset.into(), velocity_mps, drone, reserved: 0 });
+                let (drone, velocity_mps) = (other.pilot.id(), raised(other.velocity - velocity, 0.0));
+                around.neighbours.push(SensedNeighbour {
+                    position_m: raised(offset, 0.0),
+                    velocity_mps,
+                    drone,
+                    reserved: 0,
+                });
             }
         }
         around

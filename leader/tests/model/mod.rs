@@ -177,7 +177,8 @@ impl Mission {
     fn own(id: u32, step: u32) -> OwnState {
         let y_m = if id.is_multiple_of(2) { 30.0 } else { -30.0 };
         let x_m = 20.0 - 20.0 * f64::from(id) + SPEED_MPS * PERIODS.dt_s * f64::from(step);
-        OwnState { tick: u64::from(step), position: Vec2::new(x_m, y_m), velocity: Vec2::new(SPEED_MPS, 0.0) }
+        let (position, velocity) = (Vec2::new(x_m, y_m), Vec2::new(SPEED_MPS, 0.0));
+        OwnState { tick: u64::from(step), position, velocity, altitude_m: 50.0, climb_mps: 0.0 }
     }
 
     /// All drones hear the messages that are due, then all act.

@@ -68,7 +68,7 @@ impl Swarm {
     pub(crate) fn new(periods: Periods, air: Air, drones: usize) -> Self {
         let own = |i: usize| {
             let position = Vec2::new(-40.0 * i as f64, 7.0 * i as f64 - 3.0 * drones as f64);
-            OwnState { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0) }
+            OwnState { tick: 0, position, velocity: Vec2::new(SPEED_MPS, 0.0), altitude_m: 50.0, climb_mps: 0.0 }
         };
         let machine = |i| Some(Leading::new(&params(&periods, drones as u32, i, 1, SimTime::ZERO)));
         Self {

@@ -21,7 +21,7 @@ pub use rule::Rule;
 pub use shared_channel::{ChannelQueue, HEAD_BYTES, SharedChannel};
 pub use topic_set::TopicSet;
 
-use crate::Vec2;
+use crate::Vec3;
 use crate::frame::AirFrame;
 use crate::ids::DroneId;
 use crate::message::Topic;
@@ -65,11 +65,11 @@ impl Radio {
     /// The outcome of a frame that was transmitted at `aired`. `path` is the vector from the sender to the receiver, world
     /// frame, m.
     #[must_use]
-    pub fn outcome(&self, link: Link, path: Vec2, aired: SimTime) -> Delivery {
+    pub fn outcome(&self, link: Link, path: Vec3, aired: SimTime) -> Delivery {
         self.outcome_in(self.channel_of(link), link, path, aired)
     }
 
-    fn outcome_in(&self, channel: &ChannelModel, link: Link, path: Vec2, aired: SimTime) -> Delivery {
+    fn outcome_in(&self, channel: &ChannelModel, link: Link, path: Vec3, aired: SimTime) -> Delivery {
         let draw = |purpose| KeyedRng::of_frame(self.seed, link, purpose).unit();
         if let Some(range) = channel.range {
             let heard = range.heard(path.norm_squared());
@@ -100,14 +100,14 @@ impl Radio {
     /// The outcome of a frame, with the stamp of the world, at one receiver. `here` is the receiver's position one tick
     /// after the frame was sent, world frame, m. `dt_ns` is the length of a tick, ns.
     #[must_use]
-    pub fn delivery(&self, frame: &AirFrame, receiver: DroneId, here: Vec2, dt_ns: i64) -> Delivery {
+    pub fn delivery(&self, frame: &AirFrame, receiver: DroneId, here: Vec3, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, receiver);
         self.delivery_in(self.channel_of(link), frame, (link, here), dt_ns)
     }
 
     /// The same as [`Radio::delivery`], for a receiver whose channel models were looked up with [`Radio::channels_at`].
     #[must_use]
-    pub fn delivery_at(&self, channels: &ReceiverChannels, frame: &AirFrame, here: Vec2, dt_ns: i64) -> Delivery {
+    pub fn delivery_at(&self, channels: &ReceiverChannels, frame: &AirFrame, here: Vec3, dt_ns: i64) -> Delivery {
         let link = Link::of(frame, channels.receiver);
         let place = match channels.places.get(usize::from(link.topic).wrapping_sub(1)) {
             Some(place) => *place,
@@ -124,7 +124,7 @@ impl Radio {
         &self,
         channel: &ChannelModel,
         frame: &AirFrame,
-        (link, here): (Link, Vec2),
+        (link, here): (Link, Vec3),
         dt_ns: i64,
     ) -> Delivery {
         if frame.queue_ns == NEVER_TRANSMITTED {

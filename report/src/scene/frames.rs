@@ -7,7 +7,7 @@ use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Delivery, DropReason};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{DroneId, Message, Vec2};
+use skein_protocol::{DroneId, Message, Vec3};
 use std::sync::LazyLock;
 
 /// The letter of a receiver that a frame does not concern: its sender or a dead drone.
@@ -24,7 +24,7 @@ pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, 
     if let Some(reason) = row.link_faults.drop_reason(frame.link_faults) {
         return letter(reason);
     }
-    match scene.radio.delivery(frame, receiver, Vec2::from(row.position_m), dt_ns) {
+    match scene.radio.delivery(frame, receiver, Vec3::from(row.position_m), dt_ns) {
         Delivery::Deliver { .. } => 'h',
         Delivery::Drop(reason) => letter(reason),
     }
@@ -95,7 +95,7 @@ mod tests {
             tick: 3,
             source: DroneId(0),
             sequence,
-            position_m: [0.0; 2],
+            position_m: [0.0, 0.0, 50.0],
             queue_ns: 0,
             link_faults: Default::default(),
             frame: Message::Passed(passed).encode(),

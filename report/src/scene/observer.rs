@@ -157,7 +157,7 @@ mod tests {
             tick,
             source: DroneId(1),
             sequence: tick as u32,
-            position_m: [0.0; 2],
+            position_m: [0.0, 0.0, 50.0],
             queue_ns: 0,
             link_faults: Default::default(),
             frame: Message::Passed(passed).encode(),

@@ -61,7 +61,7 @@ mod tests {
             tick: 0,
             source: DroneId(0),
             sequence: 0,
-            position_m: [0.0; 2],
+            position_m: [0.0, 0.0, 50.0],
             queue_ns: 0,
             link_faults: Default::default(),
             frame: message.encode(),

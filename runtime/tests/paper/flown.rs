@@ -53,11 +53,11 @@ pub(crate) fn fly_file(name: &str, sets: &[(&str, &str)]) -> Flown {
 }
 
 pub(crate) fn position(row: &DroneRow) -> Vec2 {
-    row.position_m.into()
+    skein_protocol::horizontal(row.position_m)
 }
 
 pub(crate) fn velocity(row: &DroneRow) -> Vec2 {
-    row.velocity_mps.into()
+    skein_protocol::horizontal(row.velocity_mps)
 }
 
 impl Flown {

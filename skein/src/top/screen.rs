@@ -141,7 +141,7 @@ fn drones(view: &SwarmView) -> Vec<Line> {
     );
     let mut lines = vec![bold(head)];
     for (drone, row) in view.rows.iter().enumerate() {
-        let [x, y] = row.position_m;
+        let [x, y, _] = row.position_m;
         let speed = row.velocity_mps[0].hypot(row.velocity_mps[1]);
         let leader = row.leader().map_or("-".to_owned(), |leader| leader.to_string());
         let phase = if row.alive() { row.phase().name() } else { "dead" };

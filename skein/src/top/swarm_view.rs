@@ -111,7 +111,7 @@ impl SwarmView {
 
 /// The least distance between two living drones. Sorted by x, so that far pairs are skipped.
 fn separation(rows: &[DroneRow]) -> Option<f64> {
-    let mut places: Vec<[f64; 2]> = rows.iter().filter(|row| row.alive()).map(|row| row.position_m).collect();
+    let mut places: Vec<[f64; 3]> = rows.iter().filter(|row| row.alive()).map(|row| row.position_m).collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut least: Option<f64> = None;
     for (i, here) in places.iter().enumerate() {
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn only_living_drones_count_for_the_separation() {
-        let row = |x, y, flags| DroneRow { position_m: [x, y], flags, ..DroneRow::default() };
+        let row = |x, y, flags| DroneRow { position_m: [x, y, 50.0], flags, ..DroneRow::default() };
         let rows = [row(0.0, 0.0, ROW_ALIVE), row(1.0, 0.0, 0), row(30.0, 40.0, ROW_ALIVE), row(60.0, 0.0, ROW_ALIVE)];
         assert_eq!(separation(&rows), Some(50.0));
         assert_eq!(separation(&rows[..2]), None);

@@ -78,7 +78,7 @@ mod tests {
     use crate::drones::DroneTable;
     use crate::stages::Stages;
     use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED};
-    use skein_protocol::{Ballot, PlanStamp, Vec2};
+    use skein_protocol::{Ballot, PlanStamp, Vec3};
 
     fn slot(flags: u32, led: GroupId, round: u32, rank: u16) -> Slot {
         let ballot = Ballot { round, incarnation: 1, claimant: DroneId(0) };
@@ -87,7 +87,7 @@ mod tests {
 
     /// 0 leads the swarm under an old ballot, 2 under a new one; 1 leads N1; 3, 4 and 5 queue.
     fn resolved(targets: &FaultTargets, change: impl FnOnce(&mut DroneTable)) -> Vec<u32> {
-        let starts = [0.0, 1.0, 2.0, 30.0, 40.0, 50.0, 6.0].map(|x| (Vec2::new(x, 0.0), Vec2::zeros()));
+        let starts = [0.0, 1.0, 2.0, 30.0, 40.0, 50.0, 6.0].map(|x| (Vec3::new(x, 0.0, 50.0), Vec3::zeros()));
         let mut drones = DroneTable::new(&starts);
         let slots = [
             slot(SLOT_LEADS, GroupId::ALL, 1, 0),

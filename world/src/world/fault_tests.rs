@@ -57,7 +57,7 @@ fn a_frozen_drone_hovers_and_flies_on_later() {
     fly(&mut world, 190);
     let row = world.record().rows[ID.index()];
     assert!(world.is_frozen(ID) && world.is_alive(ID));
-    assert_eq!((row.velocity_mps, row.flags & (ROW_ALIVE | ROW_FROZEN)), ([0.0, 0.0], ROW_ALIVE | ROW_FROZEN));
+    assert_eq!((row.velocity_mps, row.flags & (ROW_ALIVE | ROW_FROZEN)), ([0.0; 3], ROW_ALIVE | ROW_FROZEN));
     let other = world.record().rows[2];
     assert!(row.energy_j > other.energy_j, "hovering takes more power than cruising, and is counted");
     let (commands, flown) = fly(&mut world, 30);

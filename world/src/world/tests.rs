@@ -8,7 +8,7 @@ use skein_protocol::shape::ShapeError;
 use skein_protocol::slot::SLOT_LEADS;
 use skein_protocol::{Ballot, Message, ObstacleId, PlanStamp};
 
-const CRUISE: [f64; 2] = [10.0, 0.0];
+const CRUISE: [f64; 3] = [10.0, 0.0, 0.0];
 
 fn eight(params: WorldParams, obstacles: &[ConvexShape]) -> World {
     World::new(params, &starts(8), obstacles).unwrap()
@@ -44,10 +44,10 @@ fn eight_drones_without_obstacles_run_out_of_time() {
 
 #[test]
 fn an_invalid_start_or_obstacle_is_named() {
-    let error = |starts: &[(Vec2, Vec2)], obstacles: &[ConvexShape]| {
+    let error = |starts: &[(Vec3, Vec3)], obstacles: &[ConvexShape]| {
         World::new(params(), starts, obstacles).map(|_| ()).unwrap_err()
     };
-    assert_eq!(error(&[(Vec2::new(f64::NAN, 0.0), Vec2::zeros())], &[]), WorldError::Start(0));
+    assert_eq!(error(&[(Vec3::new(0.0, 0.0, f64::NAN), Vec3::zeros())], &[]), WorldError::Start(0));
     let hollow = ConvexShape { count: 0, ..rectangle(0.0, 0.0, 1.0, 1.0) };
     let wrong = error(&[], &[rectangle(0.0, 0.0, 1.0, 1.0), hollow]);
     assert_eq!(wrong, WorldError::Obstacle { index: 1, error: ShapeError::Count(0) });
@@ -85,7 +85,7 @@ fn commands_that_are_not_finite_are_counted_and_huge_ones_clipped() {
     world.take_slot(DroneId(99), &command(1.0, 0.0));
     world.advance();
     assert_eq!(world.record().rows[0].velocity_mps, CRUISE);
-    assert_eq!(world.record().rows[1].velocity_mps, [10.0, 0.1]);
+    assert_eq!(world.record().rows[1].velocity_mps, [10.0, 0.1, 0.0]);
     assert_eq!(totals_of(&mut world).rejected_commands, 1);
 }
 
@@ -165,17 +165,17 @@ fn a_dead_drone_brakes_stays_and_sends_nothing() {
     assert_eq!(events(&world), [RunEvent { t_s: 0.02, what: fault }]);
     let row = world.record().rows[7];
     assert_eq!((row.flags, world.record().frames.len(), world.is_alive(DroneId(7))), (0, 0, false));
-    assert_eq!(row.velocity_mps, [9.9, 0.0]);
+    assert_eq!(row.velocity_mps, [9.9, 0.0, 0.0]);
     let energy = row.energy_j;
     fly(&mut world, &Slot::default());
     let row = world.record().rows[7];
-    assert_eq!((row.velocity_mps, row.energy_j), ([0.0, 0.0], energy));
+    assert_eq!((row.velocity_mps, row.energy_j), ([0.0; 3], energy));
     assert_eq!(world.downlink().drones[7].alive, 0);
 }
 
 #[test]
 fn dead_bodies_still_count_for_separation_until_they_have_landed() {
-    let pair = [(Vec2::zeros(), Vec2::zeros()), (Vec2::new(-200.0, 0.0), Vec2::new(10.0, 0.0))];
+    let pair = [(0.0, 0.0), (-200.0, 10.0)].map(|(x, vx)| (Vec3::new(x, 0.0, 50.0), Vec3::new(vx, 0.0, 0.0)));
     let outcome = |failsafe| {
         let mut world = World::new(WorldParams { failsafe, timeout_s: 30.0, ..params() }, &pair, &[]).unwrap();
         world.mark_dead(DroneId(0), FaultKind::Hung, false, "no answer");

@@ -9,7 +9,7 @@ use crate::stages::Stages;
 use crate::sweep::Contact;
 use crate::testing::rectangle;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{Ballot, GroupId, Phase, PlanStamp};
+use skein_protocol::{Ballot, GroupId, Phase, PlanStamp, Vec3};
 
 /// Three drones and one obstacle set around x = 100 m.
 struct Scene {
@@ -20,7 +20,7 @@ struct Scene {
 impl Scene {
     fn new() -> Self {
         Self {
-            drones: DroneTable::new(&[0.0, -50.0, -100.0].map(|x| (Vec2::new(x, 0.0), Vec2::zeros()))),
+            drones: DroneTable::new(&[0.0, -50.0, -100.0].map(|x| (Vec3::new(x, 0.0, 50.0), Vec3::zeros()))),
             stages: Stages::new(&[Outline::new(&rectangle(100.0, 0.0, 5.0, 50.0))], 40.0),
         }
     }
@@ -30,7 +30,7 @@ impl Scene {
     }
 
     fn detect(&mut self) {
-        let nearest = Nearest { point: Vec2::zeros(), distance_m: 60.0 };
+        let nearest = Nearest { point: Vec3::zeros(), distance_m: 60.0 };
         self.stages.detect(&[Contact { drone: 0, obstacle: 0, nearest }], SimTime::ZERO, &mut EventLog::default());
     }
 
@@ -160,7 +160,7 @@ fn events_about_an_obstacle_set_are_seen_in_their_order() {
     assert_eq!(places(&mut schedule, at(2.0), &scene), [1]);
     scene.obey(1, 2, Phase::Avoid, SLOT_QUEUED);
     assert_eq!(places(&mut schedule, at(3.0), &scene), [2]);
-    scene.drones.place(0, Vec2::new(100.0, 0.0));
+    scene.drones.place(0, Vec3::new(100.0, 0.0, 50.0));
     assert_eq!(places(&mut schedule, at(4.0), &scene), [3]);
     // A drone that re-forms before the set does not count.
     scene.obey(1, 3, Phase::Reform, 0);
@@ -168,7 +168,7 @@ fn events_about_an_obstacle_set_are_seen_in_their_order() {
     scene.obey(0, 3, Phase::Reform, 0);
     assert_eq!(places(&mut schedule, at(6.0), &scene), [4]);
     for drone in 0..3 {
-        scene.drones.place(drone, Vec2::new(200.0, 0.0));
+        scene.drones.place(drone, Vec3::new(200.0, 0.0, 50.0));
     }
     scene.stages.pass(scene.drones.bodies(), at(7.0), &mut EventLog::default());
     assert_eq!(places(&mut schedule, at(7.0), &scene), [5], "there is no second set");
