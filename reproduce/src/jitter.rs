@@ -61,7 +61,7 @@ pub(crate) fn rows(results: &Results, quick: bool) -> Vec<Row> {
             );
             let what = Quantity::new(prefix(quantity.id), words, quantity.unit, quantity.published);
             let row = what.row(json!(thousandths(found.mean)), commands.join("; "));
-            rows.push(Row { interval: Some([found.low, found.high].map(thousandths)), ..row });
+            rows.push(Row { interval: found.interval().map(|ends| ends.map(thousandths)), ..row });
         }
     }
     rows

@@ -18,6 +18,9 @@ pub struct Cell {
     pub values: Vec<String>,
     /// Number of runs by outcome.
     pub outcomes: BTreeMap<String, usize>,
+    /// Number of runs if all of them are one flight, with equal digests: the seed changes nothing. They give no interval. 0
+    /// otherwise.
+    pub equal: usize,
     /// Share of runs that reached their goal and kept every invariant.
     pub success: Option<Estimate>,
     /// One mean for each of [`METRICS`]; `None` if no run has a value.
@@ -44,7 +47,7 @@ impl Cell {
         json!({
             "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
             "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
-            "success": self.success, "metrics": metrics,
+            "equal_digests": self.equal > 0, "success": self.success, "metrics": metrics,
         })
     }
 }
@@ -65,25 +68,34 @@ pub(crate) fn cells(grid: &Grid<'_>, rows: &[Row]) -> Vec<Cell> {
     rows.chunk_by(|a, b| combination(a) == combination(b)).map(|rows| cell(grid, rows)).collect()
 }
 
+/// Whether these are at least two runs, all flown, with equal digests.
+fn are_equal(rows: &[Row]) -> bool {
+    let first = rows[0].digest.as_ref();
+    rows.len() > 1 && first.is_some() && rows.iter().all(|row| row.digest.as_ref() == first)
+}
+
 fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
     let combination = grid.job(rows[0].job).0;
     let mut outcomes = BTreeMap::new();
     for row in rows {
         *outcomes.entry(row.outcome.clone()).or_insert(0) += 1;
     }
+    let equal = if are_equal(rows) { rows.len() } else { 0 };
+    let valid = |estimate: Estimate| if equal > 0 { estimate.without_interval() } else { estimate };
     let reached = rows.iter().filter(|row| row.reached()).count();
     let flown = rows.iter().map(|row| &row.strategy).find(|strategy| !strategy.is_empty());
     let estimate = |i: usize| {
         let counts = |row: &&Row| row.reached() || !METRICS[i].reached_only;
         let values = rows.iter().filter(counts).filter_map(|row| row.metrics.get(i).copied().flatten());
-        mean(&values.collect::<Vec<f64>>())
+        mean(&values.collect::<Vec<f64>>()).map(valid)
     };
     Cell {
         scenario: grid.scenario_name(combination),
         strategy: flown.or(combination.strategy.as_ref()).cloned().unwrap_or_default(),
         values: combination.values.clone(),
         outcomes,
-        success: rate(reached, rows.len()),
+        equal,
+        success: rate(reached, rows.len()).map(valid),
         metrics: (0..METRICS.len()).map(estimate).collect(),
     }
 }
@@ -135,5 +147,38 @@ mod tests {
         let json = cells[1].json(&["radio.loss"]);
         assert_eq!((&json["grid"]["radio.loss"], &json["outcomes"]["failed"]), (&json!(0.5), &json!(1)));
         assert_eq!(json["metrics"]["mission_s"], Value::Null);
+    }
+
+    #[test]
+    fn runs_with_equal_digests_give_no_interval() {
+        let experiment = Experiment {
+            name: "e".to_owned(),
+            scenarios: vec![Mission::Random],
+            strategies: vec![],
+            seeds: vec![1, 2, 3],
+            grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
+            processes: false,
+            metrics: vec![],
+            bounds: SceneBounds::default(),
+        };
+        let grid = Grid::new(&experiment, &[]);
+        let row = |job: usize, digest: &str| Row {
+            metrics: METRICS.iter().map(|_| Some(50.0)).collect(),
+            digest: Some(digest.to_owned()),
+            ..Row::unflown(job, "reached", "")
+        };
+        let digests = ["a", "a", "a", "b", "b", "c"];
+        let rows: Vec<Row> = (0..).zip(digests).map(|(job, digest)| row(job, digest)).collect();
+        let cells = cells(&grid, &rows);
+        assert_eq!((cells[0].equal, cells[1].equal), (3, 0));
+        for name in [SUCCESS, "mission_s"] {
+            let interval = |cell: &Cell| cell.estimate(name).unwrap().interval();
+            assert!(interval(&cells[0]).is_none() && interval(&cells[1]).is_some(), "{name}");
+        }
+        let json = cells[0].json(&["radio.loss"]);
+        assert_eq!((&json["equal_digests"], &json["metrics"]["mission_s"]["low"]), (&json!(true), &Value::Null));
+        let text = crate::table::table(&cells, &["radio.loss"], &["mission_s"]);
+        assert!(text.contains("3, all equal") && text.contains("\n3 runs of random with 0 are one flight"), "{text}");
+        assert!(text.contains("50 ± 0"), "{text}");
     }
 }

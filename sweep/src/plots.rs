@@ -4,7 +4,6 @@ use crate::cells::{Cell, toml_value};
 use crate::error::SweepError;
 use crate::experiment::Experiment;
 use crate::metrics::{METRICS, SUCCESS, label, metric};
-use crate::statistics::Estimate;
 use skein_report::plot::sweep::{HeatMap, Lines, Point, Series};
 use std::collections::BTreeSet;
 
@@ -110,8 +109,9 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     let x = |value: &String| if numbers { value.parse().unwrap_or(0.0) } else { place(value) };
     let series = |of: &[Cell]| {
         let point = |cell: &Cell| {
-            let Estimate { mean, low, high, .. } = cell.estimate(metric)?;
-            Some(Point { x: x(&cell.values[axis]), mean, low, high })
+            let found = cell.estimate(metric)?;
+            let [low, high] = found.interval().unwrap_or([found.mean; 2]);
+            Some(Point { x: x(&cell.values[axis]), mean: found.mean, low, high })
         };
         let mut points: Vec<Point> = of.iter().filter_map(point).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
@@ -123,7 +123,7 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     }
     let key = &experiment.grid[axis].key;
     let x_label = if numbers { key.clone() } else { format!("{key} (0 = {})", values.join(", ")) };
-    let title = title(experiment, &cells[0].scenario, metric);
+    let title = title(experiment, cells, metric);
     let lines = Lines { title, x_label, y_label: label(metric).to_owned(), series };
     let file = file(experiment, metric, &cells[0].scenario, None);
     Some(match lines.draw() {
@@ -140,15 +140,15 @@ fn maps(experiment: &Experiment, cells: &[Cell], axes: &MapAxes, metric: &str) -
         };
         let at = |column: &[String], row: &[String]| {
             let cell = of.iter().find(|cell| has(cell, columns, column) && has(cell, rows, row))?;
-            let Estimate { mean, low, high, .. } = cell.estimate(metric)?;
-            Some(skein_report::plot::sweep::Cell { mean, low, high })
+            let found = cell.estimate(metric)?;
+            Some(skein_report::plot::sweep::Cell { mean: found.mean, interval: found.interval() })
         };
         let values =
             rows.ticks.iter().flat_map(|row| columns.ticks.iter().map(|column| at(&column.values, &row.values)));
         let (scenario, strategy) = (&of[0].scenario, &of[0].strategy);
         let axis = |axis: &Axis| (axis.name.clone(), axis.ticks.iter().map(|tick| tick.label.clone()).collect());
         let map = HeatMap {
-            title: format!("{}, {strategy}", title(experiment, scenario, metric)),
+            title: format!("{}, {strategy}", title(experiment, of, metric)),
             x: axis(columns),
             y: axis(rows),
             cells: values.collect(),
@@ -170,8 +170,15 @@ fn file(experiment: &Experiment, metric: &str, scenario: &str, strategy: Option<
     format!("{}.svg", parts.join("-").replace([':', '/'], "-"))
 }
 
-fn title(experiment: &Experiment, scenario: &str, metric_name: &str) -> String {
-    let interval = if metric_name == SUCCESS { "Wilson's 95 % interval" } else { "mean and its 95 % interval" };
+fn title(experiment: &Experiment, cells: &[Cell], metric_name: &str) -> String {
+    let interval = if cells.iter().all(|cell| cell.equal > 0) {
+        "no interval, as all runs of a cell are equal"
+    } else if metric_name == SUCCESS {
+        "Wilson's 95 % interval"
+    } else {
+        "mean and its 95 % interval"
+    };
+    let scenario = &cells[0].scenario;
     let of = if metric(metric_name).is_some_and(|metric| metric.reached_only) {
         " of runs that reached the goal"
     } else {
@@ -211,6 +218,7 @@ mod tests {
             strategy: strategy.to_owned(),
             values: values.iter().map(|&value| value.to_owned()).collect(),
             outcomes: BTreeMap::new(),
+            equal: 0,
             success: rate(1, 2),
             metrics: METRICS.iter().map(|_| mean(&[1.0, 2.0])).collect(),
         }

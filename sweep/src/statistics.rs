@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Two-sided 95 % point of the normal distribution.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// A mean or a rate with its 95 % confidence interval.
+/// A mean or a rate with its 95 % confidence interval. Without one, both ends are `None`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Number of values.
@@ -13,13 +13,27 @@ pub struct Estimate {
     /// The mean, or the rate.
     pub mean: f64,
     /// Lower end of the interval.
-    pub low: f64,
+    pub low: Option<f64>,
     /// Upper end of the interval.
-    pub high: f64,
+    pub high: Option<f64>,
     /// Least value.
     pub min: f64,
     /// Greatest value.
     pub max: f64,
+}
+
+impl Estimate {
+    /// Both ends of the interval.
+    #[must_use]
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        Some([self.low?, self.high?])
+    }
+
+    /// The same without its interval: its values are not independent of each other.
+    #[must_use]
+    pub fn without_interval(self) -> Self {
+        Self { low: None, high: None, ..self }
+    }
 }
 
 /// A success rate with Wilson's score interval; `None` if `n` is 0.
@@ -36,10 +50,10 @@ pub fn rate(successes: usize, n: usize) -> Option<Estimate> {
     // Exact at both ends, where rounding would push the bound beyond the rate itself.
     let low = if successes == 0 { 0.0 } else { middle - half };
     let high = if successes == n { 1.0 } else { middle + half };
-    Some(Estimate { n, mean: p, low, high, min, max })
+    Some(Estimate { n, mean: p, low: Some(low), high: Some(high), min, max })
 }
 
-/// A mean with Student's t interval; `None` if there are no values. The interval of a single value is that value.
+/// A mean with Student's t interval; `None` if there are no values. A single value has no interval.
 #[must_use]
 pub fn mean(values: &[f64]) -> Option<Estimate> {
     if values.is_empty() {
@@ -48,12 +62,9 @@ pub fn mean(values: &[f64]) -> Option<Estimate> {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / n as f64;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let half = match n {
-        1 => 0.0,
-        _ => student(n - 1) * (squares / (n - 1) as f64 / n as f64).sqrt(),
-    };
+    let half = (n > 1).then(|| student(n - 1) * (squares / (n - 1) as f64 / n as f64).sqrt());
     let (min, max) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    Some(Estimate { n, mean, low: mean - half, high: mean + half, min, max })
+    Some(Estimate { n, mean, low: half.map(|half| mean - half), high: half.map(|half| mean + half), min, max })
 }
 
 /// Two-sided 95 % point of Student's t distribution: from a table up to 10 degrees of freedom, above by the Cornish-Fisher
@@ -81,11 +92,12 @@ mod tests {
             [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
         {
             let found = rate(r, n).unwrap();
-            assert!((found.low - low).abs() < 5e-5 && (found.high - high).abs() < 5e-5, "{r} of {n}: {found:?}");
+            let [from, to] = found.interval().unwrap();
+            assert!((from - low).abs() < 5e-5 && (to - high).abs() < 5e-5, "{r} of {n}: {found:?}");
         }
         let all = rate(30, 30).unwrap();
-        assert_eq!((all.mean, all.high), (1.0, 1.0));
-        assert!((all.low - 0.8865).abs() < 5e-5, "{all:?}");
+        assert_eq!((all.mean, all.high), (1.0, Some(1.0)));
+        assert!((all.low.unwrap() - 0.8865).abs() < 5e-5, "{all:?}");
         assert_eq!(rate(0, 0), None);
     }
 
@@ -100,10 +112,10 @@ mod tests {
     fn mean_and_interval_of_known_values() {
         // 2, 4, 6: standard deviation 2, 4.3027 · 2 / √3 = 4.9683.
         let found = mean(&[2.0, 4.0, 6.0]).unwrap();
-        assert!((found.mean - 4.0).abs() < 1e-12 && (found.high - 8.9683).abs() < 1e-3, "{found:?}");
+        assert!((found.mean - 4.0).abs() < 1e-12 && (found.high.unwrap() - 8.9683).abs() < 1e-3, "{found:?}");
         assert_eq!((found.n, found.min, found.max), (3, 2.0, 6.0));
         let one = mean(&[5.0]).unwrap();
-        assert_eq!((one.low, one.high), (5.0, 5.0));
+        assert_eq!((one.mean, one.interval()), (5.0, None));
         assert_eq!(mean(&[]), None);
     }
 }

@@ -20,7 +20,8 @@ pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[&str]) -> String {
     for cell in cells.iter().take(MAX_LINES) {
         let mut line = vec![cell.scenario.clone(), cell.strategy.clone()];
         line.extend(varying.iter().map(|&i| cell.values[i].clone()));
-        line.push(cell.outcomes.values().sum::<usize>().to_string());
+        let runs = cell.outcomes.values().sum::<usize>();
+        line.push(if cell.equal > 0 { format!("{runs}, all equal") } else { runs.to_string() });
         line.extend(metrics.iter().map(|name| shown(name, cell.estimate(name))));
         lines.push(line);
     }
@@ -36,16 +37,37 @@ pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[&str]) -> String {
     if cells.len() > MAX_LINES {
         text += &format!("… and {} more in summary.json\n", cells.len() - MAX_LINES);
     }
-    text
+    text + &equal_runs(cells, &varying)
+}
+
+/// Says which cells have runs with equal digests: their seeds change nothing.
+fn equal_runs(cells: &[Cell], varying: &[usize]) -> String {
+    let equal: Vec<&Cell> = cells.iter().filter(|cell| cell.equal > 0).collect();
+    let Some(first) = equal.first() else { return String::new() };
+    let values: Vec<&str> = varying.iter().map(|&i| first.values[i].as_str()).collect();
+    let with = if values.is_empty() { String::new() } else { format!(" with {}", values.join(", ")) };
+    let more = match equal.len() {
+        1 => String::new(),
+        count => format!(", and those of {} other cells", count - 1),
+    };
+    format!(
+        "\n{} runs of {}{with} are one flight: their digests are equal{more}. Their seeds change nothing, so they give no \
+         interval.\n",
+        first.equal, first.scenario
+    )
 }
 
 fn shown(name: &str, found: Option<Estimate>) -> String {
     match found {
         None => "-".to_owned(),
         Some(found) if name == SUCCESS => {
-            format!("{:.1} % [{:.1}, {:.1}]", 100.0 * found.mean, 100.0 * found.low, 100.0 * found.high)
+            let interval = found.interval().map(|[low, high]| format!(" [{:.1}, {:.1}]", 100.0 * low, 100.0 * high));
+            format!("{:.1} %{}", 100.0 * found.mean, interval.unwrap_or_default())
         }
-        Some(found) => format!("{} ± {}", brief(found.mean), brief((found.high - found.low) / 2.0)),
+        Some(found) => {
+            let half = found.interval().map(|[low, high]| format!(" ± {}", brief((high - low) / 2.0)));
+            brief(found.mean) + &half.unwrap_or_default()
+        }
     }
 }
 

@@ -114,10 +114,8 @@ pub struct HeatMap {
 pub struct Cell {
     /// Mean or rate.
     pub mean: f64,
-    /// Lower end of the interval.
-    pub low: f64,
-    /// Upper end of the interval.
-    pub high: f64,
+    /// Both ends of the interval; `None` without one.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// The colour map Cividis at eleven places, from low values (dark) to high values (light). It is perceived as uniform, by
@@ -210,7 +208,8 @@ fn draw_cell(svg: &mut String, (x, y): (usize, usize), width: usize, cell: Optio
     };
     match cell {
         None => text(ROW / 2 + 5, 13, "–".to_owned()),
-        Some(Cell { mean, low, high }) => {
+        Some(Cell { mean, interval: None }) => text(ROW / 2 + 5, 14, brief(mean)),
+        Some(Cell { mean, interval: Some([low, high]) }) => {
             text(ROW / 2 - 2, 14, brief(mean));
             text(ROW / 2 + 15, 11, format!("{} to {}", brief(low), brief(high)));
         }
@@ -250,7 +249,7 @@ mod tests {
 
     #[test]
     fn rows_of_a_heat_map_start_at_the_bottom_and_missing_cells_are_marked() {
-        let cell = |mean: f64| Cell { mean, low: mean - 1.0, high: mean + 1.0 };
+        let cell = |mean: f64| Cell { mean, interval: Some([mean - 1.0, mean + 1.0]) };
         let map = HeatMap {
             title: "a < b".to_owned(),
             x: ("radio.loss".to_owned(), vec!["0".to_owned(), "0.5".to_owned()]),
