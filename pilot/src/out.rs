@@ -67,6 +67,11 @@ impl Out {
         self.done = done;
     }
 
+    /// Says that the pilot has failed, and why, for a human reader: like a panic. The first reason counts.
+    pub fn fail(&mut self, reason: impl Into<String>) {
+        self.note_misuse(reason.into());
+    }
+
     /// Broadcasts one of the built-in messages, such as the beacon [`Message::Pose`].
     pub fn message(&mut self, message: Message) {
         self.messages.push(message);

@@ -124,6 +124,12 @@ impl World {
         &self.downlink
     }
 
+    /// What [`World::downlink`] built last.
+    #[must_use]
+    pub fn sensed(&self) -> &Downlink {
+        &self.downlink
+    }
+
     /// Takes a drone's answer to the current tick. Answers of dead and frozen drones are ignored.
     pub fn take_slot(&mut self, id: DroneId, slot: &Slot) {
         self.drones.take_slot(id, slot);
