@@ -5,8 +5,8 @@ use crate::error::BenchError;
 use crate::scratch::ScratchFolder;
 use clap::Args;
 use serde::Serialize;
+use skein_runtime::Program;
 use std::path::Path;
-use std::process::Command;
 
 /// Flights by the wall clock, one for each size of the swarm and each tick rate.
 #[derive(Clone, Debug, Args)]
@@ -56,7 +56,7 @@ impl ClockBench {
         let mut rows = Vec::new();
         for &drones in &self.drones {
             for &rate_hz in &self.rates {
-                let row = self.fly(drones, rate_hz, context.executable, folder.path());
+                let row = self.fly(drones, rate_hz, context.pilots.program(), folder.path());
                 if context.stopped() {
                     return Ok(None);
                 }
@@ -79,10 +79,10 @@ impl ClockBench {
         text
     }
 
-    fn fly(&self, drones: u32, rate_hz: u32, executable: &Path, folder: &Path) -> Result<ClockRow, BenchError> {
+    fn fly(&self, drones: u32, rate_hz: u32, program: &Program, folder: &Path) -> Result<ClockRow, BenchError> {
         let file = folder.join("clock.toml");
         std::fs::write(&file, self.scenario(drones, rate_hz)).map_err(BenchError::file(&file))?;
-        let mut command = Command::new(executable);
+        let mut command = program.command();
         command.arg("run").arg(&file).args(["--clock", "realtime", "--json", "--no-record", "--force", "--out"]);
         let output = command.arg(folder.join("run")).output().map_err(BenchError::system("starting a flight"))?;
         let summary: serde_json::Value = serde_json::from_slice(&output.stdout).map_err(|_| BenchError::NoSummary {

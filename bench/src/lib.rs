@@ -14,9 +14,10 @@
 //! ```
 //! use skein_bench::parts::{Part, PartBench};
 //! use skein_bench::Context;
-//! use std::path::Path;
+//! use skein_runtime::PilotRegistry;
 //!
-//! let context = Context { executable: Path::new("skein"), interrupted: &|| None };
+//! let pilots = PilotRegistry::built_in()?;
+//! let context = Context { pilots: &pilots, interrupted: &|| None };
 //! let bench = PartBench { drones: vec![8], rounds: 1 };
 //! let figures = bench.run(Part::Grouping, &context)?.expect("nothing interrupts it");
 //! assert_eq!(figures.len(), 4, "two and four routes, with and without the tie-break");
@@ -28,6 +29,7 @@ pub mod clock;
 mod context;
 mod error;
 pub mod failover;
+mod flown_by;
 mod median;
 pub mod parts;
 pub mod runtime;

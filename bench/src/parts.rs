@@ -2,6 +2,7 @@
 
 use crate::context::Context;
 use crate::error::BenchError;
+use crate::flown_by::flown_by;
 use crate::median::median;
 use crate::scratch::ScratchFolder;
 use clap::Args;
@@ -10,11 +11,11 @@ use skein_leader::split::ArrivalTable;
 use skein_protocol::radio::Link;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Vec3};
-use skein_runtime::{DroneFactory, PilotKind, StepScratch, mission};
+use skein_runtime::{DroneFactory, PilotRegistry, Program, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::Instant;
 
 /// How a part is measured.
@@ -63,10 +64,10 @@ impl PartBench {
         let mut figures = Vec::new();
         for &drones in &self.drones {
             match part {
-                Part::Radio => radio(drones, self.rounds, &mut figures)?,
+                Part::Radio => radio(drones, self.rounds, context.pilots, &mut figures)?,
                 Part::Grouping => grouping(drones, self.rounds, &mut figures)?,
                 Part::Sense => sense(drones, self.rounds, &mut figures)?,
-                Part::Record => record(drones, self.rounds, context.executable, &mut figures)?,
+                Part::Record => record(drones, self.rounds, context.pilots.program(), &mut figures)?,
             }
             if context.stopped() {
                 return Ok(None);
@@ -102,7 +103,7 @@ fn scenario(drones: u32, more: &str) -> Result<Scenario, BenchError> {
 }
 
 /// The cost of deciding about one frame, for each radio preset, and of a drone's tick with and without a radio range.
-fn radio(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), BenchError> {
+fn radio(drones: u32, rounds: u32, pilots: &PilotRegistry, figures: &mut Vec<Figure>) -> Result<(), BenchError> {
     const FRAMES: u32 = 100_000;
     for preset in ["ideal", "wifi", "mesh-lossy", "lte", "jammed", "satellite"] {
         let radio = scenario(drones, &format!("[radio]\npreset = {preset:?}\n"))?.radio();
@@ -121,7 +122,7 @@ fn radio(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Benc
         });
     }
     for (name, more) in [("unlimited range", ""), ("range of 100 m", "[radio]\nrange_m = 100\n")] {
-        let us = tick_us(&scenario(drones, more)?, rounds)?;
+        let us = tick_us(&scenario(drones, more)?, pilots, rounds)?;
         figures.push(Figure {
             drones,
             what: format!("one drone's tick, trivial pilot, {name}"),
@@ -133,13 +134,14 @@ fn radio(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Benc
 }
 
 /// The time of one tick of one drone with the trivial pilot, its radio included, µs.
-fn tick_us(scenario: &Scenario, rounds: u32) -> Result<f64, BenchError> {
+fn tick_us(scenario: &Scenario, pilots: &PilotRegistry, rounds: u32) -> Result<f64, BenchError> {
     const TICKS: u32 = 50;
-    let mut world = mission::world(scenario)?;
+    let scenario = flown_by(scenario, "beacon");
+    let mut world = mission::world(&scenario)?;
     let drones = scenario.formation.drones;
-    let (factory, mut scratch) = (DroneFactory::new(scenario, PilotKind::Beacon), StepScratch::default());
+    let (factory, mut scratch) = (DroneFactory::new(&scenario, pilots), StepScratch::default());
     let host = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO);
-    let mut hosts: Vec<_> = (0..drones).map(host).collect();
+    let mut hosts = (0..drones).map(host).collect::<Result<Vec<_>, _>>()?;
     let (mut slot, mut stats) = (Slot::default(), LinkStats::default());
     Ok(median((0..rounds).map(|_| {
         let mut spent_s = 0.0;
@@ -207,7 +209,7 @@ fn sense(drones: u32, rounds: u32, figures: &mut Vec<Figure>) -> Result<(), Benc
 }
 
 /// The speed of recorded flights over that of unrecorded ones, measured in pairs.
-fn record(drones: u32, rounds: u32, executable: &Path, figures: &mut Vec<Figure>) -> Result<(), BenchError> {
+fn record(drones: u32, rounds: u32, program: &Program, figures: &mut Vec<Figure>) -> Result<(), BenchError> {
     let scratch = ScratchFolder::new()?;
     let file = scratch.path().join("record.toml");
     let ticks = (80_000 / drones.max(8)).max(100);
@@ -216,7 +218,7 @@ fn record(drones: u32, rounds: u32, executable: &Path, figures: &mut Vec<Figure>
     let text = flown.to_toml()?;
     std::fs::write(&file, text).map_err(BenchError::file(&file))?;
     for runtime in ["inline", "processes"] {
-        let flight = TimedFlight { executable, file: &file, out: scratch.path().join("run"), runtime };
+        let flight = TimedFlight { program, file: &file, out: scratch.path().join("run"), runtime };
         let mut ratios = Vec::new();
         for round in 0..rounds {
             // The order alternates.
@@ -237,7 +239,7 @@ fn record(drones: u32, rounds: u32, executable: &Path, figures: &mut Vec<Figure>
 
 /// A flight in another process, whose wall time is wanted.
 struct TimedFlight<'a> {
-    executable: &'a Path,
+    program: &'a Program,
     file: &'a Path,
     out: PathBuf,
     runtime: &'a str,
@@ -246,7 +248,7 @@ struct TimedFlight<'a> {
 impl TimedFlight<'_> {
     /// Flies it with more arguments. Returns the wall time from the first tick to the last, s.
     fn wall_s(&self, more: &[&str]) -> Result<f64, BenchError> {
-        let mut command = Command::new(self.executable);
+        let mut command = self.program.command();
         command.arg("run").arg(self.file).arg("--out").arg(&self.out);
         command.args(["--force", "--json", "--runtime", self.runtime]).args(more).stderr(Stdio::null());
         let output = command.output().map_err(BenchError::system("starting a flight"))?;

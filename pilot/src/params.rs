@@ -32,6 +32,12 @@ use serde_json::{Map, Value};
 #[serde(transparent)]
 pub struct Params(Map<String, Value>);
 
+impl From<Map<String, Value>> for Params {
+    fn from(table: Map<String, Value>) -> Self {
+        Self(table)
+    }
+}
+
 impl Params {
     /// The value of a key; `None` if the table does not have it.
     #[must_use]

@@ -229,6 +229,7 @@ impl Accumulator {
             metrics: self.metrics.means(),
             elections: leading.elections,
             messages: messages(&self.counts, totals),
+            pilots: self.facts.pilots.clone(),
             deadline_misses: totals.map_or(self.counts.late, |totals| totals.deadline_misses),
             lateness_us: totals.and_then(|totals| lateness(&totals.lateness_s)),
             step_us: self.steps.times().filter(|_| self.facts.runtime != "inline"),

@@ -1,5 +1,6 @@
 //! What is known of a run before it starts and is not in its record.
 
+use crate::pilot_entry::PilotEntry;
 use crate::scene_facts::SceneFacts;
 use serde::{Deserialize, Serialize};
 use skein_protocol::Vec2;
@@ -44,6 +45,9 @@ pub struct RunFacts {
     /// The obstacles; the id of an obstacle is its index.
     #[serde(with = "outlines")]
     pub obstacles: Vec<ConvexShape>,
+    /// The pilots, and the drones that they fly.
+    #[serde(default)]
+    pub pilots: Vec<PilotEntry>,
     /// What the recording and the page draw beside the drones.
     #[serde(default)]
     pub scene: SceneFacts,

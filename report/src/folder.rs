@@ -4,6 +4,7 @@ use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::files::{self, MANIFEST, PLOTS, PROCESSES, SUMMARY};
 use crate::json_text::json;
+use crate::pilot_entry::PilotEntry;
 use crate::reserved_summary::ReservedSummary;
 use crate::summary::Summary;
 use crate::work_folder::{WorkFolder, part};
@@ -32,6 +33,9 @@ pub struct Manifest {
     pub commit: Option<String>,
     /// Operating system and architecture.
     pub platform: String,
+    /// The pilots, with the hashes of their programs.
+    #[serde(default)]
+    pub pilots: Vec<PilotEntry>,
     /// What is known of the run before it starts.
     pub facts: RunFacts,
 }
@@ -49,6 +53,7 @@ impl Manifest {
             version: version.to_owned(),
             commit,
             platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),
+            pilots: facts.pilots.clone(),
             facts,
         }
     }

@@ -3,6 +3,7 @@
 //! Its keys are a contract: keys may be added, but are never renamed or removed. The value of a key that does not apply is
 //! null; the key is never absent.
 
+use crate::pilot_entry::PilotEntry;
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
@@ -89,6 +90,9 @@ pub struct Summary {
     pub messages: Messages,
     /// Faults of drones and links, scheduled or not.
     pub faults: Vec<FaultEntry>,
+    /// The pilots, and the drones that they flew.
+    #[serde(default)]
+    pub pilots: Vec<PilotEntry>,
     /// Number of ticks that drones did not answer in time (wall clock only).
     pub deadline_misses: u64,
     /// How late ticks opened, µs (wall clock only; null in lockstep).

@@ -8,7 +8,7 @@ use skein_report::deviation::{self, ShapeDeviation};
 use skein_report::plot::reproduce::Snapshots;
 use skein_report::{Manifest, Recorder, RunCompletion, RunFacts, RunFolder, Summary, plot};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{RuntimeError, inline};
+use skein_runtime::{PilotRegistry, RuntimeError, inline};
 use skein_sweep::Interrupted;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ impl Forest {
         let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
         folder.begin(&manifest)?;
         let mut recorder = Recorder::in_folder(facts.clone(), &folder)?;
-        let end = inline::run(&scenario, &mut recorder, interrupted)?;
+        let end = inline::run(&scenario, &PilotRegistry::built_in()?, &mut recorder, interrupted)?;
         let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
         let (summary, record) = recorder.finish(&completion);
         folder.write_summary(&summary)?;

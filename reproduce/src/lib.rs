@@ -18,7 +18,7 @@
 //! // Row R3: obstacle to the right, the paper's rule. Published: 32 s from detection to pass.
 //! let flight = Flight::new("s2-right", PAPER);
 //! assert_eq!(flight.command(), "skein run scenarios/paper/s2-right.toml --strategy congestion-aware-paper");
-//! let summary = skein_sweep::fly_inline(&flight.resolve()?, &|| None)?;
+//! let summary = skein_sweep::fly_inline(&flight.resolve()?, &skein_runtime::PilotRegistry::built_in()?, &|| None)?;
 //! let ours_s = summary.stages[0].pass_time_s.expect("all drones pass");
 //! assert!((ours_s - 32.0).abs() < 2.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

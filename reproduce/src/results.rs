@@ -4,6 +4,7 @@ use crate::error::ReproduceError;
 use crate::flight::{Flight, JITTER_M};
 use skein_protocol::record::Outcome;
 use skein_report::{Summary, text};
+use skein_runtime::PilotRegistry;
 use skein_sweep::{Interrupted, Progress, WorkerPool, fly_inline};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -102,7 +103,7 @@ impl Results {
 
 /// Flies one mission inline.
 fn fly_one(flight: &Flight, interrupted: &Interrupted<'_>) -> Result<Summary, ReproduceError> {
-    let flown = fly_inline(&flight.resolve()?, interrupted);
+    let flown = fly_inline(&flight.resolve()?, &PilotRegistry::built_in()?, interrupted);
     flown.map_err(|source| ReproduceError::Flight { command: flight.command(), source })
 }
 

@@ -5,8 +5,9 @@ use crate::clock::Clock;
 use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{ProcessInfo, ProcessRole};
-use crate::pilot_kind::PilotKind;
 use crate::process_state::is_stopped;
+use crate::program::Program;
+use crate::programs::Programs;
 use rustix::event::{Timespec, epoll};
 use rustix::io::retry_on_intr;
 use rustix::process::{Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, kill_process, pidfd_open, waitid};
@@ -14,7 +15,6 @@ use skein_protocol::DroneId;
 use std::fmt;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -55,21 +55,20 @@ impl Running {
 }
 
 /// Processes that were started and not yet reaped. Dropping this kills and reaps all of them.
-pub(crate) struct Children {
-    executable: PathBuf,
+pub(crate) struct Children<'l> {
+    programs: Programs<'l>,
     args: ChildArgs,
-    pilot: PilotKind,
     running: Vec<Running>,
     /// Reports the ends of processes. The cost of a wait does not depend on their number.
     ends: OwnedFd,
 }
 
-impl Children {
+impl<'l> Children<'l> {
     /// No processes yet. All that are started get these arguments.
-    pub(crate) fn new(executable: PathBuf, args: ChildArgs, pilot: PilotKind) -> Result<Self, RuntimeError> {
+    pub(crate) fn new(programs: Programs<'l>, args: ChildArgs) -> Result<Self, RuntimeError> {
         let ends = epoll::create(epoll::CreateFlags::CLOEXEC)
             .map_err(|error| RuntimeError::system("watching processes")(error.into()))?;
-        Ok(Self { executable, args, pilot, running: Vec::new(), ends })
+        Ok(Self { programs, args, running: Vec::new(), ends })
     }
 
     /// Starts a process. Call this from one thread that lives as long as the run: a child dies with the thread that
@@ -78,7 +77,7 @@ impl Children {
         let mut child = self
             .command(role, clock)
             .spawn()
-            .map_err(RuntimeError::system(format!("starting {role} as {}", self.executable.display())))?;
+            .map_err(RuntimeError::system(format!("starting {role} as {}", self.program(role))))?;
         match watch(&self.ends, &child) {
             Ok(pidfd) => {
                 self.running.push(Running { role, child, _pidfd: pidfd });
@@ -93,13 +92,11 @@ impl Children {
     }
 
     fn command(&self, role: ChildRole, clock: Clock) -> Command {
-        let mut command = Command::new(&self.executable);
+        let mut command = self.program(role).command();
         match role {
             ChildRole::World => command.args(["world", "--clock", &clock.to_string()]),
             ChildRole::Drones(DroneRange { first, count, incarnation, first_tick }) => command.args([
                 "drone",
-                "--pilot",
-                self.pilot.name(),
                 "--id",
                 &first.to_string(),
                 "--count",
@@ -111,10 +108,23 @@ impl Children {
             ]),
         };
         self.args.append_to(&mut command);
-        // A terminal's Ctrl-C must reach the launcher alone, and stdout is the launcher's.
-        command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
+        // A terminal's Ctrl-C must reach the launcher alone, and stdout is the launcher's: what a pilot prints goes to stderr.
+        command.stdin(Stdio::null()).stdout(std::io::stderr()).process_group(0);
         lighten(&mut command);
         command
+    }
+
+    /// The program of a process.
+    fn program(&self, role: ChildRole) -> &Program {
+        match role {
+            ChildRole::World => self.programs.launcher(),
+            ChildRole::Drones(range) => self.programs.of(range.first),
+        }
+    }
+
+    /// Whether one process can fly both drones.
+    pub(crate) fn share(&self, one: DroneId, other: DroneId) -> bool {
+        self.programs.share(one, other)
     }
 
     /// Waits for a process to end, at most `limit`. Reaps all processes that have ended and returns how they ended.
@@ -206,7 +216,7 @@ impl Children {
     }
 }
 
-impl Drop for Children {
+impl Drop for Children<'_> {
     fn drop(&mut self) {
         self.kill_all();
     }

@@ -1,11 +1,9 @@
 //! Makes the drones of a swarm.
 
-use crate::beacon::BeaconPilot;
-use crate::mission;
+use crate::error::RuntimeError;
 use crate::pilot_host::{HostParams, PilotHost};
-use crate::pilot_kind::PilotKind;
-use skein_agent::SwarmPilot;
-use skein_pilot::Pilot;
+use crate::pilot_registry::PilotRegistry;
+use serde_json::Value;
 use skein_protocol::radio::Radio;
 use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
@@ -14,33 +12,35 @@ use std::sync::Arc;
 /// Makes the drones of one scenario. They share one radio model.
 pub struct DroneFactory<'s> {
     scenario: &'s Scenario,
-    kind: PilotKind,
+    pilots: &'s PilotRegistry,
+    /// The scenario, as pilots get it.
+    json: Arc<Value>,
+    /// The table of each drone's pilot.
+    tables: Vec<Option<usize>>,
     radio: Arc<Radio>,
 }
 
 impl<'s> DroneFactory<'s> {
-    /// A factory of drones with pilots of this kind.
+    /// A factory of drones with the pilots that the scenario names.
     #[must_use]
-    pub fn new(scenario: &'s Scenario, kind: PilotKind) -> Self {
-        Self { scenario, kind, radio: Arc::new(scenario.radio()) }
+    pub fn new(scenario: &'s Scenario, pilots: &'s PilotRegistry) -> Self {
+        // A checked scenario has no value that JSON cannot hold.
+        let json = Arc::new(serde_json::to_value(scenario).unwrap_or_default());
+        Self { scenario, pilots, json, tables: scenario.pilot_tables(), radio: Arc::new(scenario.radio()) }
     }
 
     /// One drone, ready for the tick that begins at `start`. A restarted drone has a higher incarnation, from 1.
-    #[must_use]
-    pub fn pilot_host(&self, id: DroneId, incarnation: u32, start: SimTime) -> PilotHost {
-        let pilot: Box<dyn Pilot> = match self.kind {
-            PilotKind::Swarm => Box::new(SwarmPilot::new(mission::pilot_params(self.scenario, id, incarnation, start))),
-            PilotKind::Beacon => Box::new(BeaconPilot::new(id, incarnation, self.beacon_ticks())),
-        };
+    ///
+    /// # Errors
+    /// [`RuntimeError::Pilot`] if its pilot cannot be made.
+    pub fn pilot_host(&self, id: DroneId, incarnation: u32, start: SimTime) -> Result<PilotHost, RuntimeError> {
+        let table = self.tables.get(id.index()).copied().flatten();
+        let pilot = self.pilots.make(self.scenario, &self.json, table, (id, incarnation, start))?;
         let params = HostParams {
             me: id,
             dt_s: self.scenario.time.dt_s,
             velocity_gain_per_s: self.scenario.guidance.velocity_gain_per_s,
         };
-        PilotHost::new(params, Arc::clone(&self.radio), pilot)
-    }
-
-    fn beacon_ticks(&self) -> u64 {
-        (self.scenario.beacon_period_s() / self.scenario.time.dt_s).round() as u64
+        Ok(PilotHost::new(params, Arc::clone(&self.radio), pilot))
     }
 }

@@ -6,7 +6,7 @@ use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pilot_host::{PilotHost, StepScratch};
-use crate::pilot_kind::PilotKind;
+use crate::pilot_registry::PilotRegistry;
 use skein_bus::{
     BusError, Control, Domain, DownlinkSubscriber, DroneEndpoint, SHARD_DRONES, Services, TickSignal, UplinkHeader,
     UplinkPublisher, pin_to_core, raise_file_limit,
@@ -15,29 +15,13 @@ use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::slot::Slot;
 use skein_protocol::{DroneId, SimTime, Tick};
-use skein_scenario::Scenario;
 use std::sync::Arc;
 
-/// Flies drones with a built-in pilot until the mission ends.
+/// Flies drones with the pilots that the scenario names until the mission ends.
 ///
 /// # Errors
 /// [`RuntimeError`]; the launcher notices that the process has ended.
-pub fn run(args: &ChildArgs, range: DroneRange, pilot: PilotKind) -> Result<(), RuntimeError> {
-    fly(args, range, |scenario, id| {
-        let start = SimTime(range.first_tick as i64 * mission::dt_ns(scenario));
-        DroneFactory::new(scenario, pilot).pilot_host(id, range.incarnation, start)
-    })
-}
-
-/// Flies drones with a pilot of the caller's until the mission ends. `make` makes each of them.
-///
-/// # Errors
-/// [`RuntimeError`]; the launcher notices that the process has ended.
-pub fn fly(
-    args: &ChildArgs,
-    range: DroneRange,
-    mut make: impl FnMut(&Scenario, DroneId) -> PilotHost,
-) -> Result<(), RuntimeError> {
+pub fn run(args: &ChildArgs, range: DroneRange, pilots: &PilotRegistry) -> Result<(), RuntimeError> {
     args.bind_to_parent()?;
     raise_file_limit()?;
     let scenario = args.scenario()?;
@@ -45,10 +29,17 @@ pub fn fly(
     pin_to_core(control.core_of(range.first.index()), args.pin)?;
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), &format!("drone-{}", range.first))?;
+    let factory = DroneFactory::new(&scenario, pilots);
+    let start = SimTime(range.first_tick as i64 * mission::dt_ns(&scenario));
     let mut drones = Vec::with_capacity(range.count as usize);
     for id in range.ids() {
         let barrier = DroneEndpoint::new(Arc::clone(&control), id.index())?.bound();
-        drones.push(DroneHandle { id, pilot_host: make(&scenario, id), barrier, slot: Slot::default() });
+        drones.push(DroneHandle {
+            id,
+            pilot_host: factory.pilot_host(id, range.incarnation, start)?,
+            barrier,
+            slot: Slot::default(),
+        });
     }
     let mut process = DroneProcess::new(&services, range.incarnation, drones)?;
     process.announce();

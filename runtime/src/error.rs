@@ -1,5 +1,6 @@
 //! What keeps a run from being started or carried through.
 
+use crate::pilot_problem::PilotProblem;
 use skein_bus::BusError;
 use skein_protocol::DroneId;
 use skein_protocol::shape::ShapeError;
@@ -18,6 +19,9 @@ pub enum RuntimeError {
     /// An obstacle of the scenario has an impossible shape.
     #[error("the scenario makes no world: {0}")]
     Shape(ShapeError),
+    /// The pilots of the scenario cannot fly it.
+    #[error(transparent)]
+    Pilot(#[from] PilotProblem),
     /// Shared memory, a service or the barrier failed.
     #[error(transparent)]
     Bus(#[from] BusError),

@@ -5,11 +5,11 @@ use crate::drone_factory::DroneFactory;
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pilot_host::{PilotHost, StepScratch};
-use crate::pilot_kind::PilotKind;
+use crate::pilot_registry::PilotRegistry;
 use crate::run_end::RunEnd;
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
-use skein_protocol::record::RecordSink;
+use skein_protocol::record::{FaultKind, RecordSink};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
@@ -17,32 +17,21 @@ use skein_world::World;
 use skein_world::faults::ProcessCommand;
 use std::time::Instant;
 
-/// Flies a mission with the paper's pilot in this thread. `interrupted` is called once per tick; it returns the number of a
-/// signal that should stop the run.
+/// Flies a mission in this thread with the pilots that the scenario names. `interrupted` is called once per tick; it returns the
+/// number of a signal that should stop the run.
 ///
 /// # Errors
-/// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made of the scenario.
+/// [`RuntimeError::Pilot`] if a pilot cannot be made, [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made
+/// of the scenario.
 pub fn run(
     scenario: &Scenario,
-    sink: &mut dyn RecordSink,
-    interrupted: impl FnMut() -> Option<i32>,
-) -> Result<RunEnd, RuntimeError> {
-    run_with(scenario, PilotKind::Swarm, sink, interrupted)
-}
-
-/// As [`run`], with a pilot of the given kind.
-///
-/// # Errors
-/// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made of the scenario.
-pub fn run_with(
-    scenario: &Scenario,
-    pilot: PilotKind,
+    pilots: &PilotRegistry,
     sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
     let mut end = RunEnd::default();
     let started = Instant::now();
-    let mut swarm = InlineSwarm::new(scenario, pilot)?;
+    let mut swarm = InlineSwarm::new(scenario, pilots)?;
     end.startup_s = started.elapsed().as_secs_f64();
     let opened = Instant::now();
     while swarm.world.ended().is_none() {
@@ -76,11 +65,12 @@ struct InlineSwarm<'s> {
 }
 
 impl<'s> InlineSwarm<'s> {
-    fn new(scenario: &'s Scenario, pilot: PilotKind) -> Result<Self, RuntimeError> {
-        let factory = DroneFactory::new(scenario, pilot);
+    fn new(scenario: &'s Scenario, pilots: &'s PilotRegistry) -> Result<Self, RuntimeError> {
+        pilots.check(scenario, true)?;
+        let factory = DroneFactory::new(scenario, pilots);
         let world = mission::world(scenario)?;
-        let new_drone = |id| InlineDrone::new(factory.pilot_host(DroneId(id), 1, SimTime::ZERO));
-        let drones = (0..scenario.formation.drones).map(new_drone).collect();
+        let new_drone = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO).map(InlineDrone::new);
+        let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<_, _>>()?;
         Ok(Self { factory, world, drones, scratch: StepScratch::default() })
     }
 
@@ -96,6 +86,11 @@ impl<'s> InlineSwarm<'s> {
         for (drone, id) in self.drones.iter().zip(0..).filter(|(drone, _)| drone.flies()) {
             self.world.take_slot(DroneId(id), &drone.slot);
             self.world.take_frames(DroneId(id), &drone.frames);
+        }
+        for (drone, id) in self.drones.iter_mut().zip(0..) {
+            if let Some(why) = drone.unborn.take() {
+                self.world.mark_dead(DroneId(id), FaultKind::Kill, false, &why);
+            }
         }
         self.world.advance();
     }
@@ -120,7 +115,11 @@ fn carry_out(command: ProcessCommand, drones: &mut [InlineDrone], factory: &Dron
         ProcessCommand::Freeze(id) => drones[id.index()].frozen = true,
         ProcessCommand::Resume(id) => drones[id.index()].frozen = false,
         ProcessCommand::Restart(id, incarnation) => {
-            drones[id.index()].pilot_host = Some(factory.pilot_host(id, incarnation, start));
+            let drone = &mut drones[id.index()];
+            match factory.pilot_host(id, incarnation, start) {
+                Ok(pilot_host) => drone.pilot_host = Some(pilot_host),
+                Err(error) => drone.unborn = Some(error.to_string()),
+            }
         }
     }
 }
@@ -130,6 +129,8 @@ struct InlineDrone {
     /// `None` once it was killed.
     pilot_host: Option<PilotHost>,
     frozen: bool,
+    /// Why it has no pilot although it was restarted.
+    unborn: Option<String>,
     slot: Slot,
     frames: Vec<Frame>,
     stats: LinkStats,
@@ -140,6 +141,7 @@ impl InlineDrone {
         Self {
             pilot_host: Some(pilot_host),
             frozen: false,
+            unborn: None,
             slot: Slot::default(),
             frames: Vec::new(),
             stats: LinkStats::default(),

@@ -1,10 +1,9 @@
 //! How a run in processes is started.
 
 use crate::clock::Clock;
-use crate::pilot_kind::PilotKind;
+use crate::program::Program;
 use skein_bus::{PinMode, WaitMode};
 use skein_scenario::Scenario;
-use std::path::PathBuf;
 
 /// How a run in processes is started.
 pub struct Launch<'a> {
@@ -16,12 +15,10 @@ pub struct Launch<'a> {
     pub pin: PinMode,
     /// How processes wait for each other.
     pub wait: WaitMode,
-    /// The pilot of all drones.
-    pub pilot: PilotKind,
     /// Drones per process, from 1. With more than one, no fault of the scenario may end or stop a process.
     pub per_process: u32,
-    /// The executable with the roles `world` and `drone`.
-    pub executable: PathBuf,
+    /// The program with the roles `world` and `drone`. Drones whose pilot is a program of its own are started from that one.
+    pub program: &'a Program,
     /// Called with all processes of the run when they are ready and before the first tick. Called again, with the ended
     /// processes included, when a drone got a new process. An error of the first call ends the run with
     /// `RuntimeError::OnReady`.

@@ -12,6 +12,9 @@
 //! A [`Clock`] paces the ticks. In lockstep, each tick waits for every living drone. By the wall clock, a drone that is
 //! late keeps its last command.
 //!
+//! A [`PilotRegistry`] knows the pilots by name, and the [`Program`] from which processes are started. The scenario says which
+//! drones they fly.
+//!
 //! [`mission`] turns a `Scenario` into the world and into the parameters of the pilots. [`DroneFactory`] makes one
 //! [`PilotHost`] per drone: a pilot, its radio receiver and what it counts in a tick. A program that steps the world
 //! itself, such as a test, needs only these two modules.
@@ -25,7 +28,7 @@
 //!
 //! ```
 //! use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
-//! use skein_runtime::inline;
+//! use skein_runtime::{PilotRegistry, inline};
 //! use skein_scenario::{Scenario, ScenarioSource};
 //!
 //! #[derive(Default)]
@@ -56,7 +59,7 @@
 //! "#;
 //! let scenario = Scenario::parse(text, ScenarioSource { name: "tree.toml", stem: "tree" }, &[])?;
 //! let mut sink = LastOutcome::default();
-//! inline::run(&scenario, &mut sink, || None)?;
+//! inline::run(&scenario, &PilotRegistry::built_in()?, &mut sink, || None)?;
 //! assert_eq!(sink.0, Some(Outcome::Reached));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -66,6 +69,7 @@ mod beacon;
 mod child_args;
 mod children;
 mod clock;
+mod cruise;
 mod drone_factory;
 pub mod drone_process;
 mod drone_range;
@@ -76,9 +80,13 @@ mod launch;
 pub mod mission;
 mod pacer;
 mod pilot_host;
-mod pilot_kind;
+mod pilot_problem;
+mod pilot_registry;
 mod process_state;
+mod program;
+mod programs;
 mod radio_receiver;
+mod reported_panic;
 mod run_end;
 pub mod run_facts;
 mod said;
@@ -96,7 +104,9 @@ pub use drone_range::DroneRange;
 pub use error::RuntimeError;
 pub use launch::{Launch, OnReady, ProcessInfo, ProcessRole};
 pub use pilot_host::{HostParams, PilotHost, StepScratch};
-pub use pilot_kind::PilotKind;
+pub use pilot_problem::PilotProblem;
+pub use pilot_registry::PilotRegistry;
+pub use program::{Program, resolve_commands};
 pub use run_end::RunEnd;
 pub use said::Said;
 pub use steered_swarm::SteeredSwarm;

@@ -6,8 +6,8 @@ use skein_leader::routes::{Route, Routes, Side};
 use skein_protocol::shape::ShapeError;
 use skein_protocol::{DroneId, ObstacleId, SimTime};
 use skein_report::scene::{SceneFacts, SetOutline};
-use skein_report::{MissionEnd, RunFacts};
-use skein_scenario::{End, Scenario};
+use skein_report::{MissionEnd, PilotEntry, RunFacts};
+use skein_scenario::{DEFAULT_PILOT, End, FreeTable, PilotKeys, Scenario};
 
 /// An obstacle set, and the routes past it that a leader finds which knows all obstacles of the scenario.
 #[derive(Clone, Debug)]
@@ -64,8 +64,26 @@ pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunF
         arrival_error_m: scenario.mission.arrival_error_m,
         radio_range_m: scenario.radio.range_m,
         obstacles: scenario.shapes()?,
+        pilots: pilot_groups(scenario).into_iter().map(|(_, entry)| entry).collect(),
         scene: scene(scenario)?,
     })
+}
+
+/// The scenario's pilots, each with its table, if it has one, and without the hash of its program.
+pub(crate) fn pilot_groups(scenario: &Scenario) -> Vec<(Option<&PilotKeys>, PilotEntry)> {
+    let tables = scenario.pilot_tables();
+    let flown_by = |table: Option<usize>| {
+        let drones = tables.iter().zip(0..).filter(|(of, _)| **of == table).map(|(_, drone)| drone);
+        drones.collect::<Vec<u32>>()
+    };
+    let group = |table: Option<usize>| {
+        let keys = table.and_then(|number| scenario.pilots.get(number));
+        let (name, params) = keys.map_or((DEFAULT_PILOT, FreeTable::new()), |k| (k.shown_name(), k.params.clone()));
+        (keys, PilotEntry { name: name.to_owned(), drones: flown_by(table), program: None, params })
+    };
+    let mut groups: Vec<_> = (0..scenario.pilots.len()).map(|number| group(Some(number))).collect();
+    groups.extend(tables.contains(&None).then(|| group(None)));
+    groups
 }
 
 /// What the recording and the page draw beside the drones.

@@ -6,6 +6,7 @@ use crate::children::{ChildRole, Children};
 use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{Launch, ProcessInfo, ProcessRole};
+use crate::programs::Programs;
 use crate::run_end::RunEnd;
 use crate::tuning::{
     END_LIMIT, HUNG_AFTER, RESTART_READY_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, STOPPED_POLL, SUPERVISOR_POLL,
@@ -44,7 +45,7 @@ struct Supervisor<'l, 's, 'd> {
     control: Control,
     record: RecordSubscriber,
     sink: &'s mut dyn RecordSink,
-    children: Children,
+    children: Children<'l>,
     /// All that were started, those that have ended included.
     processes: Vec<ProcessInfo>,
     /// The incarnation of each drone's newest process.
@@ -80,7 +81,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             pin: launch.pin,
         };
         Ok(Self {
-            children: Children::new(launch.executable.clone(), args, launch.pilot)?,
+            children: Children::new(Programs::new(launch.scenario, launch.program), args)?,
             launch,
             domain,
             control,
@@ -117,10 +118,15 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
     fn spawn_all(&mut self) -> Result<(), RuntimeError> {
         self.children.spawn(ChildRole::World, self.launch.clock)?;
         let (drones, per_process) = (self.drones() as u32, self.launch.per_process.max(1));
-        for first in (0..drones).step_by(per_process as usize) {
-            let count = per_process.min(drones - first);
+        let mut first = 0;
+        while first < drones {
+            // A process has the drones from a multiple of `per_process` on, or fewer if they fly different programs.
+            let most = (first + per_process - first % per_process).min(drones);
+            let others = (first..most).take_while(|&id| self.children.share(DroneId(first), DroneId(id)));
+            let count = others.count() as u32;
             let range = DroneRange { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
             self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
+            first += count;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ mod support;
 use skein_protocol::SimTime;
 use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio};
 use skein_protocol::record::{EventKind, RecordSink, RecordView, RunEvent, SinkError, Totals};
-use skein_runtime::{inline, mission};
+use skein_runtime::{PilotRegistry, inline, mission};
 use support::scenario;
 
 /// Computes the delivery of every recorded frame. The frames of the last tick do not count: they have not arrived when the
@@ -43,7 +43,7 @@ fn fly(sets: &[(&str, &str)]) -> Totals {
     let (radio, dt_ns) = (scenario.radio(), mission::dt_ns(&scenario));
     let mut lookup =
         Lookup { radio, dt_ns, deliveries: Vec::new(), last_tick: Vec::new(), opened: SimTime::ZERO, totals: None };
-    let end = inline::run(&scenario, &mut lookup, || None).unwrap();
+    let end = inline::run(&scenario, &PilotRegistry::built_in().unwrap(), &mut lookup, || None).unwrap();
     assert_eq!(end.sink_error, None);
     let (totals, by) = (lookup.totals.unwrap(), lookup.opened);
     let mut dropped = [0u64; DROP_REASONS];

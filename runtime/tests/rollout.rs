@@ -4,7 +4,7 @@
 mod support;
 
 use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, RunEvent, SinkError};
-use skein_runtime::inline;
+use skein_runtime::{PilotRegistry, inline};
 use std::collections::BTreeMap;
 use support::scenario;
 
@@ -51,7 +51,13 @@ impl RecordSink for Flight {
 
 fn fly_with(name: &str, overrides: &[(&str, &str)]) -> Flight {
     let mut flight = Flight::default();
-    inline::run(&scenario(&format!("paper/{name}"), overrides), &mut flight, || None).unwrap();
+    inline::run(
+        &scenario(&format!("paper/{name}"), overrides),
+        &PilotRegistry::built_in().unwrap(),
+        &mut flight,
+        || None,
+    )
+    .unwrap();
     assert_eq!(flight.outcome, Some(Outcome::Reached), "{name}");
     flight
 }

@@ -4,7 +4,7 @@
 mod support;
 
 use skein_protocol::record::{EventKind, Outcome, RecordSink, RecordView, SinkError};
-use skein_runtime::inline;
+use skein_runtime::{PilotRegistry, inline};
 use support::scenario;
 
 /// How a mission ended.
@@ -30,7 +30,7 @@ impl RecordSink for Ending {
 
 fn fly(name: &str, keys: &[(&str, &str)]) -> Ending {
     let mut ending = Ending::default();
-    inline::run(&scenario(name, keys), &mut ending, || None).unwrap();
+    inline::run(&scenario(name, keys), &PilotRegistry::built_in().unwrap(), &mut ending, || None).unwrap();
     ending
 }
 

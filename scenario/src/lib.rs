@@ -47,6 +47,7 @@ mod faults;
 mod guidance;
 mod keys;
 mod limits;
+mod name;
 mod near;
 mod node;
 mod objective;

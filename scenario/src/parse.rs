@@ -4,6 +4,7 @@ use crate::broken_rule::BrokenRule;
 use crate::check::{Complaint, check};
 use crate::error::{Issue, Lines, ScenarioErrors};
 use crate::keys::Scenario;
+use crate::name::is_name_char;
 use crate::node::{Data, Node, Place};
 use crate::radio;
 use crate::reference::schema;
@@ -201,7 +202,7 @@ fn overridden(node: &Node) -> Option<&Place> {
 
 /// A scenario's name, made from the name of its file without the ending.
 fn name_of(stem: &str) -> String {
-    let name: String = stem.chars().take(64).map(|c| if rules::is_name_char(c) { c } else { '-' }).collect();
+    let name: String = stem.chars().take(64).map(|c| if is_name_char(c) { c } else { '-' }).collect();
     let name = name.trim_start_matches(['.', '-']);
     if name.is_empty() { "scenario".to_owned() } else { name.to_owned() }
 }

@@ -2,7 +2,7 @@
 
 use crate::broken_rule::BrokenRule;
 use crate::keys::Scenario;
-use crate::rules::is_name_char;
+use crate::name::is_name_char;
 use std::collections::BTreeMap;
 
 /// The rules that the scenario's pilots break.

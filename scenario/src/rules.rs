@@ -2,6 +2,7 @@
 
 use crate::broken_rule::{BrokenRule, quantity};
 use crate::keys::{End, Scenario};
+use crate::name::is_name_char;
 use crate::node::number;
 use crate::strategy::Strategy;
 use crate::{fault_rules, near, pilot_rules};
@@ -213,8 +214,4 @@ impl Rules<'_> {
             )
         });
     }
-}
-
-pub(crate) fn is_name_char(c: char) -> bool {
-    c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-')
 }

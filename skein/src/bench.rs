@@ -10,6 +10,7 @@ use skein_bench::failover::FailoverBench;
 use skein_bench::parts::{self, Part, PartBench};
 use skein_bench::runtime::{BaselinePeer, RuntimeBench};
 use skein_bench::{BenchError, Context};
+use skein_runtime::PilotRegistry;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -98,11 +99,10 @@ pub(crate) struct PartArgs {
 }
 
 /// Runs one benchmark.
-pub(crate) fn bench(command: Option<&BenchCommand>) -> Result<Exit, Failure> {
+pub(crate) fn bench(command: Option<&BenchCommand>, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
-    let executable = std::env::current_exe().map_err(Failure::environment)?;
-    let context = Context { executable: &executable, interrupted: &interrupted };
+    let context = Context { pilots, interrupted: &interrupted };
     let exit = match command {
         None => runtime(&RuntimeArgs::default(), &context),
         Some(BenchCommand::Runtime(args)) => runtime(args, &context),

@@ -5,11 +5,11 @@ use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::output::{print, print_line};
 use serde_json::json;
-use skein_runtime::{advice, mission, run_facts};
+use skein_runtime::{PilotRegistry, advice, mission, run_facts};
 
 /// Prints the processes, services and routes of a mission.
-pub(crate) fn check(args: &CheckArgs) -> Result<Exit, Failure> {
-    let scenario = input::scenario(&args.scenario)?;
+pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+    let scenario = input::scenario(&args.scenario, pilots, false)?;
     let sets = run_facts::obstacle_sets(&scenario).map_err(Failure::usage)?;
     let drones = mission::drones(&scenario);
     let shards = skein_bus::shards(drones);

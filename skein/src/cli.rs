@@ -4,7 +4,7 @@ use crate::missing::nearest;
 use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
-use skein_runtime::{Clock, PilotKind};
+use skein_runtime::Clock;
 use std::path::PathBuf;
 
 /// Skein: a swarm runtime in which every drone is a process
@@ -121,6 +121,10 @@ pub(crate) struct ScenarioArgs {
     /// Seed of everything random
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<String>,
+    /// Pilot of the drones that no table of the scenario names: paper, cruise or one of the program's own; the same as
+    /// --set pilot.0.name=NAME
+    #[arg(long, value_name = "NAME")]
+    pub(crate) pilot: Option<String>,
     /// Override a scenario key, such as radio.delay_s=0.1; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
@@ -226,9 +230,6 @@ pub(crate) struct DroneArgs {
     /// The arguments of every child process.
     #[command(flatten)]
     pub(crate) child: ChildArgs,
-    /// The pilot.
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) pilot: PilotChoice,
     /// Number of the drone, or of the first drone in this process.
     #[arg(long)]
     pub(crate) id: u32,
@@ -241,23 +242,4 @@ pub(crate) struct DroneArgs {
     /// First tick that it answers.
     #[arg(long)]
     pub(crate) first_tick: u64,
-}
-
-/// The pilots.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PilotChoice {
-    /// The paper's pilot.
-    #[default]
-    Swarm,
-    /// A pilot that only sends beacons.
-    Beacon,
-}
-
-impl From<PilotChoice> for PilotKind {
-    fn from(choice: PilotChoice) -> Self {
-        match choice {
-            PilotChoice::Swarm => Self::Swarm,
-            PilotChoice::Beacon => Self::Beacon,
-        }
-    }
 }

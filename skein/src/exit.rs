@@ -15,7 +15,6 @@ use crate::complaint::complain;
 use skein_report::text::printable;
 use std::borrow::Cow;
 use std::fmt;
-use std::process::ExitCode;
 
 /// An exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,15 +33,16 @@ pub(crate) enum Exit {
     Interrupted(i32),
 }
 
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        match exit {
-            Exit::Reached => Self::from(0),
-            Exit::NotReached => Self::from(1),
-            Exit::Usage => Self::from(2),
-            Exit::Environment => Self::from(3),
-            Exit::Unsafe => Self::from(4),
-            Exit::Interrupted(signal) => Self::from(128u8.wrapping_add(signal.unsigned_abs() as u8)),
+impl Exit {
+    /// The number that the process returns.
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Reached => 0,
+            Self::NotReached => 1,
+            Self::Usage => 2,
+            Self::Environment => 3,
+            Self::Unsafe => 4,
+            Self::Interrupted(signal) => 128u8.wrapping_add(signal.unsigned_abs() as u8),
         }
     }
 }

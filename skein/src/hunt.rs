@@ -4,13 +4,14 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::missing::missing;
 use crate::options::key_value;
+use crate::output::print as print_text;
 use crate::progress::RunsBar;
 use crate::sweep::jobs;
 use clap::Args;
 use serde_json::json;
+use skein_runtime::PilotRegistry;
 use skein_sweep::hunt::{self, FailureKind, Hunt, HuntReport};
 use skein_sweep::{Grid, Progress};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `hunt`.
@@ -52,7 +53,7 @@ pub(crate) struct HuntArgs {
 }
 
 /// Hunts, writes what was found, and prints the report.
-pub(crate) fn hunt(args: &HuntArgs) -> Result<Exit, Failure> {
+pub(crate) fn hunt(args: &HuntArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     if let Some(text) = missing(&args.source, "expected an experiment or a scenario (TOML)") {
         return Err(Failure::usage(text));
     }
@@ -62,7 +63,7 @@ pub(crate) fn hunt(args: &HuntArgs) -> Result<Exit, Failure> {
     let interrupted = || interrupt.signal();
     let workers = args.jobs.or_else(|| std::thread::available_parallelism().ok().map(std::num::NonZero::get));
     let mut bar = RunsBar::new(args.quiet || args.json);
-    let search = Hunt::new(&grid).flights(args.flights as usize).seed(args.seed).workers(workers.unwrap_or(1));
+    let search = Hunt::new(&grid, pilots).flights(args.flights as usize).seed(args.seed).workers(workers.unwrap_or(1));
     let runs = args.flights as usize;
     let report = search.interrupted(&interrupted).run(|done, _| bar.show(Progress { done, runs }));
     bar.finish();
@@ -125,7 +126,6 @@ fn refused(path: &Path, error: &std::io::Error) -> Failure {
 }
 
 fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
-    let mut out = std::io::stdout().lock();
     let findings = report.findings.iter().zip(files);
     let text = if args.json {
         let findings: Vec<_> = findings
@@ -165,5 +165,5 @@ fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
         text + &ratio("separation", report.least_separation) + &ratio("clearance", report.least_clearance) + "\n"
     };
     // A closed pipe is the reader's choice.
-    let _ = out.write_all(text.as_bytes());
+    let _ = print_text(text);
 }

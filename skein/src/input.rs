@@ -2,16 +2,15 @@
 
 use crate::cli::ScenarioArgs;
 use crate::exit::Failure;
+use crate::experiment_file::MAX_FILE;
 use crate::missing::missing;
+use skein_runtime::{PilotRegistry, resolve_commands};
 use skein_scenario::{Scenario, ScenarioSource};
 use skein_sweep::FileKind;
 use std::path::Path;
 
-/// Greatest size of a scenario file, bytes.
-const MAX_FILE: u64 = 16 << 20;
-
-/// Reads the scenario file, applies the overrides and checks the result.
-pub(crate) fn scenario(args: &ScenarioArgs) -> Result<Scenario, Failure> {
+/// Reads the scenario file, applies the overrides, and checks the result and that these pilots can fly it. `inline`: in this process.
+pub(crate) fn scenario(args: &ScenarioArgs, pilots: &PilotRegistry, inline: bool) -> Result<Scenario, Failure> {
     let path = &args.scenario;
     let name = path.display().to_string();
     let expected = "expected a scenario file (TOML)";
@@ -34,19 +33,15 @@ pub(crate) fn scenario(args: &ScenarioArgs) -> Result<Scenario, Failure> {
     let mut overrides = args.overrides.clone();
     overrides.extend(args.strategy.iter().map(|value| ("strategy".to_owned(), format!("{value:?}"))));
     overrides.extend(args.seed.iter().map(|value| ("seed".to_owned(), value.clone())));
-    Scenario::parse_bytes(&bytes, ScenarioSource { name: &name, stem: &stem }, &overrides).map_err(Failure::diagnostic)
-}
-
-/// Refuses a path that does not exist, and a scenario in place of an experiment.
-pub(crate) fn check_experiment(path: &Path) -> Result<(), Failure> {
-    if let Some(text) = missing(path, "expected an experiment file (TOML)") {
-        return Err(Failure::usage(text));
+    // A name needs no quotes; a number would be one without.
+    overrides.extend(args.pilot.iter().map(|name| ("pilot.0.name".to_owned(), format!("{name:?}"))));
+    let source = ScenarioSource { name: &name, stem: &stem };
+    let mut scenario = Scenario::parse_bytes(&bytes, source, &overrides).map_err(Failure::diagnostic)?;
+    resolve_commands(&mut scenario, path.parent().unwrap_or(Path::new("")));
+    if let Err(problem) = pilots.check(&scenario, inline) {
+        let text = String::from_utf8_lossy(&bytes);
+        let errors = Scenario::blame(&text, source, &overrides, problem.keys(), problem.message());
+        return Err(Failure::diagnostic(errors));
     }
-    let text = std::fs::metadata(path).ok().filter(|about| about.is_file() && about.len() <= MAX_FILE);
-    let text = text.and_then(|_| std::fs::read_to_string(path).ok());
-    if text.is_some_and(|text| FileKind::of(&text) == FileKind::Scenario) {
-        let name = path.display();
-        return Err(Failure::usage(format!("{name} is a scenario, not an experiment; `skein run {name}` flies it")));
-    }
-    Ok(())
+    Ok(scenario)
 }

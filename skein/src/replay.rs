@@ -8,9 +8,9 @@ use crate::run_folder;
 use clap::Args;
 use serde_json::json;
 use skein_protocol::record::Outcome;
-use skein_report::{Recorder, RunCompletion, Summary};
+use skein_report::{PilotEntry, Recorder, RunCompletion, Summary};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{Clock, Launch, PilotKind, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
+use skein_runtime::{Clock, Launch, PilotRegistry, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub(crate) struct ReplayArgs {
 }
 
 /// Flies the run again in lockstep, and compares the digests. Writes nothing.
-pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
+pub(crate) fn replay(args: &ReplayArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     let folder = run_folder::open(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let recorded = folder.read_summary().map_err(Failure::report)?;
@@ -45,10 +45,11 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
         "inline" => RuntimeChoice::Inline,
         _ => RuntimeChoice::Processes,
     });
+    check_pilots(pilots, &scenario, &manifest.pilots, runtime == RuntimeChoice::Inline)?;
     let interrupt = Interrupt::watch()?;
     let name = if runtime == RuntimeChoice::Inline { "inline" } else { "processes" };
     let mut recorder = Recorder::in_memory(run_facts(&scenario, name, "lockstep").map_err(Failure::usage)?);
-    let end = fly(runtime, &scenario, &interrupt, &mut recorder).map_err(Failure::environment)?;
+    let end = fly(runtime, &scenario, pilots, &interrupt, &mut recorder).map_err(Failure::environment)?;
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
     let (flown, _) = recorder.finish(&completion);
     if let Some(signal) = end.signal {
@@ -62,14 +63,37 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<Exit, Failure> {
     Ok(if equal { Exit::Reached } else { Exit::NotReached })
 }
 
+/// Refuses pilots that are not those of the recorded run.
+fn check_pilots(
+    pilots: &PilotRegistry,
+    scenario: &Scenario,
+    recorded: &[PilotEntry],
+    inline: bool,
+) -> Result<(), Failure> {
+    pilots.check(scenario, inline).map_err(Failure::usage)?;
+    for (now, then) in pilots.entries(scenario).map_err(Failure::usage)?.iter().zip(recorded) {
+        if now.program != then.program {
+            let hash = |entry: &PilotEntry| entry.program.clone().unwrap_or_else(|| "a built-in pilot".to_owned());
+            return Err(Failure::usage(format!(
+                "the pilot {:?} was flown by another program: expected the one with the hash {}, found {}",
+                then.name,
+                hash(then),
+                hash(now)
+            )));
+        }
+    }
+    Ok(())
+}
+
 fn fly(
     runtime: RuntimeChoice,
     scenario: &Scenario,
+    pilots: &PilotRegistry,
     interrupt: &Interrupt,
     recorder: &mut Recorder,
 ) -> Result<RunEnd, RuntimeError> {
     if runtime == RuntimeChoice::Inline {
-        return inline::run(scenario, recorder, || interrupt.signal());
+        return inline::run(scenario, pilots, recorder, || interrupt.signal());
     }
     skein_bus::clean()?;
     let launch = Launch {
@@ -77,9 +101,8 @@ fn fly(
         clock: Clock::Lockstep,
         pin: PinChoice::Auto.into(),
         wait: WaitChoice::Block.into(),
-        pilot: PilotKind::Swarm,
         per_process: 1,
-        executable: std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?,
+        program: pilots.program(),
         on_ready: &mut |_: &[ProcessInfo]| Ok(()),
         interrupted: &mut || interrupt.signal(),
     };

@@ -8,7 +8,6 @@ use crate::output;
 use crate::run_folder;
 use skein_report::ReportError::{self, Content, NoSummary};
 use skein_report::{FlightRecord, Interrupted, Manifest, RunFolder, Summary, page, text};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Writes the files of the run again, and prints the summary.
@@ -48,7 +47,7 @@ fn write(
 }
 
 fn print(summary: &Summary, written: &[PathBuf]) -> Result<bool, Failure> {
-    let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let colour = crate::output::is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let files: String = written.iter().map(|file| format!("{}\n", file.display())).collect();
     output::print(format!("{}\n{files}", text::summary(summary, colour)))
 }

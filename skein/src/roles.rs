@@ -3,7 +3,7 @@
 use crate::cli::{self, DroneArgs, WorldArgs};
 use crate::exit::{Exit, Failure};
 use skein_protocol::DroneId;
-use skein_runtime::{ChildArgs, DroneRange, drone_process, world_process};
+use skein_runtime::{ChildArgs, DroneRange, PilotRegistry, RuntimeError, drone_process, world_process};
 
 /// Runs the world process.
 pub(crate) fn world(args: &WorldArgs) -> Result<Exit, Failure> {
@@ -12,11 +12,14 @@ pub(crate) fn world(args: &WorldArgs) -> Result<Exit, Failure> {
 }
 
 /// Runs a drone process, which may carry several drones.
-pub(crate) fn drone(args: &DroneArgs) -> Result<Exit, Failure> {
+pub(crate) fn drone(args: &DroneArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     let DroneArgs { id, count, incarnation, first_tick, .. } = *args;
     let range = DroneRange { first: DroneId(id), count, incarnation, first_tick };
-    let run = drone_process::run(&child(&args.child), range, args.pilot.into());
-    run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("drone {}: {error}", args.id)))
+    let run = drone_process::run(&child(&args.child), range, pilots);
+    run.map(|()| Exit::Reached).map_err(|error| {
+        let message = format!("drone {}: {error}", args.id);
+        if matches!(error, RuntimeError::Pilot(_)) { Failure::usage(message) } else { Failure::environment(message) }
+    })
 }
 
 fn child(args: &cli::ChildArgs) -> ChildArgs {

@@ -18,20 +18,19 @@ use skein_report::{
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{
-    Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent, inline, supervisor,
+    Launch, PilotRegistry, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent, inline, supervisor,
 };
 use skein_scenario::Scenario;
-use std::io::IsTerminal;
 use std::path::Path;
 use std::time::Instant;
 
 /// Flies the mission, writes its folder and prints its summary.
-pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
+pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     let started = Instant::now();
     if let Some(parent) = args.parent {
         end_with_parent(parent, Signal::TERM).map_err(Failure::environment)?;
     }
-    let scenario = input::scenario(&args.scenario)?;
+    let scenario = input::scenario(&args.scenario, pilots, args.runtime == RuntimeChoice::Inline)?;
     check_packing(args, &scenario)?;
     if args.runtime == RuntimeChoice::Processes {
         check_room(scenario.formation.drones, args.drones_per_process)?;
@@ -40,17 +39,19 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
         RuntimeChoice::Processes => "processes",
         RuntimeChoice::Inline => "inline",
     };
-    let facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
+    let mut facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
+    facts.pilots = pilots.entries(&scenario).map_err(Failure::usage)?;
     if !args.quiet {
         for warning in advice::warnings(&scenario).map_err(Failure::usage)? {
             complain(format!("warning: {warning}"));
         }
+        warn_of_idle_pilots(pilots, &scenario);
     }
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
     let manifest = manifest(&facts, &scenario)?;
     let flown = begin(args, &folder, &manifest, scenario.timeout_s()).and_then(|Begun { reserved, mut sink }| {
-        let end = fly(args, &scenario, &folder, &interrupt, &mut sink).map_err(Failure::environment)?;
+        let end = fly(args, &scenario, pilots, &folder, &interrupt, &mut sink).map_err(failure)?;
         Ok((end, reserved, sink.finish()))
     });
     let (end, reserved, recorder) = match flown {
@@ -120,6 +121,28 @@ fn check_packing(args: &RunArgs, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Says so if the program has pilots of its own, and no drone flies with one of them.
+fn warn_of_idle_pilots(pilots: &PilotRegistry, scenario: &Scenario) {
+    let own = pilots.own_names();
+    if !own.is_empty() && !pilots.flies_own(scenario) {
+        let names = own.join(", ");
+        complain(format!(
+            "warning: no drone flies with a pilot of this program ({names}): use --pilot {}, or [[pilot]]",
+            own[0]
+        ));
+    }
+}
+
+/// Why a flight could not begin.
+fn failure(error: RuntimeError) -> Failure {
+    match error {
+        // The process has said on stderr what its pilot refuses.
+        RuntimeError::EndedEarly { status, .. } if status.code() == Some(2) => Failure::usage(error),
+        RuntimeError::Pilot(_) => Failure::usage(error),
+        error => Failure::environment(error),
+    }
+}
+
 fn open_folder(args: &RunArgs, scenario: &Scenario) -> Result<RunFolder, Failure> {
     let folder = match &args.out {
         Some(path) => RunFolder::at(path, args.force),
@@ -153,6 +176,7 @@ fn write_files(
 fn fly(
     args: &RunArgs,
     scenario: &Scenario,
+    pilots: &PilotRegistry,
     folder: &RunFolder,
     interrupt: &Interrupt,
     sink: &mut dyn RecordSink,
@@ -165,19 +189,17 @@ fn fly(
     match args.runtime {
         RuntimeChoice::Inline => {
             on_ready(&[launcher]).map_err(RuntimeError::OnReady)?;
-            inline::run(scenario, sink, || interrupt.signal())
+            inline::run(scenario, pilots, sink, || interrupt.signal())
         }
         RuntimeChoice::Processes => {
             skein_bus::clean()?;
-            let executable = std::env::current_exe().map_err(RuntimeError::system("finding this executable"))?;
             let launch = Launch {
                 scenario,
                 clock: args.clock,
                 pin: args.pin.into(),
                 wait: args.wait.into(),
-                pilot: PilotKind::Swarm,
                 per_process: args.drones_per_process,
-                executable,
+                program: pilots.program(),
                 on_ready: &mut on_ready,
                 interrupted: &mut || interrupt.signal(),
             };
@@ -201,7 +223,7 @@ fn print(args: &RunArgs, summary: &Summary, folder: &RunFolder) -> Result<bool, 
     } else if args.quiet {
         Ok(true)
     } else {
-        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        let colour = output::is_terminal() && std::env::var_os("NO_COLOR").is_none();
         output::print_line(format!("{}\nfolder  {}", text::summary(summary, colour), folder.path().display()))
     }
 }

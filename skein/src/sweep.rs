@@ -2,12 +2,13 @@
 
 use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
-use crate::input;
+use crate::experiment_file::check_experiment;
 use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
 use crate::output;
 use crate::progress::RunsBar;
 use clap::Args;
+use skein_runtime::PilotRegistry;
 use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};
 use std::path::{Path, PathBuf};
 
@@ -87,15 +88,15 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
 }
 
 /// Flies the runs of an experiment that are not done yet, and prints the results once all are done.
-pub(crate) fn sweep(args: &SweepArgs) -> Result<Exit, Failure> {
-    input::check_experiment(&args.experiment)?;
+pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+    check_experiment(&args.experiment)?;
     let experiment = Experiment::read(&args.experiment).map_err(Failure::usage)?;
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sweeps").join(&experiment.name));
     let mut bar = RunsBar::new(args.quiet || args.json);
-    let mut sweep = Sweep::new(&grid).interrupted(&interrupted).progress(|progress| bar.show(progress));
+    let mut sweep = Sweep::new(&grid, pilots).interrupted(&interrupted).progress(|progress| bar.show(progress));
     if let Some(jobs) = args.jobs {
         sweep = sweep.workers(jobs);
     }

@@ -1,7 +1,7 @@
 //! What can go wrong in a sweep.
 
 use skein_report::{DrawError, ReportError};
-use skein_runtime::RuntimeError;
+use skein_runtime::{PilotProblem, RuntimeError};
 use skein_scenario::{ScenarioErrors, StrategyError};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -102,6 +102,9 @@ pub enum JobError {
     /// The random scene cannot be made.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The pilots cannot fly it.
+    #[error(transparent)]
+    Pilot(#[from] PilotProblem),
 }
 
 /// Why a random scene cannot be made.

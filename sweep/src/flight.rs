@@ -7,13 +7,13 @@ use rustix::process::{Pid, Signal, kill_process};
 use skein_protocol::record::Outcome;
 use skein_report::{Recorder, RunCompletion, Summary};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{RuntimeError, inline};
+use skein_runtime::{PilotRegistry, Program, RuntimeError, inline};
 use skein_scenario::Scenario;
 use std::io::Read;
 use std::os::unix::process::CommandExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::Duration;
 
 /// Asked again and again whether to stop: gives the number of the signal that asks for it, or `None`.
@@ -26,8 +26,6 @@ pub(crate) enum FlightMode {
     Inline,
     /// By one launcher process for each run.
     Processes {
-        /// The program whose command `run` flies a scenario.
-        executable: PathBuf,
         /// Folder for the files of runs in flight.
         folder: PathBuf,
     },
@@ -37,16 +35,22 @@ pub(crate) enum FlightMode {
 const POLL: Duration = Duration::from_millis(5);
 
 /// Flies a run and returns its row; `None` if it was interrupted. If anything goes wrong, the row says so.
-pub(crate) fn fly(grid: &Grid<'_>, job: usize, mode: &FlightMode, interrupted: &Interrupted<'_>) -> Option<Row> {
+pub(crate) fn fly(
+    grid: &Grid<'_>,
+    job: usize,
+    mode: &FlightMode,
+    pilots: &PilotRegistry,
+    interrupted: &Interrupted<'_>,
+) -> Option<Row> {
     let flown = catch_unwind(AssertUnwindSafe(|| {
         let scenario = match grid.scenario(job) {
             Ok(scenario) => scenario,
             Err(error) => return Some(Row::unflown(job, "invalid", &error.to_string())),
         };
         let summary = match mode {
-            FlightMode::Inline => fly_inline(&scenario, interrupted),
-            FlightMode::Processes { executable, folder } => {
-                fly_processes(&scenario, executable, &folder.join(job.to_string()), interrupted)
+            FlightMode::Inline => fly_inline(&scenario, pilots, interrupted),
+            FlightMode::Processes { folder } => {
+                fly_processes(&scenario, pilots.program(), &folder.join(job.to_string()), interrupted)
             }
         };
         if interrupted().is_some() {
@@ -64,13 +68,19 @@ pub(crate) fn fly(grid: &Grid<'_>, job: usize, mode: &FlightMode, interrupted: &
     })
 }
 
-/// Flies a mission in this thread and returns its summary. Nothing is written.
+/// Flies a mission in this thread with these pilots and returns its summary. Nothing is written.
 ///
 /// # Errors
 /// [`FlightError`] if the scenario cannot be flown or its record cannot be evaluated.
-pub fn fly_inline(scenario: &Scenario, interrupted: &Interrupted<'_>) -> Result<Summary, FlightError> {
-    let mut recorder = Recorder::in_memory(run_facts(scenario, "inline", "lockstep").map_err(RuntimeError::Shape)?);
-    let end = inline::run(scenario, &mut recorder, interrupted)?;
+pub fn fly_inline(
+    scenario: &Scenario,
+    pilots: &PilotRegistry,
+    interrupted: &Interrupted<'_>,
+) -> Result<Summary, FlightError> {
+    let mut facts = run_facts(scenario, "inline", "lockstep").map_err(RuntimeError::Shape)?;
+    facts.pilots = pilots.entries(scenario)?;
+    let mut recorder = Recorder::in_memory(facts);
+    let end = inline::run(scenario, pilots, &mut recorder, interrupted)?;
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
     match end.sink_error {
         Some(error) => Err(FlightError::Record(error.to_string())),
@@ -78,18 +88,19 @@ pub fn fly_inline(scenario: &Scenario, interrupted: &Interrupted<'_>) -> Result<
     }
 }
 
-/// Starts the executable's `run` in a process group of its own. So a terminal's Ctrl-C reaches the sweep alone, which
+/// Starts the program's `run` in a process group of its own. So a terminal's Ctrl-C reaches the sweep alone, which
 /// forwards it.
 fn fly_processes(
     scenario: &Scenario,
-    executable: &Path,
+    program: &Program,
     folder: &Path,
     interrupted: &Interrupted<'_>,
 ) -> Result<Summary, FlightError> {
     std::fs::create_dir_all(folder).map_err(FlightError::process("making a folder for the run"))?;
     let path = folder.join("scenario.toml");
     std::fs::write(&path, scenario.to_toml()?).map_err(FlightError::process("writing the run's scenario"))?;
-    let mut child = Command::new(executable)
+    let mut child = program
+        .command()
         .arg("run")
         .arg(&path)
         // If the sweep is killed, its flights end as well.

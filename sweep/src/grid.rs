@@ -4,6 +4,7 @@ use crate::error::JobError;
 use crate::experiment::{Experiment, Mission};
 use crate::random_scene::{SceneBounds, random_scene};
 use crate::wide_scene::wide_scene;
+use skein_runtime::{PilotRegistry, resolve_commands};
 use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
 use std::path::Path;
 
@@ -102,19 +103,23 @@ impl<'a> Grid<'a> {
         match &self.experiment.scenarios[combination.scenario] {
             Mission::Random => Ok(random_scene(seed, self.experiment.bounds, &overrides)?),
             Mission::Wide => Ok(wide_scene(seed, &overrides)?),
-            Mission::File { path, text } => Ok(parse(path, text, &overrides)?),
+            Mission::File { path, text } => {
+                let mut scenario = parse(path, text, &overrides)?;
+                resolve_commands(&mut scenario, path.parent().unwrap_or(Path::new("")));
+                Ok(scenario)
+            }
         }
     }
 
-    /// Checks each combination with its first seed. Another seed can only change the start's jitter; if that makes the
+    /// Checks each combination, and that these pilots can fly it, with its first seed. `inline`: in this process. Another seed can only change the start's jitter; if that makes the
     /// scenario invalid, the run gets a row with the outcome `invalid`.
     ///
     /// # Errors
     /// The first combination that is not a valid scenario.
-    pub fn check(&self) -> Result<(), JobError> {
+    pub fn check(&self, pilots: &PilotRegistry, inline: bool) -> Result<(), JobError> {
         let seeds = self.experiment.seeds.len();
         for number in 0..self.combinations.len() {
-            self.scenario(number * seeds)?;
+            pilots.check(&self.scenario(number * seeds)?, inline)?;
         }
         Ok(())
     }
@@ -245,7 +250,7 @@ mod tests {
         let experiment = experiment();
         let overrides = [("drone.safe_distance_m".to_owned(), "30".to_owned())];
         let grid = Grid::new(&experiment, &overrides);
-        grid.check().unwrap();
+        grid.check(&PilotRegistry::built_in().unwrap(), true).unwrap();
         let scenario = grid.scenario(5).unwrap();
         assert_eq!((scenario.seed, scenario.radio.delay_s, scenario.radio.loss), (9, 0.0, 0.2));
         assert_eq!((scenario.strategy.to_string().as_str(), scenario.drone.safe_distance_m), ("shortest-path", 30.0));
@@ -268,7 +273,8 @@ mod tests {
     fn an_invalid_combination_is_found_before_the_flight() {
         let mut experiment = experiment();
         experiment.grid[1].values.push("1.5".to_owned());
-        let error = Grid::new(&experiment, &[]).check().unwrap_err().to_string();
+        let error =
+            Grid::new(&experiment, &[]).check(&PilotRegistry::built_in().unwrap(), true).unwrap_err().to_string();
         assert!(error.contains("--set radio.loss=1.5"), "{error}");
     }
 }

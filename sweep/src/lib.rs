@@ -33,7 +33,8 @@
 //! "#;
 //! let experiment = Experiment::parse(text, "demo", Path::new(""))?;
 //! let grid = Grid::new(&experiment, &[]);
-//! let report = Sweep::new(&grid).workers(2).run_in_memory()?.complete().expect("nothing interrupts it");
+//! let pilots = skein_runtime::PilotRegistry::built_in()?;
+//! let report = Sweep::new(&grid, &pilots).workers(2).run_in_memory()?.complete().expect("nothing interrupts it");
 //! assert_eq!(report.rows().len(), 4);
 //! let success = report.cells()[0].estimate("success").expect("both runs were flown");
 //! assert_eq!((success.mean, success.n), (1.0, 2));

@@ -11,7 +11,8 @@ use crate::worker_pool::WorkerPool;
 use skein_bus::{PinMode, pin_to_core};
 use skein_protocol::digest::Digest;
 use skein_report::WorkFolder;
-use std::path::{Path, PathBuf};
+use skein_runtime::PilotRegistry;
+use std::path::Path;
 
 /// How far a sweep is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,29 +47,24 @@ impl<'a> SweepEnd<'a> {
 pub struct Sweep<'g, 'c> {
     grid: &'g Grid<'g>,
     workers: usize,
-    executable: Option<PathBuf>,
+    pilots: &'g PilotRegistry,
     interrupted: &'c Interrupted<'c>,
     progress: Box<dyn FnMut(Progress) + 'c>,
 }
 
 impl<'g, 'c> Sweep<'g, 'c> {
-    /// A sweep with as many workers as there are cores, which reports no progress and cannot be interrupted.
+    /// A sweep of these pilots with as many workers as there are cores, which reports no progress and cannot be interrupted. Runs of
+    /// processes are flown by the command `run` of the pilots' program.
     #[must_use]
-    pub fn new(grid: &'g Grid<'g>) -> Self {
+    pub fn new(grid: &'g Grid<'g>, pilots: &'g PilotRegistry) -> Self {
         let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        Self { grid, workers, executable: None, interrupted: &|| None, progress: Box::new(|_| {}) }
+        Self { grid, workers, pilots, interrupted: &|| None, progress: Box::new(|_| {}) }
     }
 
     /// Flies this many runs side by side.
     #[must_use]
     pub fn workers(self, workers: usize) -> Self {
         Self { workers, ..self }
-    }
-
-    /// Flies runs of processes by the command `run` of this program. The default is the current executable.
-    #[must_use]
-    pub fn executable(self, executable: PathBuf) -> Self {
-        Self { executable: Some(executable), ..self }
     }
 
     /// Stops as soon as this returns the number of a signal.
@@ -88,7 +84,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
     /// # Errors
     /// [`SweepError::Scenario`] if a combination of the grid is not a valid scenario. Nothing is flown then.
     pub fn run_in_memory(mut self) -> Result<SweepEnd<'g>, SweepError> {
-        self.grid.check()?;
+        self.grid.check(self.pilots, true)?;
         let mut rows = Vec::new();
         self.fly_missing(&FlightMode::Inline, &mut rows, |_| Ok(()))?;
         self.end(rows)
@@ -100,12 +96,12 @@ impl<'g, 'c> Sweep<'g, 'c> {
     /// # Errors
     /// [`SweepError`]. If it is a usage error, nothing was flown.
     pub fn run_in_folder(mut self, folder: &Path) -> Result<SweepEnd<'g>, SweepError> {
-        self.grid.check()?;
+        self.grid.check(self.pilots, !self.grid.experiment().processes)?;
         let (mut store, mut rows) = Store::open(folder, &identity(self.grid))?;
         let flights = folder.join("flights");
         // Left behind by a sweep that was killed.
         let _ = std::fs::remove_dir_all(&flights);
-        let mode = self.mode(&flights)?;
+        let mode = self.mode(&flights);
         let ended = self.fly_missing(&mode, &mut rows, |row| store.keep(row));
         // Empty by now.
         let _ = std::fs::remove_dir_all(flights);
@@ -117,13 +113,12 @@ impl<'g, 'c> Sweep<'g, 'c> {
         Ok(end)
     }
 
-    fn mode(&self, flights: &Path) -> Result<FlightMode, SweepError> {
-        if !self.grid.experiment().processes {
-            return Ok(FlightMode::Inline);
+    fn mode(&self, flights: &Path) -> FlightMode {
+        if self.grid.experiment().processes {
+            FlightMode::Processes { folder: flights.join(std::process::id().to_string()) }
+        } else {
+            FlightMode::Inline
         }
-        let current = || std::env::current_exe().map_err(SweepError::io(Path::new("/proc/self/exe")));
-        let executable = self.executable.clone().map_or_else(current, Ok)?;
-        Ok(FlightMode::Processes { executable, folder: flights.join(std::process::id().to_string()) })
     }
 
     fn fly_missing(
@@ -132,7 +127,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
         rows: &mut Vec<Row>,
         mut keep: impl FnMut(&Row) -> Result<(), SweepError>,
     ) -> Result<(), SweepError> {
-        let (grid, interrupted, runs) = (self.grid, self.interrupted, self.grid.len());
+        let (grid, pilots, interrupted, runs) = (self.grid, self.pilots, self.interrupted, self.grid.len());
         let mut done = vec![false; runs];
         for row in &*rows {
             done[row.job] = true;
@@ -148,7 +143,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
         let pool = WorkerPool { jobs: &missing, workers: self.workers.min(missing.len()) };
         pool.run_with(
             pin,
-            |job| fly(grid, job, mode, interrupted),
+            |job| fly(grid, job, mode, pilots, interrupted),
             |row| {
                 if let Some(row) = row {
                     keep(&row)?;

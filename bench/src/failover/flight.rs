@@ -9,7 +9,7 @@ use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::Outcome;
 use skein_report::{Recorder, RunCompletion};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{Clock, Launch, PilotKind, RunEnd, RuntimeError, inline, supervisor};
+use skein_runtime::{Clock, Launch, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
 
 /// Flies a mission to its end, and returns its row.
@@ -23,7 +23,7 @@ pub(super) fn fly(setting: &Setting, context: &Context<'_>) -> Result<FailoverRo
     let recorder = Recorder::in_memory(facts);
     let mut monitor = FailoverMonitor::new(recorder, DT_S, setting.clock == ClockChoice::Realtime);
     let end = match setting.clock {
-        ClockChoice::Lockstep => inline::run(&scenario, &mut monitor, context.interrupted)?,
+        ClockChoice::Lockstep => inline::run(&scenario, context.pilots, &mut monitor, context.interrupted)?,
         ClockChoice::Realtime => fly_processes(&scenario, clock, &mut monitor, context)?,
     };
     let failure = end.failure.as_ref().map(ToString::to_string);
@@ -47,9 +47,8 @@ fn fly_processes(
         clock,
         pin: PinMode::Auto,
         wait: WaitMode::Block,
-        pilot: PilotKind::Swarm,
         per_process: 1,
-        executable: context.executable.to_owned(),
+        program: context.pilots.program(),
         on_ready: &mut |_| Ok(()),
         interrupted: &mut || (context.interrupted)(),
     };

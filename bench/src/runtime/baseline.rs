@@ -10,11 +10,11 @@ use clap::Args;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 use skein_bus::Baseline;
 use skein_protocol::slot::Slot;
-use skein_runtime::lighten;
+use skein_runtime::{Program, lighten};
 use std::os::unix::net::UnixDatagram;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// Ticks before the measurement.
@@ -93,10 +93,10 @@ impl Drop for Peers {
 }
 
 impl Peers {
-    fn start(workload: &Workload, executable: &Path, transport: &[String]) -> Result<Self, BenchError> {
+    fn start(workload: &Workload, program: &Program, transport: &[String]) -> Result<Self, BenchError> {
         let mut peers = Self(Vec::new());
         for id in 0..workload.drones {
-            let mut command = Command::new(executable);
+            let mut command = program.command();
             command.arg("baseline-peer").args(transport).args(["--id", &id.to_string()]);
             command.args(["--parent", &std::process::id().to_string()]);
             command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
@@ -121,18 +121,18 @@ impl Peers {
 }
 
 /// Measures the exchange once. This process plays the world.
-pub(super) fn measure(workload: &Workload, transport: Transport, executable: &Path) -> Result<Measurement, BenchError> {
+pub(super) fn measure(workload: &Workload, transport: Transport, program: &Program) -> Result<Measurement, BenchError> {
     match transport {
-        Transport::Memory => memory(workload, executable),
-        Transport::Datagrams => datagrams(workload, executable),
+        Transport::Memory => memory(workload, program),
+        Transport::Datagrams => datagrams(workload, program),
     }
 }
 
-fn memory(workload: &Workload, executable: &Path) -> Result<Measurement, BenchError> {
+fn memory(workload: &Workload, program: &Program) -> Result<Measurement, BenchError> {
     let started = Instant::now();
     let baseline = Baseline::create(workload.drones as usize, workload.down_len, workload.read_len)?;
     let segment = ["--segment".to_owned(), baseline.fd().unwrap_or(-1).to_string()];
-    let peers = Peers::start(workload, executable, &segment)?;
+    let peers = Peers::start(workload, program, &segment)?;
     while baseline.here() < workload.drones {
         if started.elapsed() > START_LIMIT {
             return Err(BenchError::PeersMissing { seconds: START_LIMIT.as_secs() });
@@ -151,14 +151,14 @@ fn memory(workload: &Workload, executable: &Path) -> Result<Measurement, BenchEr
     Ok(measurement)
 }
 
-fn datagrams(workload: &Workload, executable: &Path) -> Result<Measurement, BenchError> {
+fn datagrams(workload: &Workload, program: &Program) -> Result<Measurement, BenchError> {
     const WHAT: &str = "exchanging datagrams";
     let started = Instant::now();
     let scratch = ScratchFolder::new()?;
     let folder = scratch.path();
     let world = UnixDatagram::bind(folder.join("world")).map_err(BenchError::system("binding a socket"))?;
     world.set_read_timeout(Some(START_LIMIT)).map_err(BenchError::system("setting a time limit"))?;
-    let peers = Peers::start(workload, executable, &["--sockets".to_owned(), folder.display().to_string()])?;
+    let peers = Peers::start(workload, program, &["--sockets".to_owned(), folder.display().to_string()])?;
     let mut slot = [0; size_of::<Slot>()];
     for _ in 0..workload.drones {
         world.recv(&mut slot).map_err(BenchError::system("waiting for the datagram peers"))?;

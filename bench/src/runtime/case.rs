@@ -9,7 +9,6 @@ use crate::error::BenchError;
 use clap::ValueEnum;
 use serde::Serialize;
 use skein_bus::WaitMode;
-use skein_runtime::PilotKind;
 
 /// Drones per process in the case [`Case::Packed`].
 const PACK: u32 = 32;
@@ -71,21 +70,22 @@ impl Case {
 
     /// Measures the case once.
     pub(super) fn measure(self, workload: &Workload, context: &Context<'_>) -> Result<Measurement, BenchError> {
-        use PilotKind::{Beacon, Swarm};
+        const BEACON: &str = "beacon";
+        const PAPER: &str = "paper";
         let processes = |pilot, wait, per_process| {
             let processes = flight::Processes { pilot, wait, per_process };
             flight::processes(workload, &processes, context)
         };
         match self {
-            Self::Baseline => baseline::measure(workload, Transport::Memory, context.executable),
-            Self::Datagrams => baseline::measure(workload, Transport::Datagrams, context.executable),
-            Self::InlineBeacon => flight::inline(workload, Beacon, context.interrupted),
-            Self::Inline => flight::inline(workload, Swarm, context.interrupted),
-            Self::BlockBeacon => processes(Beacon, WaitMode::Block, 1),
-            Self::YieldBeacon => processes(Beacon, WaitMode::Yield, 1),
-            Self::Block => processes(Swarm, WaitMode::Block, 1),
-            Self::Yield => processes(Swarm, WaitMode::Yield, 1),
-            Self::Packed => processes(Swarm, WaitMode::Block, PACK),
+            Self::Baseline => baseline::measure(workload, Transport::Memory, context.pilots.program()),
+            Self::Datagrams => baseline::measure(workload, Transport::Datagrams, context.pilots.program()),
+            Self::InlineBeacon => flight::inline(workload, BEACON, context),
+            Self::Inline => flight::inline(workload, PAPER, context),
+            Self::BlockBeacon => processes(BEACON, WaitMode::Block, 1),
+            Self::YieldBeacon => processes(BEACON, WaitMode::Yield, 1),
+            Self::Block => processes(PAPER, WaitMode::Block, 1),
+            Self::Yield => processes(PAPER, WaitMode::Yield, 1),
+            Self::Packed => processes(PAPER, WaitMode::Block, PACK),
         }
     }
 }

@@ -3,18 +3,19 @@
 use super::measurement::Measurement;
 use super::process_stats::{CpuUsage, Memory, entries};
 use super::workload::Workload;
-use crate::context::{Context, Interrupted};
+use crate::context::Context;
 use crate::error::BenchError;
+use crate::flown_by::flown_by;
 use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
-use skein_runtime::{Clock, Launch, PilotKind, ProcessInfo, ProcessRole, RunEnd, inline, supervisor};
+use skein_runtime::{Clock, Launch, ProcessInfo, ProcessRole, RunEnd, inline, supervisor};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// How a swarm of processes flies.
 pub(super) struct Processes {
-    pub(super) pilot: PilotKind,
+    pub(super) pilot: &'static str,
     pub(super) wait: WaitMode,
     pub(super) per_process: u32,
 }
@@ -132,16 +133,13 @@ fn lock(usage: &Mutex<ProcessUsage>) -> MutexGuard<'_, ProcessUsage> {
 }
 
 /// Measures a flight by function calls in this thread.
-pub(super) fn inline(
-    workload: &Workload,
-    pilot: PilotKind,
-    interrupted: &Interrupted<'_>,
-) -> Result<Measurement, BenchError> {
+pub(super) fn inline(workload: &Workload, pilot: &str, context: &Context<'_>) -> Result<Measurement, BenchError> {
     let me = std::process::id();
     let begun = ProcessUsage { world: vec![me], world_before: CpuUsage::of(me), ..ProcessUsage::default() };
     let usage = Mutex::new(begun);
     let mut timer = WindowTimer::new(workload, &usage);
-    let end = inline::run_with(&workload.scenario, pilot, &mut timer, interrupted)?;
+    let scenario = flown_by(&workload.scenario, pilot);
+    let end = inline::run(&scenario, context.pilots, &mut timer, context.interrupted)?;
     let mut measurement = timer.measurement(&end)?;
     let usage = usage.into_inner().unwrap_or_else(PoisonError::into_inner);
     measurement.cpu_us_per_step = Some(usage.world_used.us_per_step(usage.steps(workload)));
@@ -157,14 +155,14 @@ pub(super) fn processes(
 ) -> Result<Measurement, BenchError> {
     let usage = Mutex::new(ProcessUsage::default());
     let mut timer = WindowTimer::new(workload, &usage);
+    let scenario = flown_by(&workload.scenario, processes.pilot);
     let launch = Launch {
-        scenario: &workload.scenario,
+        scenario: &scenario,
         clock: Clock::Lockstep,
         pin: PinMode::Auto,
         wait: processes.wait,
-        pilot: processes.pilot,
         per_process: processes.per_process,
-        executable: context.executable.to_owned(),
+        program: context.pilots.program(),
         on_ready: &mut |started: &[ProcessInfo]| {
             lock(&usage).begin(started);
             Ok(())

@@ -2,7 +2,7 @@
 
 use skein_protocol::record::{DroneRow, EventKind, Outcome, RecordSink, RecordView, RunEvent, SinkError};
 use skein_protocol::{DroneId, Phase, Vec2};
-use skein_runtime::inline;
+use skein_runtime::{PilotRegistry, inline};
 use skein_scenario::{Scenario, ScenarioSource};
 
 /// The record of a flight.
@@ -40,7 +40,7 @@ pub(crate) fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
 
 pub(crate) fn fly(scenario: &Scenario) -> Flown {
     let mut flown = Flown::default();
-    inline::run(scenario, &mut flown, || None).unwrap();
+    inline::run(scenario, &PilotRegistry::built_in().unwrap(), &mut flown, || None).unwrap();
     flown
 }
 

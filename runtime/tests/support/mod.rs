@@ -5,7 +5,7 @@ use skein_protocol::frame::Frame;
 use skein_protocol::record::FaultKind;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, SimTime, Tick};
-use skein_runtime::{DroneFactory, PilotHost, PilotKind, StepScratch, mission};
+use skein_runtime::{DroneFactory, PilotHost, PilotRegistry, StepScratch, mission};
 use skein_scenario::{Scenario, ScenarioSource};
 use skein_world::World;
 
@@ -24,8 +24,9 @@ pub(crate) fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
 
 /// The drones of a scenario before their first tick, with the paper's pilot.
 pub(crate) fn pilot_hosts(scenario: &Scenario) -> Vec<PilotHost> {
-    let factory = DroneFactory::new(scenario, PilotKind::Swarm);
-    (0..scenario.formation.drones).map(|id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO)).collect()
+    let pilots = PilotRegistry::built_in().unwrap();
+    let factory = DroneFactory::new(scenario, &pilots);
+    (0..scenario.formation.drones).map(|id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO).unwrap()).collect()
 }
 
 /// Flies to the end. `killed` names a drone whose process ends in a tick: from then on it does not answer.

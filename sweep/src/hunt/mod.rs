@@ -17,6 +17,7 @@ use crate::flight::{Interrupted, fly_inline};
 use crate::grid::Grid;
 use crate::worker_pool::WorkerPool;
 use failure::Danger;
+use skein_runtime::PilotRegistry;
 use skein_scenario::Scenario;
 use std::collections::BTreeMap;
 
@@ -30,6 +31,7 @@ const GENERATION: usize = 32;
 /// A hunt over the runs of a grid.
 pub struct Hunt<'a> {
     grid: &'a Grid<'a>,
+    pilots: &'a PilotRegistry,
     flights: usize,
     shrink_flights: usize,
     workers: usize,
@@ -72,10 +74,10 @@ struct Flown {
 }
 
 impl<'a> Hunt<'a> {
-    /// A hunt over the runs of a grid, with 1000 flights in one worker. It is never interrupted.
+    /// A hunt of these pilots over the runs of a grid, with 1000 flights in one worker. It is never interrupted.
     #[must_use]
-    pub fn new(grid: &'a Grid<'a>) -> Self {
-        Self { grid, flights: 1000, shrink_flights: 300, workers: 1, seed: 1, interrupted: &|| None }
+    pub fn new(grid: &'a Grid<'a>, pilots: &'a PilotRegistry) -> Self {
+        Self { grid, pilots, flights: 1000, shrink_flights: 300, workers: 1, seed: 1, interrupted: &|| None }
     }
 
     /// Sets the number of flights, without those of the shrinking.
@@ -113,7 +115,7 @@ impl<'a> Hunt<'a> {
     /// # Errors
     /// [`SweepError::Scenario`] if a combination of the grid is not a valid scenario.
     pub fn run(&self, mut progress: impl FnMut(usize, usize)) -> Result<HuntReport, SweepError> {
-        self.grid.check()?;
+        self.grid.check(self.pilots, true)?;
         let mut flown = self.fly_runs(&mut progress);
         self.fly_neighbours(&mut flown, &mut progress);
         let mut report = HuntReport {
@@ -123,7 +125,7 @@ impl<'a> Hunt<'a> {
             least_clearance: least(&flown, |danger| danger.clearance),
         };
         for (failure, one) in worst_of_each_kind(&flown) {
-            let shrunk = shrink::shrink(&one.scenario, failure, self.shrink_flights, self.interrupted);
+            let shrunk = shrink::shrink(&one.scenario, failure, self.shrink_flights, (self.pilots, self.interrupted));
             report.flights += shrunk.flights;
             let command = one.run.map(|run| self.grid.command(run));
             report.findings.push(Finding { failure: shrunk.failure, toml: shrunk.toml, command });
@@ -180,7 +182,7 @@ impl<'a> Hunt<'a> {
         let pool = WorkerPool { jobs: &jobs, workers: self.workers };
         let fly = |job: usize| {
             let (scenario, run) = &scenarios[job];
-            let summary = fly_inline(scenario, self.interrupted).ok();
+            let summary = fly_inline(scenario, self.pilots, self.interrupted).ok();
             (self.interrupted)().is_none().then(|| (job, summary.map(|summary| (scenario, *run, summary))))
         };
         let end = pool.run(fly, |result| {

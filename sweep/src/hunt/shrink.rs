@@ -4,6 +4,7 @@
 
 use super::failure::Failure;
 use crate::flight::{Interrupted, fly_inline};
+use skein_runtime::PilotRegistry;
 use skein_scenario::{Scenario, ScenarioSource};
 use toml::{Table, Value};
 
@@ -28,6 +29,7 @@ struct Shrinker<'a> {
     failure: Failure,
     flights: usize,
     most_flights: usize,
+    pilots: &'a PilotRegistry,
     interrupted: &'a Interrupted<'a>,
 }
 
@@ -36,13 +38,13 @@ pub(super) fn shrink(
     scenario: &Scenario,
     failure: Failure,
     most_flights: usize,
-    interrupted: &Interrupted<'_>,
+    (pilots, interrupted): (&PilotRegistry, &Interrupted<'_>),
 ) -> Shrunk {
     // A checked scenario can be written as TOML, and its text can be read.
     let text = scenario.to_toml().unwrap_or_default();
     let mut table: Table = toml::from_str(&text).unwrap_or_default();
     table.insert("name".to_owned(), Value::from(NAME));
-    let mut shrinker = Shrinker { table, failure, flights: 0, most_flights, interrupted };
+    let mut shrinker = Shrinker { table, failure, flights: 0, most_flights, pilots, interrupted };
     loop {
         let before = shrinker.table.clone();
         shrinker.drop_keys();
@@ -69,7 +71,7 @@ impl Shrinker<'_> {
         let source = ScenarioSource { name: NAME, stem: NAME };
         let Ok(scenario) = Scenario::parse(&table.to_string(), source, &[]) else { return false };
         self.flights += 1;
-        let Ok(summary) = fly_inline(&scenario, self.interrupted) else { return false };
+        let Ok(summary) = fly_inline(&scenario, self.pilots, self.interrupted) else { return false };
         let Some(failure) = Failure::of(&summary, &scenario).filter(|found| found.kind == self.failure.kind) else {
             return false;
         };

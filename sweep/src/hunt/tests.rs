@@ -8,7 +8,12 @@ fn hunted(text: &str, flights: usize, workers: usize) -> HuntReport {
     let blind = [("fault.0.kind", "blind"), ("fault.0.at_s", "0"), ("fault.0.target", "all")];
     let overrides = blind.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let grid = Grid::new(&experiment, &overrides);
-    Hunt::new(&grid).flights(flights).shrink_flights(60).workers(workers).run(|_, _| {}).unwrap()
+    Hunt::new(&grid, &skein_runtime::PilotRegistry::built_in().unwrap())
+        .flights(flights)
+        .shrink_flights(60)
+        .workers(workers)
+        .run(|_, _| {})
+        .unwrap()
 }
 
 /// Small random scenes.

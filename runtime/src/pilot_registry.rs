@@ -1,0 +1,220 @@
+//! The pilots that a program knows by name.
+
+use crate::beacon::BeaconPilot;
+use crate::cruise::CruisePilot;
+use crate::error::RuntimeError;
+use crate::mission;
+use crate::pilot_problem::PilotProblem;
+use crate::program::Program;
+use crate::reported_panic::catch;
+use crate::run_facts::pilot_groups;
+use serde_json::Value;
+use skein_agent::SwarmPilot;
+use skein_pilot::{Birth, Params, Pilot, PilotError};
+use skein_protocol::{DroneId, SimTime};
+use skein_report::PilotEntry;
+use skein_scenario::{DEFAULT_PILOT, PilotKeys, Scenario};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+type Make = dyn Fn(&Scenario, &Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync;
+
+/// The pilots that a program knows by name, and the program itself, from which processes are started.
+pub struct PilotRegistry {
+    pilots: BTreeMap<String, Registered>,
+    program: Program,
+}
+
+struct Registered {
+    make: Box<Make>,
+    own: bool,
+}
+
+impl fmt::Debug for PilotRegistry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PilotRegistry").field("pilots", &self.names()).field("program", &self.program).finish()
+    }
+}
+
+impl PilotRegistry {
+    /// The built-in pilots: `paper` and `cruise`, and `beacon`, with which the runtime is measured.
+    #[must_use]
+    pub fn new(program: Program) -> Self {
+        let mut registry = Self { pilots: BTreeMap::new(), program };
+        registry.insert(DEFAULT_PILOT, false, |scenario, birth| {
+            without_params(birth)?;
+            let (id, start) = (DroneId(birth.drone), SimTime::from_secs(birth.start_s));
+            Ok(Box::new(SwarmPilot::new(mission::pilot_params(scenario, id, birth.incarnation, start))))
+        });
+        registry.insert("cruise", false, |_, birth| Ok(Box::new(CruisePilot::new(&birth.params)?)));
+        registry.insert("beacon", false, |scenario, birth| {
+            without_params(birth)?;
+            let ticks = (scenario.beacon_period_s() / scenario.time.dt_s).round() as u64;
+            Ok(Box::new(BeaconPilot::new(DroneId(birth.drone), birth.incarnation, ticks)))
+        });
+        registry
+    }
+
+    /// The built-in pilots in the executable of this process.
+    ///
+    /// # Errors
+    /// [`RuntimeError::System`] if the system does not know the executable.
+    pub fn built_in() -> Result<Self, RuntimeError> {
+        Ok(Self::new(Program::current()?))
+    }
+
+    /// Adds a pilot, or replaces the one of this name. `make` is called once for each start of a drone.
+    pub fn register(
+        &mut self,
+        name: &str,
+        make: impl Fn(&Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync + 'static,
+    ) {
+        self.insert(name, true, move |_, birth| make(birth));
+    }
+
+    fn insert(
+        &mut self,
+        name: &str,
+        own: bool,
+        make: impl Fn(&Scenario, &Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync + 'static,
+    ) {
+        self.pilots.insert(name.to_owned(), Registered { make: Box::new(make), own });
+    }
+
+    /// The program from which processes are started.
+    #[must_use]
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// The names of all pilots.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        self.pilots.keys().map(String::as_str).collect()
+    }
+
+    /// The names of the pilots that are not built in.
+    #[must_use]
+    pub fn own_names(&self) -> Vec<&str> {
+        self.pilots.iter().filter(|(_, pilot)| pilot.own).map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// Whether the scenario's drones fly any of the program's own pilots.
+    #[must_use]
+    pub fn flies_own(&self, scenario: &Scenario) -> bool {
+        let own = |name: &str| self.pilots.get(name).is_some_and(|pilot| pilot.own);
+        scenario.pilots.iter().any(|table| table.command.is_none() && table.name.as_deref().is_some_and(own))
+    }
+
+    /// Whether this program can fly the scenario: it makes one pilot of each table. `inline`: in this process, where commands
+    /// cannot fly.
+    ///
+    /// # Errors
+    /// [`PilotProblem`] with the key that is wrong.
+    pub fn check(&self, scenario: &Scenario, inline: bool) -> Result<(), PilotProblem> {
+        let tables = scenario.pilot_tables();
+        let json = Arc::new(serde_json::to_value(scenario).unwrap_or_default());
+        for (number, table) in scenario.pilots.iter().enumerate() {
+            if table.command.is_some() {
+                if inline {
+                    let message = "a program of its own cannot fly inline: expected --runtime processes";
+                    return Err(PilotProblem::new(format!("pilot.{number}.command"), message));
+                }
+                continue;
+            }
+            let drone = tables.iter().position(|of| *of == Some(number)).unwrap_or_default() as u32;
+            self.make(scenario, &json, Some(number), (DroneId(drone), 1, SimTime::ZERO))?;
+        }
+        Ok(())
+    }
+
+    /// Makes the pilot of a drone: of the scenario's table with this number, or of the default pilot. `json`: the scenario.
+    /// `incarnation` counts the drone's starts from 1, `start` is the time of its first tick.
+    pub(crate) fn make(
+        &self,
+        scenario: &Scenario,
+        json: &Arc<Value>,
+        table: Option<usize>,
+        (drone, incarnation, start): (DroneId, u32, SimTime),
+    ) -> Result<Box<dyn Pilot>, PilotProblem> {
+        let keys = table.and_then(|number| scenario.pilots.get(number));
+        let path = format!("pilot.{}", table.unwrap_or_default());
+        let name = self.name_of(keys, &path)?;
+        let registered = self.pilots.get(name).ok_or_else(|| self.unknown(name, &path))?;
+        let birth = Birth {
+            drone: drone.0,
+            drones: scenario.formation.drones,
+            incarnation,
+            start_s: start.secs(),
+            dt_s: scenario.time.dt_s,
+            seed: scenario.seed,
+            pilot: name.to_owned(),
+            params: keys.map(|keys| Params::from(keys.params.clone())).unwrap_or_default(),
+            scenario: Arc::clone(json),
+        };
+        let made = catch(|| (registered.make)(scenario, &birth));
+        let made = made.unwrap_or_else(|panic| Err(PilotError::new(format!("the pilot {name:?} {panic}"))));
+        made.map_err(|error| refused(name, &path, &error))
+    }
+
+    /// The name of the pilot of a table.
+    fn name_of<'a>(&'a self, keys: Option<&'a PilotKeys>, path: &str) -> Result<&'a str, PilotProblem> {
+        match keys.map(|keys| (keys.name.as_deref(), keys.command.is_some())) {
+            Some((Some(name), _)) => Ok(name),
+            Some((None, true)) => match self.own_names()[..] {
+                [only] => Ok(only),
+                ref own => {
+                    let message = format!("is missing: the program has {} pilots: {}", own.len(), own.join(", "));
+                    Err(PilotProblem::new(format!("{path}.name"), message))
+                }
+            },
+            Some((None, false)) | None => Ok(DEFAULT_PILOT),
+        }
+    }
+
+    fn unknown(&self, name: &str, path: &str) -> PilotProblem {
+        let known: Vec<&str> = self.names().into_iter().filter(|name| *name != "beacon").collect();
+        let scored = known.iter().map(|known| (strsim::jaro_winkler(name, known), known));
+        let best = scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
+        let hint = best.map(|(_, known)| format!("; did you mean `{known}`?")).unwrap_or_default();
+        let list: Vec<String> = known.iter().map(|known| format!("{known:?}")).collect();
+        let message =
+            format!("found {name:?}, expected one of {}, the pilots of {}{hint}", list.join(", "), self.program);
+        PilotProblem::new(format!("{path}.name"), message)
+    }
+
+    /// The scenario's pilots for the manifest and the summary, with the hashes of their programs.
+    ///
+    /// # Errors
+    /// [`RuntimeError::System`] if a program's file cannot be read.
+    pub fn entries(&self, scenario: &Scenario) -> Result<Vec<PilotEntry>, RuntimeError> {
+        let mut entries = Vec::new();
+        for (keys, mut entry) in pilot_groups(scenario) {
+            let own = self.pilots.get(&entry.name).is_some_and(|pilot| pilot.own);
+            entry.program = match keys.and_then(|keys| keys.command.as_deref()) {
+                Some(words) => Some(Program::of_command(words).hash()?),
+                None if own => Some(self.program.hash()?),
+                None => None,
+            };
+            entries.push(entry);
+        }
+        Ok(entries)
+    }
+}
+
+fn without_params(birth: &Birth) -> Result<(), PilotError> {
+    let expected = format!("expected no parameters: the pilot {:?} reads the keys of the scenario", birth.pilot);
+    birth.params.keys().next().map_or(Ok(()), |key| Err(PilotError::of_param(key, expected)))
+}
+
+fn refused(name: &str, path: &str, error: &PilotError) -> PilotProblem {
+    let key = match error.key() {
+        Some(key) => format!("{path}.params.{key}"),
+        None => format!("{path}.params"),
+    };
+    PilotProblem::new(key, format!("{} (pilot {name:?})", error.problem()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,226 @@
+//! An application with pilots of its own, by the crate `skein` alone. This file is the application and its test: started with
+//! `SKEIN_TEST_APP` set, it does what its arguments say.
+#![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
+
+mod own_pilots;
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Output};
+
+/// Set in the processes of the application.
+const APP: &str = "SKEIN_TEST_APP";
+
+fn main() -> ExitCode {
+    if std::env::var_os(APP).is_some() {
+        return own_pilots::app().main();
+    }
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
+    for (name, test) in TESTS {
+        if wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str())) {
+            let folder = tempfile::tempdir().unwrap();
+            test(&Bench { folder: folder.path().to_owned() });
+            println!("test {name} ... ok");
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+type Test = fn(&Bench);
+
+const TESTS: &[(&str, Test)] = &[
+    ("both_runtimes_fly_own_pilots_with_equal_digests", both_runtimes_fly_own_pilots_with_equal_digests),
+    ("a_mixed_swarm_survives_faults_and_loss", a_mixed_swarm_survives_faults_and_loss),
+    ("wrong_names_and_parameters_are_refused", wrong_names_and_parameters_are_refused),
+    ("a_program_of_its_own_flies_some_drones", a_program_of_its_own_flies_some_drones),
+    ("sweep_and_replay_know_the_pilots", sweep_and_replay_know_the_pilots),
+    ("a_program_without_its_pilot_in_the_air_says_so", a_program_without_its_pilot_in_the_air_says_so),
+];
+
+/// A folder for one test.
+struct Bench {
+    folder: PathBuf,
+}
+
+impl Bench {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Writes a scenario: a V of six drones in the open that flies for three seconds, and these tables.
+    fn scenario(&self, tables: &str) -> PathBuf {
+        let path = self.path("own.toml");
+        let head = "[formation]\nshape = \"v\"\ndrones = 6\nspacing_m = 60\n[time]\ntimeout_s = 3\n[mission]\nstop_x_m = 1e5\n";
+        std::fs::write(&path, format!("{head}{tables}")).unwrap();
+        path
+    }
+
+    fn command(&self, words: &[&str]) -> Command {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.env(APP, "1").current_dir(&self.folder).args(words);
+        command
+    }
+
+    fn output(&self, words: &[&str]) -> Output {
+        self.command(words).output().unwrap()
+    }
+
+    /// Flies and returns the summary.
+    fn fly(&self, scenario: &Path, more: &[&str]) -> Value {
+        let out = self.path("run");
+        let words = ["run", scenario.to_str().unwrap(), "--json", "--force", "--out", out.to_str().unwrap()];
+        let output = self.command(&words).args(more).output().unwrap();
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", text(&output.stderr)))
+    }
+
+    /// Flies inline and in processes, and returns the summary of the latter. The digests must be equal.
+    fn fly_both(&self, scenario: &Path, more: &[&str]) -> Value {
+        let inline = self.fly(scenario, &[&["--runtime", "inline", "--no-record"], more].concat());
+        let processes = self.fly(scenario, &[&["--no-record"], more].concat());
+        assert!(inline["digest"].is_string(), "{inline}");
+        assert_eq!(inline["digest"], processes["digest"]);
+        processes
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn both_runtimes_fly_own_pilots_with_equal_digests(bench: &Bench) {
+    let scenario = bench.scenario("[[pilot]]\nname = \"drift\"\nparams = { gain_per_s = 0.4 }\n");
+    let summary = bench.fly_both(&scenario, &[]);
+    let pilots = summary["pilots"].as_array().unwrap();
+    assert_eq!((pilots.len(), &pilots[0]["name"]), (1, &Value::from("drift")));
+    assert_eq!(pilots[0]["params"]["gain_per_s"], 0.4);
+    assert_eq!(pilots[0]["program"].as_str().unwrap().len(), 16);
+    let packed = bench.fly(&scenario, &["--no-record", "--drones-per-process", "4"]);
+    assert_eq!(packed["digest"], summary["digest"]);
+    let other = bench.fly(&scenario, &["--no-record", "--set", "pilot.0.params.gain_per_s=0.5"]);
+    assert_ne!(other["digest"], summary["digest"]);
+    let named =
+        bench.fly(&bench.scenario(""), &["--no-record", "--pilot", "drift", "--set", "pilot.0.params.gain_per_s=0.4"]);
+    assert_eq!(named["digest"], summary["digest"]);
+    // What pilots print does not get into the launcher's JSON.
+    let loud = bench.scenario("[[pilot]]\nname = \"loud\"\n");
+    bench.fly_both(&loud, &[]);
+}
+
+fn a_mixed_swarm_survives_faults_and_loss(bench: &Bench) {
+    let scenario = bench.scenario(
+        r#"
+        [[pilot]]
+        name = "drift"
+        drones = [1, 2, 4]
+        [radio]
+        loss = 0.5
+        [[fault]]
+        kind = "kill"
+        drone = 1
+        at_s = 0.5
+        [[fault]]
+        kind = "freeze"
+        drone = 2
+        at_s = 0.5
+        for_s = 1.0
+        [[fault]]
+        kind = "restart"
+        drone = 4
+        at_s = 0.7
+        for_s = 0.5
+        "#,
+    );
+    let summary = bench.fly_both(&scenario, &[]);
+    let names: Vec<_> = summary["pilots"].as_array().unwrap().iter().map(|pilot| pilot["name"].clone()).collect();
+    assert_eq!(names, ["drift", "paper"]);
+    assert_eq!(summary["pilots"][1]["drones"], serde_json::json!([0, 3, 5]));
+    let kinds: Vec<_> = summary["faults"].as_array().unwrap().iter().map(|fault| fault["kind"].clone()).collect();
+    assert!(kinds.contains(&"kill".into()) && kinds.contains(&"freeze".into()), "{kinds:?}");
+}
+
+fn wrong_names_and_parameters_are_refused(bench: &Bench) {
+    let refused = |tables: &str, more: &[&str]| {
+        let path = bench.scenario(tables);
+        let output = bench.command(&["run", path.to_str().unwrap()]).args(more).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+        assert!(!bench.path("runs").exists(), "nothing is started");
+        text(&output.stderr)
+    };
+    let name = refused("[[pilot]]\nname = \"drifd\"\n", &[]);
+    assert!(name.contains("own.toml:10:8: pilot.0.name: found \"drifd\""), "{name}");
+    assert!(name.contains("\"drift\"") && name.contains("did you mean `drift`?"), "{name}");
+    let value = refused("[[pilot]]\nname = \"drift\"\nparams = { gain_per_s = \"much\" }\n", &[]);
+    let wanted = "own.toml:11:25: pilot.0.params.gain_per_s: expected a number, but found \"much\" (pilot \"drift\")";
+    assert!(value.contains(wanted), "{value}");
+    let set = refused("", &["--pilot", "drift", "--set", "pilot.0.params.gain_per_s=-1"]);
+    assert!(set.contains("--set pilot.0.params.gain_per_s=-1: pilot.0.params.gain_per_s: expected"), "{set}");
+    let inline = refused("[[pilot]]\ncommand = [\"python3\", \"x.py\"]\n", &["--runtime", "inline"]);
+    assert!(inline.contains("own.toml:10:11: pilot.0.command: a program of its own cannot fly inline"), "{inline}");
+}
+
+fn a_program_of_its_own_flies_some_drones(bench: &Bench) {
+    // The launcher is `skein` with the built-in pilots; this application is the program of the pilot.
+    let program = std::env::current_exe().unwrap();
+    let table =
+        format!("[[pilot]]\nname = \"drift\"\ncommand = [{:?}]\ndrones = [1, 2, 5]\n", program.display().to_string());
+    let scenario = bench.scenario(&table);
+    let launch = |path: &Path, more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+        command.env(APP, "1").current_dir(&bench.folder).args(["run", path.to_str().unwrap(), "--json", "--no-record"]);
+        let output = command.args(["--force", "--out", "out"]).args(more).output().unwrap();
+        (
+            output.status.code(),
+            serde_json::from_slice::<Value>(&output.stdout).unwrap_or_default(),
+            text(&output.stderr),
+        )
+    };
+    let (_, summary, errors) = launch(&scenario, &[]);
+    let here = bench.fly(&bench.scenario("[[pilot]]\nname = \"drift\"\ndrones = [1, 2, 5]\n"), &["--no-record"]);
+    assert_eq!(summary["digest"], here["digest"], "{errors}");
+    assert_eq!(summary["pilots"][0]["program"], here["pilots"][0]["program"]);
+    let packed = launch(&bench.scenario(&table), &["--drones-per-process", "3"]).1;
+    assert_eq!(packed["digest"], here["digest"]);
+    let wrong = bench.scenario(&format!("{table}params = {{ gain_per_s = -1 }}\n"));
+    let (code, _, errors) = launch(&wrong, &[]);
+    assert_eq!(code, Some(2), "{errors}");
+    assert!(errors.contains("pilot.0.params.gain_per_s: expected"), "{errors}");
+}
+
+fn sweep_and_replay_know_the_pilots(bench: &Bench) {
+    let scenario = bench.scenario("[[pilot]]\nname = \"drift\"\n");
+    let run = bench.fly(&scenario, &[]);
+    let replayed = |runtime: &str| bench.output(&["replay", "run", "--runtime", runtime]);
+    for runtime in ["inline", "processes"] {
+        let output = replayed(runtime);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    }
+    // Without the pilot, or with another program, the run cannot be repeated.
+    let bare =
+        Command::new(env!("CARGO_BIN_EXE_skein")).args(["replay", "run"]).current_dir(&bench.folder).output().unwrap();
+    assert!(bare.status.code() == Some(2) && text(&bare.stderr).contains("found \"drift\""), "{}", text(&bare.stderr));
+    let manifest = bench.path("run").join("manifest.json");
+    let hash = run["pilots"][0]["program"].as_str().unwrap();
+    let changed = std::fs::read_to_string(&manifest).unwrap().replace(hash, "00000000000000ff");
+    std::fs::write(&manifest, changed).unwrap();
+    let other = replayed("inline");
+    assert_eq!(other.status.code(), Some(2));
+    assert!(text(&other.stderr).contains("was flown by another program"), "{}", text(&other.stderr));
+    let experiment =
+        "name = \"e\"\nscenario = [\"own.toml\"]\nseeds = [1]\n[grid]\n\"pilot.0.params.gain_per_s\" = [0.2, 0.4]\n";
+    std::fs::write(bench.path("e.toml"), experiment).unwrap();
+    let sweep = bench.output(&["sweep", "e.toml", "--json", "--jobs", "1"]);
+    assert_eq!(sweep.status.code(), Some(0), "{}", text(&sweep.stderr));
+    std::fs::write(bench.path("f.toml"), experiment.replace("0.4", "-0.4")).unwrap();
+    let wrong = bench.output(&["sweep", "f.toml"]);
+    assert!(
+        wrong.status.code() == Some(2) && text(&wrong.stderr).contains("pilot.0.params.gain_per_s: expected"),
+        "{wrong:?}"
+    );
+}
+
+fn a_program_without_its_pilot_in_the_air_says_so(bench: &Bench) {
+    let path = bench.scenario("");
+    let output = bench.output(&["run", path.to_str().unwrap(), "--runtime", "inline", "--no-record"]);
+    let errors = text(&output.stderr);
+    assert!(errors.contains("warning: no drone flies with a pilot of this program (drift,"), "{errors}");
+}

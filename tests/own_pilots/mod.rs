@@ -1,0 +1,44 @@
+//! The pilots of the test application.
+
+use skein::{App, Birth, Command, Inbox, Out, Pilot, PilotError, Senses};
+
+/// The application.
+pub(crate) fn app() -> App {
+    App::new().try_pilot("drift", |birth| Ok(Box::new(Drift::new(birth)?))).pilot("loud", |_| Box::new(Loud))
+}
+
+/// Flies towards the middle of its neighbours.
+struct Drift {
+    gain_per_s: f64,
+}
+
+impl Drift {
+    fn new(birth: &Birth) -> Result<Self, PilotError> {
+        let gain_per_s = birth.params.get_f64("gain_per_s", 0.1)?;
+        if gain_per_s < 0.0 {
+            return Err(PilotError::of_param("gain_per_s", format!("expected a number from 0, found {gain_per_s}")));
+        }
+        Ok(Self { gain_per_s })
+    }
+}
+
+impl Pilot for Drift {
+    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
+        let share = self.gain_per_s / senses.neighbours.len().max(1) as f64;
+        let mut velocity_mps = [0.0; 3];
+        for neighbour in senses.neighbours {
+            velocity_mps.iter_mut().zip(neighbour.position_m).for_each(|(mps, m)| *mps += share * m);
+        }
+        Command::velocity(velocity_mps)
+    }
+}
+
+/// Prints something in every step.
+struct Loud;
+
+impl Pilot for Loud {
+    fn step(&mut self, _: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
+        println!("{{ this is not the summary");
+        Command::default()
+    }
+}
