@@ -38,6 +38,7 @@ fn facts() -> RunFacts {
         planning_distance_m: 20.0,
         arrival_error_m: 0.8,
         radio_range_m: None,
+        pilots: Vec::new(),
         obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
         scene: Default::default(),
     }
