@@ -236,6 +236,9 @@ pub struct Totals {
     pub age_s: Percentiles,
     /// Commands that the world rejected because they were not finite.
     pub rejected_commands: u64,
+    /// Figures, marks and lines that were not recorded: they were not valid, or more than a drone can report in a tick.
+    #[serde(default)]
+    pub telemetry_refused: u64,
     /// Number of times a drone missed a tick's deadline (wall clock only).
     pub deadline_misses: u64,
     /// Wall time from the start of the first tick to the end of the last tick, s.
@@ -328,6 +331,16 @@ pub enum EventKind {
         target: DroneId,
         /// Details for a human reader.
         detail: String,
+    },
+    /// A pilot has failed: it panicked, or commanded or said something that cannot be used. Its drone is killed at the start of
+    /// the next tick.
+    Failure {
+        /// The drone.
+        drone: DroneId,
+        /// Name of its pilot.
+        pilot: String,
+        /// Why it failed, for a human reader.
+        reason: String,
     },
     /// An invariant is broken. The event is sent once, when the violation begins.
     Violation {

@@ -173,6 +173,18 @@ impl TelemetryRow {
         (!matches!(telemetry, Telemetry::Failure { .. })).then_some(row)
     }
 
+    /// The figure's name and value; `None` if the row is no figure.
+    #[must_use]
+    pub fn metric(&self) -> Option<(MetricName, f64)> {
+        if self.kind != u32::from(METRIC_KIND) {
+            return None;
+        }
+        match self.telemetry()? {
+            Telemetry::Metric { name, value } => Some((name, value)),
+            _ => None,
+        }
+    }
+
     /// What the drone reports; `None` if the row is not valid.
     #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {

@@ -7,9 +7,12 @@ use crate::facts::RunFacts;
 use crate::formation::{self, Closing};
 use crate::leading::Leading;
 use crate::metrics::SwarmMetrics;
+use crate::own_metrics::OwnMetrics;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
-use crate::summary::{Dropped, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers};
+use crate::summary::{
+    Dropped, FailureEntry, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers,
+};
 use crate::tuning::METRICS_PERIOD_S;
 use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
@@ -28,6 +31,8 @@ pub(crate) struct Accumulator {
     energy: EnergyMarks,
     violations: Vec<Violation>,
     faults: Vec<FaultEntry>,
+    failures: Vec<FailureEntry>,
+    own_metrics: OwnMetrics,
     end: Option<End>,
     counts: Counts,
     /// The rows of the last tick.
@@ -72,6 +77,8 @@ impl Accumulator {
             energy: EnergyMarks::default(),
             violations: Vec::new(),
             faults: Vec::new(),
+            failures: Vec::new(),
+            own_metrics: OwnMetrics::default(),
             end: None,
             counts: Counts::default(),
             last: Vec::new(),
@@ -102,6 +109,7 @@ impl Accumulator {
         }
         if fresh {
             self.counts.sent += record.frames.len() as u64;
+            self.own_metrics.take(tick, record.telemetry);
             self.take_rows(tick, record.head.now.secs(), record.rows);
         } else if record.head.lost > 0 {
             // The last ticks were lost; only the end of the mission was recorded.
@@ -134,6 +142,9 @@ impl Accumulator {
                 }
                 let target = (target != DroneId::NONE).then_some(target.0);
                 self.faults.push(FaultEntry { t_s, kind, target, scheduled, detail });
+            }
+            EventKind::Failure { drone, pilot, reason } => {
+                self.failures.push(FailureEntry { t_s, drone: drone.0, pilot, reason });
             }
             EventKind::Violation { kind, drones, value_m } => {
                 self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
@@ -233,6 +244,9 @@ impl Accumulator {
             deadline_misses: totals.map_or(self.counts.late, |totals| totals.deadline_misses),
             lateness_us: totals.and_then(|totals| lateness(&totals.lateness_s)),
             step_us: self.steps.times().filter(|_| self.facts.runtime != "inline"),
+            metrics_own: self.own_metrics.finish(),
+            telemetry_refused: totals.map(|totals| totals.telemetry_refused),
+            failures: self.failures,
             rejected_commands: totals.map(|totals| totals.rejected_commands),
             lost_ticks: self.counts.lost,
             digest: self.counts.digest.map(|digest| format!("{digest:016x}")),

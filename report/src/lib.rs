@@ -73,6 +73,7 @@ mod leading;
 mod markup;
 mod mcap;
 mod metrics;
+mod own_metrics;
 pub mod page;
 mod palette;
 mod pilot_entry;

@@ -9,6 +9,7 @@ use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
 use skein_protocol::record::{FaultKind, Outcome, Percentiles, ViolationKind};
 use skein_protocol::{Ballot, DroneId};
+use std::collections::BTreeMap;
 
 /// [`Summary::schema`] of this version.
 pub const SUMMARY_SCHEMA: &str = "skein-summary/1";
@@ -93,6 +94,15 @@ pub struct Summary {
     /// The pilots, and the drones that they flew.
     #[serde(default)]
     pub pilots: Vec<PilotEntry>,
+    /// The figures that pilots reported, by name.
+    #[serde(default)]
+    pub metrics_own: BTreeMap<String, OwnMetric>,
+    /// Number of figures, marks and lines that were not recorded, because they were not valid or too many in a tick.
+    #[serde(default)]
+    pub telemetry_refused: Option<u64>,
+    /// The pilots that failed.
+    #[serde(default)]
+    pub failures: Vec<FailureEntry>,
     /// Number of ticks that drones did not answer in time (wall clock only).
     pub deadline_misses: u64,
     /// How late ticks opened, µs (wall clock only; null in lockstep).
@@ -286,6 +296,32 @@ pub struct FaultEntry {
     pub scheduled: bool,
     /// Details in words.
     pub detail: String,
+}
+
+/// A figure that pilots reported, over the mission.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OwnMetric {
+    /// Mean of all values that any drone reported in any tick.
+    pub mean: f64,
+    /// Mean over the drones that reported it in the last tick in which any drone did.
+    pub last: f64,
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+}
+
+/// A pilot that failed: it panicked, raised an exception, hung, or commanded or said something that cannot be used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FailureEntry {
+    /// When, s.
+    pub t_s: f64,
+    /// Its drone.
+    pub drone: u32,
+    /// Its name.
+    pub pilot: String,
+    /// Why, in words.
+    pub reason: String,
 }
 
 /// Wall times, µs.

@@ -51,14 +51,12 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
             Failsafe::Hover => skein_world::Failsafe::Hover,
             Failsafe::Land => skein_world::Failsafe::Land,
         },
-        end: match destination(scenario) {
-            Destination::Hold { stop_x_m } => skein_world::End::Hold { stop_x_m },
-            Destination::Goal { front_m } => skein_world::End::Goal { front_m },
-        },
+        end: end(scenario),
         arrival_error_m: scenario.mission.arrival_error_m,
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
         faults: fault_plan(scenario),
+        pilots: scenario.pilot_names(),
     };
     let velocity = Vec3::new(drone.speed_mps, 0.0, 0.0);
     let start = |place: Vec2| (place.push(scenario.formation.altitude_m), velocity);
@@ -67,8 +65,22 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
     Ok(World::new(params, &starts, &shapes)?)
 }
 
-/// The drones that have no way to their destination; none if a scheduled kill may take such a drone out of the mission.
+/// What ends the mission.
+fn end(scenario: &Scenario) -> skein_world::End {
+    match (scenario.mission.end, destination(scenario)) {
+        (End::Time, _) => skein_world::End::Time { duration_s: scenario.mission.duration_s.unwrap_or_default() },
+        (End::Pilots, _) => skein_world::End::Pilots,
+        (_, Destination::Hold { stop_x_m }) => skein_world::End::Hold { stop_x_m },
+        (_, Destination::Goal { front_m }) => skein_world::End::Goal { front_m },
+    }
+}
+
+/// The drones that have no way to their destination; none if a scheduled kill may take such a drone out of the mission, or if
+/// places do not end it.
 fn without_way(scenario: &Scenario) -> Result<Vec<DroneId>, RuntimeError> {
+    if matches!(scenario.mission.end, End::Time | End::Pilots) {
+        return Ok(Vec::new());
+    }
     if scenario.fault_plan.iter().any(|event| event.kind == FaultKind::Kill) {
         return Ok(Vec::new());
     }

@@ -96,7 +96,7 @@ pub struct Time {
     #[schemars(range(min = 1e-4, max = 0.1))]
     pub dt_s: f64,
     /// Time limit. A mission that takes longer has failed. Default: 180 s, or twice what a smooth flight takes from the last slot
-    /// past all obstacles and to the goal, one drone behind another, if that is longer.
+    /// past all obstacles and to the goal, one drone behind another, if that is longer; at least `mission.duration_s`.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub timeout_s: Option<f64>,
 }
@@ -179,6 +179,9 @@ pub struct Mission {
     /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y].
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub goal_m: Option<[f64; 2]>,
+    /// Required with `end = "time"`: how long the mission lasts.
+    #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
+    pub duration_s: Option<f64>,
     /// Greatest speed while re-forming; at most `drone.speed_max_mps`.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub reform_speed_max_mps: f64,
@@ -199,6 +202,7 @@ impl Default for Mission {
             end: End::Hold,
             stop_x_m: 100.0,
             goal_m: None,
+            duration_s: None,
             reform_speed_max_mps: 20.0,
             arrival_error_m: 0.8,
             reformation: Reformation::Optimal,
@@ -229,6 +233,10 @@ pub enum End {
     Hold,
     /// Every drone is in a slot of the formation at `goal_m`.
     Goal,
+    /// The mission has lasted `duration_s`, and a drone lives. It is a success if no invariant was broken.
+    Time,
+    /// The pilots of all living drones say that they are done. It is a success if no invariant was broken.
+    Pilots,
 }
 
 /// The limits of a drone. A drone is a planar point mass at one altitude.

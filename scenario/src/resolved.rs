@@ -4,6 +4,7 @@ use crate::error::ScenarioErrors;
 use crate::keys::{End, FormationShape, Scenario};
 use crate::parse::{self, ScenarioSource};
 use crate::passage::Barrier;
+use crate::pilots::DEFAULT_PILOT;
 use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -84,6 +85,13 @@ impl Scenario {
             }
         }
         tables
+    }
+
+    /// The name of the pilot that flies each drone, by its number.
+    #[must_use]
+    pub fn pilot_names(&self) -> Vec<String> {
+        let name = |table: Option<usize>| table.map_or(DEFAULT_PILOT, |table| self.pilots[table].shown_name());
+        self.pilot_tables().into_iter().map(|table| name(table).to_owned()).collect()
     }
 
     /// The shape of the formation.
@@ -200,7 +208,8 @@ impl Scenario {
     }
 
     /// The time limit of the mission, s: `time.timeout_s`; or 180 s, or twice what a smooth flight takes
-    /// from the last slot past all obstacles and to the goal, one drone behind another, if that is longer.
+    /// from the last slot past all obstacles and to the goal, one drone behind another, if that is longer; at least the duration of a
+    /// mission that lasts a time.
     #[must_use]
     pub fn timeout_s(&self) -> f64 {
         let (drone, start_x_m) = (&self.drone, self.formation.start_m[0]);
@@ -210,7 +219,8 @@ impl Scenario {
         let rear_x_m = self.slots().iter().map(|slot| slot.x).fold(0.0, f64::min) + start_x_m;
         let headway_s = self.avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps;
         let smooth_s = (last_x_m - rear_x_m) / drone.speed_mps + f64::from(self.formation.drones) * headway_s;
-        self.time.timeout_s.unwrap_or_else(|| TIMEOUT_S.max((TIMEOUT_FACTOR * smooth_s).ceil()))
+        let lasts_s = self.mission.duration_s.filter(|_| self.mission.end == End::Time).unwrap_or(0.0);
+        self.time.timeout_s.unwrap_or_else(|| TIMEOUT_S.max((TIMEOUT_FACTOR * smooth_s).ceil()).max(lasts_s))
     }
 
     /// The scenario as TOML with every key written out. [`Scenario::parse`] makes an equal scenario of it.

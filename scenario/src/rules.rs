@@ -125,6 +125,16 @@ impl Rules<'_> {
         self.expect(mission.end != End::Goal || mission.goal_m.is_some(), &["mission.goal_m", "mission.end"], || {
             "is missing: mission.end = \"goal\" needs the position of the front slot, [x, y]".to_owned()
         });
+        self.expect(
+            mission.end != End::Time || mission.duration_s.is_some(),
+            &["mission.duration_s", "mission.end"],
+            || "is missing: mission.end = \"time\" needs the duration of the mission".to_owned(),
+        );
+        if let (End::Time, Some(duration_s), Some(timeout_s)) =
+            (mission.end, mission.duration_s, self.scenario.time.timeout_s)
+        {
+            self.at_most(("mission.duration_s", duration_s), ("time.timeout_s", timeout_s), "s");
+        }
     }
 
     fn strategy(&mut self) {

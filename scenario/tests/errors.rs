@@ -118,6 +118,11 @@ fn broken_rules_between_keys_are_rejected() {
             &["time.dt_s: found 0.1 s", "at most 0.05 s"],
         ),
         ("[formation]\n[mission]\nend = \"goal\"", &["bad.toml:3:7: mission.goal_m: is missing"]),
+        ("[formation]\n[mission]\nend = \"time\"", &["bad.toml:3:7: mission.duration_s: is missing"]),
+        (
+            "[formation]\n[mission]\nend = \"time\"\nduration_s = 9\n[time]\ntimeout_s = 8",
+            &["bad.toml:4:14: mission.duration_s: found 9 s, expected at most time.timeout_s = 8 s"],
+        ),
         (
             "strategy = \"fixed:4/4\"\n[formation]",
             &["strategy: found fixed:4/4 with 0 obstacles, expected exactly one"],

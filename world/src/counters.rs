@@ -25,6 +25,11 @@ impl MissionCounters {
         self.totals.sent += frames;
     }
 
+    /// Counts figures, marks and lines that were not recorded.
+    pub(crate) fn count_refused(&mut self, telemetry: u64) {
+        self.totals.telemetry_refused += telemetry;
+    }
+
     /// Counts answers that did not come in time.
     pub(crate) fn count_missed(&mut self, deadlines: u64) {
         self.totals.deadline_misses += deadlines;

@@ -57,6 +57,14 @@ impl DroneTable {
         (0..self.bodies.len()).filter_map(|drone| Some((drone, self.answer(drone)?)))
     }
 
+    /// Whether there are living drones and the last answers of all of them say that the mission is done.
+    pub(crate) fn all_done(&self) -> bool {
+        let pairs = self.bodies.iter().zip(&self.processes);
+        let mut done =
+            pairs.filter(|(body, _)| body.is_alive()).map(|(_, process)| process.slot().is_done()).peekable();
+        done.peek().is_some() && done.all(|done| done)
+    }
+
     /// Takes a drone's answer to the current tick, if its process lives and is not frozen.
     pub(crate) fn take_slot(&mut self, id: DroneId, slot: &Slot) {
         if let Some(process) = self.running(id) {
@@ -135,8 +143,9 @@ impl DroneTable {
                 body.fail_safe(params);
                 continue;
             }
-            // The safety rule allows a command in the state in which it was given, and braking in every state.
-            if process.is_frozen() || process.is_late() {
+            // The safety rule allows a command in the state in which it was given, and braking in every state. A pilot that has
+            // failed in this tick commands nothing.
+            if process.is_frozen() || process.is_late() || process.slot().has_failed() {
                 body.hover(params);
                 continue;
             }

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::end_condition::EndCondition;
-use crate::params::WorldParams;
+use crate::params::{End, WorldParams};
 use crate::stages::Stages;
 use skein_protocol::record::Outcome;
 use skein_protocol::{DroneId, SimTime};
@@ -12,6 +12,8 @@ use skein_protocol::{DroneId, SimTime};
 pub(crate) struct MissionState<'a> {
     /// The bodies, by id.
     pub(crate) bodies: &'a [Body],
+    /// Whether there are living drones and the pilots of all of them say that the mission is done.
+    pub(crate) all_done: bool,
     /// The obstacle sets.
     pub(crate) stages: &'a Stages,
     /// The time of the tick's end.
@@ -45,8 +47,8 @@ impl MissionJudge {
         if self.end.is_some() {
             return;
         }
-        let (outcome, reason) = if self.condition.is_met(params, state.bodies, state.stages) {
-            (Outcome::Reached, "the end condition is met".to_owned())
+        let (outcome, reason) = if let Some(reason) = self.reached(params, &state) {
+            (Outcome::Reached, reason)
         } else if !state.bodies.iter().any(Body::is_alive) && !state.awaits_restarts {
             (Outcome::Timeout, "no drone is left alive".to_owned())
         } else if !params.without_way.is_empty() {
@@ -60,6 +62,22 @@ impl MissionJudge {
             0 => (outcome, reason),
             count => (Outcome::Unsafe, format!("{reason}, but invariants were broken {count} times")),
         });
+    }
+
+    /// Why the mission has reached its end; `None` if it has not.
+    fn reached(&mut self, params: &WorldParams, state: &MissionState<'_>) -> Option<String> {
+        let living = state.bodies.iter().any(Body::is_alive);
+        let (met, reason) = match params.end {
+            End::Time { duration_s } => {
+                let over = living && state.end >= SimTime::from_secs(duration_s);
+                (over, format!("the mission lasted its {duration_s} s"))
+            }
+            End::Pilots => (state.all_done, "all living drones say that they are done".to_owned()),
+            End::Hold { .. } | End::Goal { .. } => {
+                (self.condition.is_met(params, state.bodies, state.stages), "the end condition is met".to_owned())
+            }
+        };
+        met.then_some(reason)
     }
 }
 

@@ -49,6 +49,7 @@
 //!     shape: Shape::NestedV,
 //!     spacing_m: 35.0,
 //!     faults: FaultPlan::default(),
+//!     pilots: Vec::new(),
 //! };
 //! let start = (Vec3::new(0.0, 0.0, 50.0), Vec3::new(10.0, 0.0, 0.0));
 //! let mut world = World::new(params, &[start], &[])?;
@@ -85,6 +86,7 @@ mod sense_writer;
 mod sensor_fault;
 mod stages;
 mod sweep;
+mod telemetry_log;
 #[cfg(test)]
 mod testing;
 mod tick_digest;

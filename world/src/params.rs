@@ -30,6 +30,13 @@ pub enum End {
         /// The position of the front slot, m.
         front_m: Vec2,
     },
+    /// The mission has lasted long enough, and a drone lives.
+    Time {
+        /// How long, s.
+        duration_s: f64,
+    },
+    /// The pilots of all living drones say that they are done.
+    Pilots,
 }
 
 /// The parameters of a world.
@@ -74,6 +81,8 @@ pub struct WorldParams {
     pub spacing_m: f64,
     /// The scheduled faults.
     pub faults: FaultPlan,
+    /// Names of the drones' pilots, by id, for events.
+    pub pilots: Vec<String>,
 }
 
 /// Why a world cannot be made.
@@ -111,6 +120,12 @@ impl WorldParams {
     #[must_use]
     pub fn dt_s(&self) -> f64 {
         self.dt_ns as f64 * 1e-9
+    }
+
+    /// Name of a drone's pilot.
+    #[must_use]
+    pub fn pilot_of(&self, id: DroneId) -> &str {
+        self.pilots.get(id.index()).map_or("unknown", String::as_str)
     }
 
     /// Checks all parameters.

@@ -33,6 +33,7 @@ pub(crate) fn params() -> WorldParams {
         shape: Shape::NestedV,
         spacing_m: 35.0,
         faults: FaultPlan::default(),
+        pilots: Vec::new(),
     }
 }
 

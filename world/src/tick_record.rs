@@ -10,6 +10,7 @@ use skein_protocol::link_faults::LinkFaults;
 use skein_protocol::record::{
     DroneRow, ROW_ALIVE, ROW_FROZEN, ROW_LATE, ROW_LEADS, ROW_QUEUED, RecordHeader, RecordView,
 };
+use skein_protocol::telemetry::TelemetryRow;
 use skein_protocol::{DroneId, SimTime, Tick};
 
 /// A tick that has ended.
@@ -25,6 +26,8 @@ pub(crate) struct EndedTick {
     pub(crate) events_len: usize,
     /// Number of its frames.
     pub(crate) frames: usize,
+    /// Number of figures, marks and lines that pilots reported in it.
+    pub(crate) telemetry: usize,
 }
 
 /// The head and the rows, in reused memory.
@@ -46,7 +49,7 @@ impl TickRecord {
             now: ended.end,
             rows: self.rows.len() as u32,
             frames: ended.frames as u32,
-            telemetry: 0,
+            telemetry: ended.telemetry as u32,
             events_len: ended.events_len as u32,
             lost: 0,
             reserved: 0,
@@ -61,10 +64,16 @@ impl TickRecord {
             RecordHeader { rows: 0, frames: 0, telemetry: 0, events_len: events_len as u32, digest, ..self.head };
     }
 
-    /// The record with its frames and events. A record without frames ignores `frames`.
-    pub(crate) fn view<'a>(&'a self, frames: &'a [AirFrame], events: &'a [u8]) -> RecordView<'a> {
+    /// The record with its frames, telemetry and events. A record without frames or telemetry ignores these.
+    pub(crate) fn view<'a>(
+        &'a self,
+        frames: &'a [AirFrame],
+        telemetry: &'a [TelemetryRow],
+        events: &'a [u8],
+    ) -> RecordView<'a> {
         let frames = if self.head.frames == 0 { &[] } else { frames };
-        RecordView { head: &self.head, rows: &self.rows, frames, telemetry: &[], events }
+        let telemetry = if self.head.telemetry == 0 { &[] } else { telemetry };
+        RecordView { head: &self.head, rows: &self.rows, frames, telemetry, events }
     }
 }
 

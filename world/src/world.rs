@@ -13,6 +13,7 @@ use crate::params::{WorldError, WorldParams};
 use crate::sense_writer::SenseWriter;
 use crate::stages::Stages;
 use crate::sweep::{SensorSweep, SweepRange};
+use crate::telemetry_log::TelemetryLog;
 use crate::tick_digest::TickDigest;
 use crate::tick_record::{EndedTick, TickRecord};
 use crate::uplink::Uplink;
@@ -22,6 +23,7 @@ use skein_protocol::nearby::Locality;
 use skein_protocol::record::{EventKind, FaultKind, Outcome, Percentiles, RecordView};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
+use skein_protocol::telemetry::Telemetry;
 use skein_protocol::{DroneId, SimTime, Tick, Vec3};
 
 /// The true state of one mission.
@@ -54,6 +56,7 @@ pub struct World {
     counters: MissionCounters,
     digest: TickDigest,
     log: EventLog,
+    telemetry: TelemetryLog,
     record: TickRecord,
 }
 
@@ -83,6 +86,7 @@ impl World {
             counters: MissionCounters::default(),
             digest: TickDigest::default(),
             log: EventLog::default(),
+            telemetry: TelemetryLog::new(starts.len()),
             record: TickRecord::default(),
             params,
             drones,
@@ -135,14 +139,20 @@ impl World {
         self.drones.take_slot(id, slot);
     }
 
-    /// Takes the frames that a drone sent in the current tick, in the order in which it sent them. Frames of dead drones
-    /// are ignored.
+    /// Takes the frames that a drone sent in the current tick, in the order in which it sent them. Telemetry is recorded; all
+    /// other frames go on the air. Frames of dead drones are ignored.
     pub fn take_frames(&mut self, id: DroneId, frames: &[Frame]) {
         if !self.drones.is_alive(id) {
             return;
         }
         let link_faults = self.faults.schedule().standing(id).link_faults;
+        let mut sent = 0;
         for &frame in frames {
+            if Telemetry::is_kind(frame.kind) {
+                self.counters.count_refused(u64::from(!self.telemetry.take(id, &frame)));
+                continue;
+            }
+            sent += 1;
             let Some((sequence, position)) = self.drones.next_frame(id) else { return };
             let position_m = position.into();
             self.uplink.push(AirFrame {
@@ -155,7 +165,7 @@ impl World {
                 frame,
             });
         }
-        self.counters.count_sent(frames.len() as u64);
+        self.counters.count_sent(sent);
     }
 
     /// A drone did not answer in time, which happens by the wall clock only. It brakes until its next command: its last one may
@@ -171,6 +181,12 @@ impl World {
             self.decisions.forget(id);
             self.log.push(self.now(), EventKind::Fault { kind, target: id, scheduled, detail: detail.to_owned() });
         }
+    }
+
+    /// Logs that a drone's pilot has failed in a way that the drone itself could not report, such as an exit.
+    pub fn note_failure(&mut self, id: DroneId, reason: &str) {
+        let pilot = self.params.pilot_of(id).to_owned();
+        self.log.push(self.now(), EventKind::Failure { drone: id, pilot, reason: reason.to_owned() });
     }
 
     /// Sets the incarnation of a drone's process, from 1, as its senses give it. A new incarnation may obey an older
@@ -206,7 +222,7 @@ impl World {
     /// The record of the tick that ended last; after [`World::finish`], the record of the mission's end.
     #[must_use]
     pub fn record(&self) -> RecordView<'_> {
-        self.record.view(&self.downlink.frames, self.log.ended())
+        self.record.view(&self.downlink.frames, self.telemetry.ended(), self.log.ended())
     }
 
     /// How the mission ended; `None` while it goes on.
@@ -321,6 +337,13 @@ impl World {
         for (drone, slot) in self.drones.answers() {
             let id = DroneId(drone as u32);
             self.counters.count_slot(slot);
+            if slot.has_failed() {
+                let reason = self.telemetry.failure(id).unwrap_or("it did not say why").to_owned();
+                let pilot = self.params.pilot_of(id).to_owned();
+                self.log.push(opening, EventKind::Failure { drone: id, pilot, reason: reason.clone() });
+                self.faults.fail(id, reason);
+                continue;
+            }
             self.monitor.check_obedience(id, slot, opening, &mut self.log);
             self.decisions.follow_slot(id, slot, opening, &mut self.log);
         }
@@ -351,6 +374,7 @@ impl World {
     fn judge(&mut self, end: SimTime) {
         let state = MissionState {
             bodies: self.drones.bodies(),
+            all_done: self.drones.all_done(),
             stages: &self.stages,
             end,
             awaits_restarts: self.faults.schedule().awaits_restarts(),
@@ -363,12 +387,14 @@ impl World {
     fn close_tick(&mut self, end: SimTime) {
         self.uplink.hand_over(&mut self.downlink.frames);
         self.log.end_tick();
+        self.telemetry.end_tick();
         let ended = EndedTick {
             tick: self.tick,
             end,
             digest: self.digest(),
             events_len: self.log.ended().len(),
             frames: self.downlink.frames.len(),
+            telemetry: self.telemetry.ended().len(),
         };
         self.record.close_tick(ended, &self.drones, self.faults.schedule());
         self.drones.open_tick();
@@ -390,5 +416,7 @@ fn check_bodies(starts: &[(Vec3, Vec3)], obstacles: &[ConvexShape]) -> Result<()
 
 #[cfg(test)]
 mod fault_tests;
+#[cfg(test)]
+mod pilot_tests;
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use skein_protocol::record::{EventKind, RunEvent};
 pub enum Severity {
     /// A normal event.
     Info,
-    /// A fault, scheduled or not.
+    /// A fault, scheduled or not, or the failure of a pilot.
     Warning,
     /// A violated invariant.
     Error,
@@ -18,7 +18,7 @@ pub enum Severity {
 #[must_use]
 pub fn severity(event: &RunEvent) -> Severity {
     match event.what {
-        EventKind::Fault { .. } => Severity::Warning,
+        EventKind::Fault { .. } | EventKind::Failure { .. } => Severity::Warning,
         EventKind::Violation { .. } => Severity::Error,
         _ => Severity::Info,
     }
@@ -48,6 +48,7 @@ pub fn line(event: &RunEvent) -> String {
         EventKind::FaultOver { kind, target, detail } => {
             format!("{}, {}, is over: {detail}", name(kind), target_text(*target))
         }
+        EventKind::Failure { drone, pilot, reason } => format!("the pilot {pilot} of drone {drone} failed: {reason}"),
         EventKind::Violation { kind, drones, value_m } => {
             let value = if kind.is_distance() { format!(": {value_m:.2} m") } else { String::new() };
             format!("{} violated by drones {}{value}", name(kind), list(drones))

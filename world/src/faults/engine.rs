@@ -14,12 +14,14 @@ use skein_protocol::{DroneId, SimTime};
 pub(crate) struct FaultEngine {
     schedule: FaultSchedule,
     commands: Vec<ProcessCommand>,
+    /// The drones whose pilots failed in the last tick, with the reasons.
+    failed: Vec<(DroneId, String)>,
 }
 
 impl FaultEngine {
     /// The plan for this number of drones, with nothing begun.
     pub(crate) fn new(plan: FaultPlan, drones: usize) -> Self {
-        Self { schedule: FaultSchedule::new(plan, drones), commands: Vec::new() }
+        Self { schedule: FaultSchedule::new(plan, drones), commands: Vec::new(), failed: Vec::new() }
     }
 
     /// What is in force.
@@ -32,9 +34,18 @@ impl FaultEngine {
         &self.commands
     }
 
-    /// Begins a tick: ends the faults that are over.
+    /// The pilot of a drone has failed: the drone is killed when the next tick begins.
+    pub(crate) fn fail(&mut self, drone: DroneId, reason: String) {
+        self.failed.push((drone, reason));
+    }
+
+    /// Begins a tick: kills drones whose pilots have failed, and ends the faults that are over.
     pub(crate) fn end_due(&mut self, now: SimTime, drones: &mut DroneTable, log: &mut EventLog) {
         self.commands.clear();
+        for (drone, reason) in self.failed.drain(..).filter(|(drone, _)| drones.kill(*drone)) {
+            self.commands.push(ProcessCommand::Kill(drone));
+            log.push(now, EventKind::Fault { kind: FaultKind::Kill, target: drone, scheduled: false, detail: reason });
+        }
         for change in self.schedule.end(now) {
             self.end(&change, now, drones, log);
         }
