@@ -40,6 +40,7 @@
 //!     planning_distance_m: 20.0,
 //!     arrival_error_m: 0.8,
 //!     radio_range_m: None,
+//!     pilots: Vec::new(),
 //!     obstacles: Vec::new(),
 //!     scene: Default::default(),
 //! };

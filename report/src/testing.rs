@@ -23,6 +23,7 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
         planning_distance_m: 20.0,
         arrival_error_m: 0.8,
         radio_range_m: None,
+        pilots: Vec::new(),
         obstacles: Vec::new(),
         scene: Default::default(),
     }
