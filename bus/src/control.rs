@@ -18,13 +18,15 @@ use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
 use std::mem::offset_of;
 use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
 /// Raised with every change of the layout, of `Slot` or of `LinkStats`.
-const LAYOUT: u32 = 5;
+const LAYOUT: u32 = 6;
 /// Looks at a word before sleeping, if every process has a core of its own.
 const SPIN: u32 = 300;
 
@@ -216,6 +218,17 @@ impl Control {
     #[must_use]
     pub fn ready(&self, drone: usize) -> Option<u32> {
         self.barrier.words(drone).ready()
+    }
+
+    /// Notes how a drone's process ended by itself, before the drone is marked as dead. For the supervisor.
+    pub fn set_end(&self, drone: usize, status: ExitStatus) {
+        self.barrier.words(drone).set_end(status.into_raw());
+    }
+
+    /// How the last process of a dead drone ended, if it ended by itself.
+    #[must_use]
+    pub fn end(&self, drone: usize) -> Option<ExitStatus> {
+        self.barrier.words(drone).end().map(ExitStatus::from_raw)
     }
 
     /// Marks a drone whose process is gone (reaped) as dead, and wakes the world if it waits for the drone. For the

@@ -23,6 +23,8 @@ pub(crate) struct DroneWords {
     resume_from: AtomicU32,
     /// Incarnation of the process that is ready; 0 if none is.
     ready: AtomicU32,
+    /// How the last process ended: the system's wait status plus 1; 0 if the supervisor has ended it, or it runs.
+    end: AtomicU32,
     /// System calls that the drone has made for the barrier.
     calls: AtomicU64,
 }
@@ -51,6 +53,15 @@ impl DroneWords {
         Some(self.ready.load(Ordering::Acquire)).filter(|&incarnation| incarnation != 0)
     }
 
+    /// The wait status of the last process, if it ended by itself.
+    pub(crate) fn end(&self) -> Option<i32> {
+        self.end.load(Ordering::Acquire).checked_sub(1).map(|status| status as i32)
+    }
+
+    pub(crate) fn set_end(&self, wait_status: i32) {
+        self.end.store((wait_status as u32).wrapping_add(1), Ordering::Release);
+    }
+
     pub(crate) fn mark_dead(&self) {
         self.ready.store(0, Ordering::Release);
         // The word changes before the wake-up: a world that is about to sleep on the old value does not fall asleep.
@@ -64,6 +75,7 @@ impl DroneWords {
 
     pub(crate) fn revive(&self, from: Tick) {
         self.set_resume_from(from);
+        self.end.store(0, Ordering::Release);
         self.done.store(0, Ordering::SeqCst);
     }
 

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum RequestKind {
-    /// Send SIGKILL, and reap the process.
+    /// Send SIGKILL, and reap the process. If other drones fly in it, it goes on without this drone.
     Kill = 1,
     /// Send SIGSTOP.
     Freeze = 2,
@@ -20,6 +20,8 @@ pub enum RequestKind {
     Resume = 3,
     /// Start a new process for a dead one.
     Restart = 4,
+    /// Send SIGKILL, and reap the process with all drones in it.
+    KillProcess = 5,
 }
 
 /// One request.
@@ -99,6 +101,7 @@ impl RequestChannel {
             1 => RequestKind::Kill,
             2 => RequestKind::Freeze,
             3 => RequestKind::Resume,
+            5 => RequestKind::KillProcess,
             _ => RequestKind::Restart,
         };
         let tick = Tick::from(words.tick.load(Ordering::Relaxed));

@@ -114,6 +114,12 @@ impl Out {
         self.misuse = None;
     }
 
+    /// Forgets everything but this: the pilot has failed. The runtime says so for a pilot that cannot go on.
+    pub fn report_failure(&mut self, reason: String) {
+        self.clear();
+        self.telemetry.push(Telemetry::Failure { reason });
+    }
+
     fn note_misuse(&mut self, problem: String) {
         self.misuse.get_or_insert(problem);
     }

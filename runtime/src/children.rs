@@ -58,6 +58,7 @@ impl Running {
 pub(crate) struct Children<'l> {
     programs: Programs<'l>,
     args: ChildArgs,
+    patience: Duration,
     running: Vec<Running>,
     /// Reports the ends of processes. The cost of a wait does not depend on their number.
     ends: OwnedFd,
@@ -65,10 +66,10 @@ pub(crate) struct Children<'l> {
 
 impl<'l> Children<'l> {
     /// No processes yet. All that are started get these arguments.
-    pub(crate) fn new(programs: Programs<'l>, args: ChildArgs) -> Result<Self, RuntimeError> {
+    pub(crate) fn new(programs: Programs<'l>, args: ChildArgs, patience: Duration) -> Result<Self, RuntimeError> {
         let ends = epoll::create(epoll::CreateFlags::CLOEXEC)
             .map_err(|error| RuntimeError::system("watching processes")(error.into()))?;
-        Ok(Self { programs, args, running: Vec::new(), ends })
+        Ok(Self { programs, args, patience, running: Vec::new(), ends })
     }
 
     /// Starts a process. Call this from one thread that lives as long as the run: a child dies with the thread that
@@ -94,7 +95,10 @@ impl<'l> Children<'l> {
     fn command(&self, role: ChildRole, clock: Clock) -> Command {
         let mut command = self.program(role).command();
         match role {
-            ChildRole::World => command.args(["world", "--clock", &clock.to_string()]),
+            ChildRole::World => {
+                let patience_s = self.patience.as_secs_f64().to_string();
+                command.args(["world", "--clock", &clock.to_string(), "--patience", &patience_s])
+            }
             ChildRole::Drones(DroneRange { first, count, incarnation, first_tick }) => command.args([
                 "drone",
                 "--id",
@@ -143,6 +147,12 @@ impl<'l> Children<'l> {
             _ => true,
         });
         ended
+    }
+
+    /// Whether the process of a drone flies others, too.
+    pub(crate) fn flies_others(&self, drone: DroneId) -> bool {
+        let process = self.running.iter().find(|running| running.flies(drone));
+        process.is_some_and(|running| matches!(running.role, ChildRole::Drones(range) if range.count > 1))
     }
 
     /// Kills the process of a drone and reaps it. Returns all drones that were in it, or `None` if there is no such process.

@@ -39,6 +39,7 @@ pub fn run(args: &ChildArgs, range: DroneRange, pilots: &PilotRegistry) -> Resul
             pilot_host: factory.pilot_host(id, range.incarnation, start)?,
             barrier,
             slot: Slot::default(),
+            ended: false,
         });
     }
     let mut process = DroneProcess::new(&services, range.incarnation, drones)?;
@@ -134,14 +135,16 @@ impl DroneProcess {
                 }
                 continue;
             }
-            for drone in &mut self.drones {
+            for drone in self.drones.iter_mut().filter(|drone| !drone.pilot_host.has_failed()) {
                 let header = UplinkHeader { tick, source: drone.id.0, incarnation: self.incarnation };
                 let uplink = &self.uplinks[shard(drone.id) - self.first_shard];
                 drone.step(&down, &mut self.scratch, header, uplink)?;
             }
             // The world waits for drones in the order of their ids. Once the first has answered, all have.
-            for drone in self.drones.iter_mut().rev() {
+            for drone in self.drones.iter_mut().rev().filter(|drone| !drone.ended) {
                 drone.barrier.finish(tick, &drone.slot);
+                // The tick in which its pilot failed is the last one that it answers.
+                drone.ended = drone.pilot_host.has_failed();
             }
             break;
         }
@@ -155,6 +158,8 @@ struct DroneHandle {
     pilot_host: PilotHost,
     barrier: DroneEndpoint,
     slot: Slot,
+    /// Whether it has answered its last tick.
+    ended: bool,
 }
 
 impl DroneHandle {

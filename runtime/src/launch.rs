@@ -2,8 +2,13 @@
 
 use crate::clock::Clock;
 use crate::program::Program;
+use crate::tuning::HUNG_AFTER;
 use skein_bus::{PinMode, WaitMode};
 use skein_scenario::Scenario;
+use std::time::Duration;
+
+/// Default of [`Launch::patience`].
+pub const PATIENCE: Duration = HUNG_AFTER;
 
 /// How a run in processes is started.
 pub struct Launch<'a> {
@@ -15,6 +20,8 @@ pub struct Launch<'a> {
     pub pin: PinMode,
     /// How processes wait for each other.
     pub wait: WaitMode,
+    /// In lockstep, a drone that does not answer a tick for this long is given up: [`PATIENCE`] by default.
+    pub patience: Duration,
     /// Drones per process, from 1. With more than one, no fault of the scenario may end or stop a process.
     pub per_process: u32,
     /// The program with the roles `world` and `drone`. Drones whose pilot is a program of its own are started from that one.

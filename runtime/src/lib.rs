@@ -102,7 +102,7 @@ pub use clock::{Clock, ClockError};
 pub use drone_factory::DroneFactory;
 pub use drone_range::DroneRange;
 pub use error::RuntimeError;
-pub use launch::{Launch, OnReady, ProcessInfo, ProcessRole};
+pub use launch::{Launch, OnReady, PATIENCE, ProcessInfo, ProcessRole};
 pub use pilot_host::{HostParams, PilotHost, StepScratch};
 pub use pilot_problem::PilotProblem;
 pub use pilot_registry::PilotRegistry;

@@ -1,11 +1,13 @@
 //! A pilot with its radio receiver, as both runtimes step it.
 
 use crate::radio_receiver::{Pending, RadioReceiver};
+use crate::reported_panic::catch;
 use crate::said::Said;
-use skein_pilot::{Command, Heard, Inbox, Out, Pilot};
+use crate::tuning::{MAX_MESSAGES, MAX_OWN_MESSAGES, MAX_TELEMETRY};
+use skein_pilot::{Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
-use skein_protocol::slot::{LinkStats, SLOT_DONE, Slot};
+use skein_protocol::slot::{LinkStats, SLOT_DONE, SLOT_FAILED, Slot};
 use skein_protocol::{DroneId, Message, SimTime, flag};
 use std::sync::Arc;
 
@@ -38,6 +40,7 @@ pub struct PilotHost {
     radio_receiver: RadioReceiver,
     pilot: Box<dyn Pilot>,
     frames_total: u64,
+    failed: bool,
 }
 
 impl PilotHost {
@@ -45,7 +48,7 @@ impl PilotHost {
     #[must_use]
     pub fn new(params: HostParams, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
         let radio_receiver = RadioReceiver::new(params.me, (params.dt_s * 1e9).round() as i64, radio.into());
-        Self { params, radio_receiver, pilot, frames_total: 0 }
+        Self { params, radio_receiver, pilot, frames_total: 0, failed: false }
     }
 
     /// Receives the frames of a downlink that came too late to be answered. The pilot hears them in its next step.
@@ -64,14 +67,18 @@ impl PilotHost {
     ) -> Said<'s> {
         scratch.arrived.clear();
         scratch.out.clear();
+        scratch.ages_s.clear();
         let Some(senses) = down.senses(self.params.me) else { return Said::of(&scratch.out) };
         self.radio_receiver.receive(down, senses.now, &mut scratch.arrived, stats);
         let mut heard = emptied(std::mem::take(&mut scratch.heard));
         self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
-        let command = self.pilot.step(&senses, &Inbox::new(&heard), &mut scratch.out);
+        let stepped = self.step_pilot(&senses, &Inbox::new(&heard), scratch);
         scratch.heard = emptied(heard);
+        if let Err(reason) = &stepped {
+            self.fail(reason.clone(), &mut scratch.out);
+        }
         self.frames_total += Said::of(&scratch.out).len() as u64;
-        self.count_ages(&senses, scratch, stats);
+        self.count_ages(scratch, stats);
         let tally = self.radio_receiver.tally();
         *slot = Slot {
             heard: tally.heard,
@@ -81,27 +88,87 @@ impl PilotHost {
             frames_total: self.frames_total,
             ..Slot::default()
         };
-        self.fill(&senses, &command, slot);
-        slot.flags |= flag(scratch.out.is_done(), SLOT_DONE);
+        if let Ok(Answer { acceleration_mps2, status }) = stepped {
+            slot.acceleration_mps2 = acceleration_mps2;
+            status.fill(slot);
+        }
+        slot.flags |= flag(scratch.out.is_done(), SLOT_DONE) | flag(self.failed, SLOT_FAILED);
         Said::of(&scratch.out)
     }
 
-    /// Writes a command and its status into the slot.
-    fn fill(&self, senses: &Senses<'_>, command: &Command, slot: &mut Slot) {
-        slot.acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, self.params.velocity_gain_per_s);
-        command.status().fill(slot);
+    /// Whether its pilot has failed. It must not be stepped any more: the world kills the drone when the next tick opens.
+    #[must_use]
+    pub fn has_failed(&self) -> bool {
+        self.failed
     }
 
-    /// Whenever the drone sends a pose, counts how old the newest pose of each peer is.
-    fn count_ages(&self, senses: &Senses<'_>, scratch: &mut StepScratch, stats: &mut LinkStats) {
-        if scratch.out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
-            self.pilot.pose_ages_s(senses.now, &mut scratch.ages_s);
-            let ticks = |age_s: &f64| (age_s / self.params.dt_s).round().max(0.0) as u64;
-            for age_s in &scratch.ages_s {
-                stats.age(ticks(age_s));
+    /// Steps the pilot, and checks what it commands and says. An error says why the pilot has failed.
+    fn step_pilot(
+        &mut self,
+        senses: &Senses<'_>,
+        inbox: &Inbox<'_>,
+        scratch: &mut StepScratch,
+    ) -> Result<Answer, String> {
+        let StepScratch { out, ages_s, .. } = scratch;
+        let pilot = &mut self.pilot;
+        let command = catch(|| {
+            let command = pilot.step(senses, inbox, out);
+            ages_s.clear();
+            if out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
+                pilot.pose_ages_s(senses.now, ages_s);
             }
+            command
+        })?;
+        let acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, self.params.velocity_gain_per_s);
+        if !acceleration_mps2.iter().all(|mps2| mps2.is_finite()) {
+            return Err(format!("it commanded {:?}, which is not finite", command.motion()));
+        }
+        check_said(out)?;
+        Ok(Answer { acceleration_mps2, status: *command.status() })
+    }
+
+    /// The pilot has failed: what it said in this tick is forgotten, and the reason is reported instead.
+    fn fail(&mut self, reason: String, out: &mut Out) {
+        tracing::warn!("the pilot of drone {} failed: {reason}", self.params.me);
+        self.failed = true;
+        out.report_failure(reason);
+    }
+
+    /// Counts how old the newest pose of each peer is, as the pilot has told whenever it sends a pose.
+    fn count_ages(&self, scratch: &mut StepScratch, stats: &mut LinkStats) {
+        let ticks = |age_s: &f64| (age_s / self.params.dt_s).round().max(0.0) as u64;
+        for age_s in &scratch.ages_s {
+            stats.age(ticks(age_s));
         }
     }
+}
+
+/// A pilot's answer to a tick.
+struct Answer {
+    acceleration_mps2: [f64; 3],
+    status: Status,
+}
+
+/// Whether the radio and the record can take what a pilot has said; otherwise why not.
+fn check_said(out: &Out) -> Result<(), String> {
+    if let Some(misuse) = out.misuse() {
+        return Err(misuse.to_owned());
+    }
+    let too_many = |what: &str, found: usize, most: usize| format!("it said {found} {what} in a tick, {most} at most");
+    let (all, telemetry) = (out.messages().len(), out.telemetry().len());
+    if all > MAX_OWN_MESSAGES {
+        let own = out.messages().iter().filter(|message| matches!(message, Message::User(_))).count();
+        if own > MAX_OWN_MESSAGES {
+            return Err(too_many("messages", own, MAX_OWN_MESSAGES));
+        }
+    }
+    if all > MAX_MESSAGES {
+        return Err(too_many("messages", all, MAX_MESSAGES));
+    }
+    if telemetry > MAX_TELEMETRY {
+        return Err(too_many("figures, marks and lines", telemetry, MAX_TELEMETRY));
+    }
+    Ok(())
 }
 
 /// Returns an empty vector with another lifetime that reuses the memory: the standard library collects in place.

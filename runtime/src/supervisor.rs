@@ -81,7 +81,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             pin: launch.pin,
         };
         Ok(Self {
-            children: Children::new(Programs::new(launch.scenario, launch.program), args)?,
+            children: Children::new(Programs::new(launch.scenario, launch.program), args, launch.patience)?,
             launch,
             domain,
             control,
@@ -228,7 +228,10 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
     fn reap(&mut self) {
         for (role, status) in self.children.wait_any(SUPERVISOR_POLL) {
             match role {
-                ChildRole::Drones(range) => self.mark_dead(range),
+                ChildRole::Drones(range) => {
+                    range.ids().for_each(|id| self.control.set_end(id.index(), status));
+                    self.mark_dead(range);
+                }
                 ChildRole::World => self.world_ended = Some(status),
             }
         }
@@ -245,7 +248,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
     fn serve_request(&mut self) {
         let Some(ProcessRequest { kind, drone, tick }) = self.control.next_request(Duration::ZERO) else { return };
         let reply = match kind {
-            RequestKind::Kill => u32::from(self.kill(drone)),
+            RequestKind::Kill => u32::from(self.kill_drone(drone)),
+            RequestKind::KillProcess => u32::from(self.kill(drone)),
             RequestKind::Freeze => {
                 self.control.freeze(drone.index());
                 u32::from(self.children.freeze_drone(drone))
@@ -262,6 +266,15 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             }),
         };
         self.control.answer_request(reply);
+    }
+
+    /// Ends a drone: its process, unless others fly in it.
+    fn kill_drone(&mut self, drone: DroneId) -> bool {
+        if self.children.flies_others(drone) {
+            self.control.mark_dead(drone.index());
+            return true;
+        }
+        self.kill(drone)
     }
 
     fn kill(&mut self, drone: DroneId) -> bool {

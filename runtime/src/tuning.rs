@@ -1,6 +1,17 @@
-//! Time limits of the runtime. None of them changes a flight in lockstep: they decide when a process counts as failed.
+//! Limits of the runtime. None of them changes a flight in lockstep in which nothing fails: they decide when a process or a pilot
+//! counts as failed.
 
 use std::time::Duration;
+
+/// A pilot that says more messages of its own in a tick has failed: 64. Chosen by hand: at 50 ticks/s it is 1 MB/s.
+pub(crate) const MAX_OWN_MESSAGES: usize = 64;
+
+/// A pilot that sends more messages in a tick, built-in ones included, has failed: 32768. A leader of 10000 drones sends a plan, an
+/// assignment for each of them, and a few others.
+pub(crate) const MAX_MESSAGES: usize = 32_768;
+
+/// A pilot that reports more figures, marks and lines in a tick has failed: 1024. The world takes 80 and drops the others.
+pub(crate) const MAX_TELEMETRY: usize = 1024;
 
 /// A drone process that does not answer a tick in lockstep for this long is hung: 5 s. Chosen by hand: a step takes far
 /// less than a millisecond, and a busy machine may stop a process for a second.

@@ -5,9 +5,7 @@ use crate::clock::Clock;
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pacer::Pacer;
-use crate::tuning::{
-    DISMISSAL_POLL, HUNG_AFTER, RECORD_LIMIT, RECORD_PATIENCE, RECORD_WARNING, REQUEST_LIMIT, RESTART_LIMIT,
-};
+use crate::tuning::{DISMISSAL_POLL, RECORD_LIMIT, RECORD_PATIENCE, RECORD_WARNING, REQUEST_LIMIT, RESTART_LIMIT};
 use skein_bus::{
     Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind,
     SHARD_DRONES, Services, TickOutcome, UplinkSubscriber, WatchPublisher, WorldState, clean_dead_nodes, pin_to_core,
@@ -19,17 +17,21 @@ use skein_protocol::slot::LinkStats;
 use skein_scenario::Scenario;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
+use std::os::unix::process::ExitStatusExt;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// The signal that ends a process at once.
+const SIGKILL: i32 = 9;
 
 /// Stop request of a launcher that has read the whole record.
 pub(crate) const DISMISSED: u32 = u32::MAX;
 
-/// Runs the world of a swarm until its mission ends.
+/// Runs the world of a swarm until its mission ends. In lockstep, a drone that does not answer for `patience` is given up.
 ///
 /// # Errors
 /// [`RuntimeError`]; the launcher notices that the process has ended.
-pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
+pub fn run(args: &ChildArgs, clock: Clock, patience: Duration) -> Result<(), RuntimeError> {
     args.bind_to_parent()?;
     raise_file_limit()?;
     let scenario = args.scenario()?;
@@ -38,7 +40,8 @@ pub fn run(args: &ChildArgs, clock: Clock) -> Result<(), RuntimeError> {
     pin_to_core(0, args.pin)?;
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), "world")?;
-    let mut server = WorldServer::new(&scenario, clock, &services, Arc::clone(&control), domain, args.clone())?;
+    let pace = Pace { clock, patience };
+    let mut server = WorldServer::new(&scenario, pace, &services, Arc::clone(&control), domain, args.clone())?;
     control.set_world_state(WorldState::Ready);
     if control.wait_go(|| true) {
         control.set_world_state(WorldState::Flying);
@@ -76,12 +79,20 @@ struct WorldServer {
     unsent_events: Vec<u8>,
     /// By the wall clock, a drone may have found its buffer full. Frames that it has announced then never arrive.
     wall_clock: bool,
+    /// How long a drone may take to answer in lockstep.
+    patience: Duration,
+}
+
+/// How ticks are paced, and how long they may take.
+struct Pace {
+    clock: Clock,
+    patience: Duration,
 }
 
 impl WorldServer {
     fn new(
         scenario: &Scenario,
-        clock: Clock,
+        Pace { clock, patience }: Pace,
         services: &Services,
         control: Arc<Control>,
         domain: Domain,
@@ -107,6 +118,7 @@ impl WorldServer {
             announced: vec![0; drones],
             lost_records: 0,
             unsent_events: Vec::new(),
+            patience,
             wall_clock: clock != Clock::Lockstep,
         })
     }
@@ -161,7 +173,7 @@ impl WorldServer {
         let down = self.world.downlink();
         self.downlink.send(tick, down.byte_len(), |bytes| down.write_to(bytes))?;
         self.control.open_tick(tick)?;
-        let patience = pacer.map_or(Patience::For(HUNG_AFTER), |pacer| Patience::Until(pacer.open()));
+        let patience = pacer.map_or(Patience::For(self.patience), |pacer| Patience::Until(pacer.open()));
         self.control.wait_done(tick, patience, &mut self.outcomes)?;
         self.take_outcomes()?;
         self.take_frames()?;
@@ -213,9 +225,11 @@ impl WorldServer {
                 TickOutcome::Late => self.world.hold(id),
                 TickOutcome::Dead => self.mark_dead(drone),
                 TickOutcome::Hung => {
-                    let request = ProcessRequest { kind: RequestKind::Kill, drone: id, tick: self.world.tick() };
-                    self.control.request(request, REQUEST_LIMIT)?;
-                    self.world.mark_dead(id, FaultKind::Hung, false, "it did not answer for 5 s and was killed");
+                    let kind = RequestKind::KillProcess;
+                    self.control.request(ProcessRequest { kind, drone: id, tick: self.world.tick() }, REQUEST_LIMIT)?;
+                    let reason = format!("it did not answer for {} s and was killed", self.patience.as_secs_f64());
+                    self.world.note_failure(id, &reason);
+                    self.world.mark_dead(id, FaultKind::Hung, false, &reason);
                 }
                 // A stopped process that was killed from outside.
                 TickOutcome::Absent if self.control.is_dead(drone) => self.mark_dead(drone),
@@ -226,7 +240,22 @@ impl WorldServer {
     }
 
     fn mark_dead(&mut self, drone: usize) {
-        self.world.mark_dead(DroneId(drone as u32), FaultKind::Kill, false, "its process ended unasked");
+        let id = DroneId(drone as u32);
+        if !self.world.is_alive(id) {
+            return;
+        }
+        let end = self.control.end(drone);
+        let (code, signal) = (end.and_then(|end| end.code()), end.and_then(|end| end.signal()));
+        let detail = match (code, signal) {
+            (Some(code), _) => format!("its process exited with code {code}"),
+            (None, Some(signal)) if signal != SIGKILL => format!("its process was ended by signal {signal}"),
+            _ => "its process ended unasked".to_owned(),
+        };
+        // SIGKILL comes from outside: it is no failure of the pilot.
+        if end.is_some() && signal != Some(SIGKILL) {
+            self.world.note_failure(id, &detail);
+        }
+        self.world.mark_dead(id, FaultKind::Kill, false, &detail);
     }
 
     /// Receives exactly the frames that drones have announced: one more call would look through all shards. If a drone is

@@ -1,11 +1,12 @@
 //! The command line.
 
 use crate::missing::nearest;
-use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value};
+use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value, seconds};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use skein_runtime::Clock;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Skein: a swarm runtime in which every drone is a process
 #[derive(Debug, Parser)]
@@ -188,6 +189,9 @@ pub(crate) struct RunArgs {
     /// How processes wait for each other: yield is faster on an idle machine and much slower on a busy one
     #[arg(long, value_enum, default_value_t)]
     pub(crate) wait: WaitChoice,
+    /// In lockstep, how long a drone may take to answer a tick before it is given up, s
+    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
+    pub(crate) patience: Duration,
     /// Drones per process; the digest does not depend on it
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) drones_per_process: u32,
@@ -222,6 +226,9 @@ pub(crate) struct WorldArgs {
     /// What paces the ticks.
     #[arg(long)]
     pub(crate) clock: Clock,
+    /// How long a drone may take to answer, s.
+    #[arg(long, value_parser = seconds)]
+    pub(crate) patience: Duration,
 }
 
 /// Arguments of `drone`.

@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use skein_bus::{PinMode, WaitMode};
+use std::time::Duration;
 
 /// Which runtime.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -57,6 +58,12 @@ pub(crate) fn key_value(text: &str) -> Result<(String, String), ArgumentError> {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err(ArgumentError("expected key.path=value")),
     }
+}
+
+/// Parses a time, s.
+pub(crate) fn seconds(text: &str) -> Result<Duration, ArgumentError> {
+    let seconds = text.parse().ok().filter(|s: &f64| (0.01..=1e6).contains(s));
+    seconds.map(Duration::from_secs_f64).ok_or(ArgumentError("expected a number of seconds from 0.01 to 1000000"))
 }
 
 /// Why an argument is refused.

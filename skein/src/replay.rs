@@ -10,7 +10,7 @@ use serde_json::json;
 use skein_protocol::record::Outcome;
 use skein_report::{PilotEntry, Recorder, RunCompletion, Summary};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{Clock, Launch, PilotRegistry, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
+use skein_runtime::{Clock, Launch, PATIENCE, PilotRegistry, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
 use std::path::PathBuf;
 
@@ -101,6 +101,7 @@ fn fly(
         clock: Clock::Lockstep,
         pin: PinChoice::Auto.into(),
         wait: WaitChoice::Block.into(),
+        patience: PATIENCE,
         per_process: 1,
         program: pilots.program(),
         on_ready: &mut |_: &[ProcessInfo]| Ok(()),

@@ -7,7 +7,7 @@ use skein_runtime::{ChildArgs, DroneRange, PilotRegistry, RuntimeError, drone_pr
 
 /// Runs the world process.
 pub(crate) fn world(args: &WorldArgs) -> Result<Exit, Failure> {
-    let run = world_process::run(&child(&args.child), args.clock);
+    let run = world_process::run(&child(&args.child), args.clock, args.patience);
     run.map(|()| Exit::Reached).map_err(|error| Failure::environment(format!("world: {error}")))
 }
 

@@ -198,6 +198,7 @@ fn fly(
                 clock: args.clock,
                 pin: args.pin.into(),
                 wait: args.wait.into(),
+                patience: args.patience,
                 per_process: args.drones_per_process,
                 program: pilots.program(),
                 on_ready: &mut on_ready,

@@ -9,7 +9,7 @@ use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::Outcome;
 use skein_report::{Recorder, RunCompletion};
 use skein_runtime::run_facts::run_facts;
-use skein_runtime::{Clock, Launch, RunEnd, RuntimeError, inline, supervisor};
+use skein_runtime::{Clock, Launch, PATIENCE, RunEnd, RuntimeError, inline, supervisor};
 use skein_scenario::Scenario;
 
 /// Flies a mission to its end, and returns its row.
@@ -47,6 +47,7 @@ fn fly_processes(
         clock,
         pin: PinMode::Auto,
         wait: WaitMode::Block,
+        patience: PATIENCE,
         per_process: 1,
         program: context.pilots.program(),
         on_ready: &mut |_| Ok(()),

@@ -8,7 +8,7 @@ use crate::error::BenchError;
 use crate::flown_by::flown_by;
 use skein_bus::{PinMode, WaitMode};
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
-use skein_runtime::{Clock, Launch, ProcessInfo, ProcessRole, RunEnd, inline, supervisor};
+use skein_runtime::{Clock, Launch, PATIENCE, ProcessInfo, ProcessRole, RunEnd, inline, supervisor};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -161,6 +161,7 @@ pub(super) fn processes(
         clock: Clock::Lockstep,
         pin: PinMode::Auto,
         wait: processes.wait,
+        patience: PATIENCE,
         per_process: processes.per_process,
         program: context.pilots.program(),
         on_ready: &mut |started: &[ProcessInfo]| {
