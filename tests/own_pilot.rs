@@ -34,6 +34,9 @@ const TESTS: &[(&str, Test)] = &[
     ("wrong_names_and_parameters_are_refused", wrong_names_and_parameters_are_refused),
     ("a_program_of_its_own_flies_some_drones", a_program_of_its_own_flies_some_drones),
     ("sweep_and_replay_know_the_pilots", sweep_and_replay_know_the_pilots),
+    ("a_failing_pilot_is_named_and_the_others_fly_on", a_failing_pilot_is_named_and_the_others_fly_on),
+    ("a_process_that_ends_or_hangs_is_a_failure", a_process_that_ends_or_hangs_is_a_failure),
+    ("drones_of_a_shared_process_fail_alone", drones_of_a_shared_process_fail_alone),
     ("a_program_without_its_pilot_in_the_air_says_so", a_program_without_its_pilot_in_the_air_says_so),
 ];
 
@@ -218,9 +221,66 @@ fn sweep_and_replay_know_the_pilots(bench: &Bench) {
     );
 }
 
+/// The table of a pilot that makes a mistake after half a second.
+fn clumsy(how: &str) -> String {
+    format!("[[pilot]]\nname = \"clumsy\"\ndrones = [2]\nparams = {{ how = {how:?} }}\n[[pilot]]\nname = \"drift\"\n")
+}
+
+/// The only failure of a summary: that of drone 2 after half a second.
+fn reason(summary: &Value) -> String {
+    let failures = summary["failures"].as_array().unwrap();
+    assert_eq!(failures.len(), 1, "{failures:?}");
+    assert_eq!((&failures[0]["drone"], &failures[0]["pilot"]), (&Value::from(2), &Value::from("clumsy")));
+    assert!((0.48..0.56).contains(&failures[0]["t_s"].as_f64().unwrap()), "{failures:?}");
+    let faults = summary["faults"].as_array().unwrap();
+    assert!(faults.iter().any(|fault| fault["target"] == 2 && fault["scheduled"] == false), "{faults:?}");
+    assert_eq!(summary["ticks"], 150, "the others fly on");
+    failures[0]["reason"].as_str().unwrap().to_owned()
+}
+
+fn a_failing_pilot_is_named_and_the_others_fly_on(bench: &Bench) {
+    let wrong = [
+        ("panic", "panicked at "),
+        ("nan", "it commanded Acceleration([NaN, 0.0, 0.0]), which is not finite"),
+        ("flood", "it said 65 messages in a tick, 64 at most"),
+        ("oversize", "the message has 273 bytes"),
+        ("say", "it gives up"),
+    ];
+    for (how, expected) in wrong {
+        let summary = bench.fly_both(&bench.scenario(&clumsy(how)), &[]);
+        let reason = reason(&summary);
+        assert!(reason.contains(expected), "{how}: {reason}");
+    }
+    let path = bench.scenario(&clumsy("panic"));
+    let output = bench.output(&["run", path.to_str().unwrap(), "--quiet", "--no-record"]);
+    let errors = text(&output.stderr);
+    assert_eq!(errors.lines().filter(|line| line.contains("panicked")).count(), 1, "{errors}");
+    assert!(errors.contains("the pilot of drone 2 failed: panicked at ") && !errors.contains("backtrace"), "{errors}");
+}
+
+fn a_process_that_ends_or_hangs_is_a_failure(bench: &Bench) {
+    let wrong = [
+        ("exit", "its process exited with code 7"),
+        ("abort", "its process was ended by signal 6"),
+        ("hang", "it did not answer for 0.5 s and was killed"),
+    ];
+    for (how, expected) in wrong {
+        let summary = bench.fly(&bench.scenario(&clumsy(how)), &["--no-record", "--patience", "0.5"]);
+        assert_eq!(reason(&summary), expected);
+    }
+}
+
+fn drones_of_a_shared_process_fail_alone(bench: &Bench) {
+    let scenario = bench.scenario(&clumsy("panic"));
+    let alone = bench.fly(&scenario, &["--no-record"]);
+    let packed = bench.fly(&scenario, &["--no-record", "--drones-per-process", "3"]);
+    assert_eq!(packed["digest"], alone["digest"]);
+    assert_eq!(reason(&packed), reason(&alone));
+}
+
 fn a_program_without_its_pilot_in_the_air_says_so(bench: &Bench) {
     let path = bench.scenario("");
     let output = bench.output(&["run", path.to_str().unwrap(), "--runtime", "inline", "--no-record"]);
     let errors = text(&output.stderr);
-    assert!(errors.contains("warning: no drone flies with a pilot of this program (drift,"), "{errors}");
+    assert!(errors.contains("warning: no drone flies with a pilot of this program (clumsy, drift, loud)"), "{errors}");
 }

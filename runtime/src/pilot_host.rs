@@ -72,7 +72,8 @@ impl PilotHost {
         self.radio_receiver.receive(down, senses.now, &mut scratch.arrived, stats);
         let mut heard = emptied(std::mem::take(&mut scratch.heard));
         self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
-        let stepped = self.step_pilot(&senses, &Inbox::new(&heard), scratch);
+        let gain_per_s = self.params.velocity_gain_per_s;
+        let stepped = step_pilot(&mut *self.pilot, gain_per_s, &senses, &Inbox::new(&heard), scratch);
         scratch.heard = emptied(heard);
         if let Err(reason) = &stepped {
             self.fail(reason.clone(), &mut scratch.out);
@@ -102,31 +103,6 @@ impl PilotHost {
         self.failed
     }
 
-    /// Steps the pilot, and checks what it commands and says. An error says why the pilot has failed.
-    fn step_pilot(
-        &mut self,
-        senses: &Senses<'_>,
-        inbox: &Inbox<'_>,
-        scratch: &mut StepScratch,
-    ) -> Result<Answer, String> {
-        let StepScratch { out, ages_s, .. } = scratch;
-        let pilot = &mut self.pilot;
-        let command = catch(|| {
-            let command = pilot.step(senses, inbox, out);
-            ages_s.clear();
-            if out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
-                pilot.pose_ages_s(senses.now, ages_s);
-            }
-            command
-        })?;
-        let acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, self.params.velocity_gain_per_s);
-        if !acceleration_mps2.iter().all(|mps2| mps2.is_finite()) {
-            return Err(format!("it commanded {:?}, which is not finite", command.motion()));
-        }
-        check_said(out)?;
-        Ok(Answer { acceleration_mps2, status: *command.status() })
-    }
-
     /// The pilot has failed: what it said in this tick is forgotten, and the reason is reported instead.
     fn fail(&mut self, reason: String, out: &mut Out) {
         tracing::warn!("the pilot of drone {} failed: {reason}", self.params.me);
@@ -147,6 +123,31 @@ impl PilotHost {
 struct Answer {
     acceleration_mps2: [f64; 3],
     status: Status,
+}
+
+/// Steps the pilot, and checks what it commands and says. An error says why the pilot has failed.
+fn step_pilot(
+    pilot: &mut dyn Pilot,
+    velocity_gain_per_s: f64,
+    senses: &Senses<'_>,
+    inbox: &Inbox<'_>,
+    scratch: &mut StepScratch,
+) -> Result<Answer, String> {
+    let StepScratch { out, ages_s, .. } = scratch;
+    let command = catch(|| {
+        let command = pilot.step(senses, inbox, out);
+        ages_s.clear();
+        if out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
+            pilot.pose_ages_s(senses.now, ages_s);
+        }
+        command
+    })?;
+    let acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, velocity_gain_per_s);
+    if !acceleration_mps2.iter().all(|mps2| mps2.is_finite()) {
+        return Err(format!("it commanded {:?}, which is not finite", command.motion()));
+    }
+    check_said(out)?;
+    Ok(Answer { acceleration_mps2, status: *command.status() })
 }
 
 /// Whether the radio and the record can take what a pilot has said; otherwise why not.

@@ -4,7 +4,10 @@ use skein::{App, Birth, Command, Inbox, Out, Pilot, PilotError, Senses};
 
 /// The application.
 pub(crate) fn app() -> App {
-    App::new().try_pilot("drift", |birth| Ok(Box::new(Drift::new(birth)?))).pilot("loud", |_| Box::new(Loud))
+    App::new()
+        .try_pilot("drift", |birth| Ok(Box::new(Drift::new(birth)?)))
+        .pilot("loud", |_| Box::new(Loud))
+        .try_pilot("clumsy", |birth| Ok(Box::new(Clumsy { how: birth.params.get_str("how", "")?.to_owned() })))
 }
 
 /// Flies towards the middle of its neighbours.
@@ -39,6 +42,33 @@ struct Loud;
 impl Pilot for Loud {
     fn step(&mut self, _: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
         println!("{{ this is not the summary");
+        Command::default()
+    }
+}
+
+/// Makes a mistake after half a second.
+struct Clumsy {
+    how: String,
+}
+
+impl Pilot for Clumsy {
+    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) -> Command {
+        if senses.now_s < 0.5 {
+            return Command::default();
+        }
+        match self.how.as_str() {
+            "panic" => panic!("it has stumbled"),
+            "nan" => return Command::acceleration([f64::NAN, 0.0, 0.0]),
+            "flood" => (0..65).for_each(|_| out.say("gossip", b"hello")),
+            "oversize" => out.say("gossip", [0; 273]),
+            "say" => out.fail("it gives up"),
+            "exit" => std::process::exit(7),
+            "abort" => std::process::abort(),
+            "hang" => loop {
+                std::thread::sleep(std::time::Duration::from_secs(1));
+            },
+            _ => {}
+        }
         Command::default()
     }
 }
