@@ -1,6 +1,6 @@
 //! The summary as text for a terminal: the outcome first, then the details.
 
-use crate::summary::{Stage, StageGroup, Summary};
+use crate::summary::{FailureEntry, OwnMetric, Stage, StageGroup, Summary};
 use skein_protocol::record::{Outcome, Percentiles};
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -37,6 +37,11 @@ pub fn split(drones: &[u32]) -> String {
     drones.iter().rev().map(u32::to_string).collect::<Vec<_>>().join("/")
 }
 
+/// The pilot that flies unless a scenario names another one. It needs no line.
+const DEFAULT_PILOT: &str = "paper";
+/// The reason that the world gives for the end of a mission whose formation is closed.
+const FORMATION_CLOSED: &str = "the end condition is met";
+
 /// The ANSI colour of an outcome.
 fn shade(outcome: Outcome) -> u8 {
     match outcome {
@@ -49,7 +54,7 @@ fn shade(outcome: Outcome) -> u8 {
 /// The outcome in one line.
 pub(crate) fn outcome(summary: &Summary) -> String {
     let (word, why) = match summary.outcome {
-        Outcome::Reached => ("reached", "the formation is closed and every invariant held".to_owned()),
+        Outcome::Reached => ("reached", reached(summary)),
         Outcome::Timeout => ("timeout", "the goal was not reached".to_owned()),
         Outcome::Stuck => ("stuck", "some drones have no way to the goal".to_owned()),
         Outcome::Unsafe => ("unsafe", violations(summary)),
@@ -58,6 +63,13 @@ pub(crate) fn outcome(summary: &Summary) -> String {
     let reason = summary.reason.as_ref().filter(|reason| summary.outcome != Outcome::Reached && !reason.is_empty());
     let reason = reason.map_or(String::new(), |reason| format!(" ({reason})"));
     format!("{word} after {:.2} s: {why}{reason}", summary.mission_s)
+}
+
+/// What was reached. Missions that end with a formation have one reason; others say their own.
+fn reached(summary: &Summary) -> String {
+    let closed = summary.reason.as_deref().is_none_or(|reason| reason.is_empty() || reason == FORMATION_CLOSED);
+    let what = if closed { "the formation is closed" } else { summary.reason.as_deref().unwrap_or_default() };
+    format!("{what} and every invariant held")
 }
 
 fn violations(summary: &Summary) -> String {
@@ -100,6 +112,17 @@ pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     line("distances", distances(summary));
     line("leadership", Some(leadership(summary)));
     line("messages", Some(messages(summary)));
+    for pilot in summary.pilots.iter().filter(|pilot| pilot.name != DEFAULT_PILOT) {
+        line("pilot", Some(format!("{} flies drones {}", pilot.name, list(&pilot.drones))));
+    }
+    for (name, figure) in &summary.metrics_own {
+        let OwnMetric { mean, last, min, max } = figure;
+        line("figure", Some(format!("{name}: mean {mean:.4}, last {last:.4}, from {min:.4} to {max:.4}")));
+    }
+    for failure in &summary.failures {
+        let FailureEntry { t_s, drone, pilot, reason } = failure;
+        line("failure", Some(format!("{t_s:.2} s: pilot {pilot} of drone {drone}: {reason}")));
+    }
     for fault in &summary.faults {
         let by = if fault.scheduled { "scheduled" } else { "not scheduled" };
         let kind = serde_json::to_value(fault.kind).ok();
