@@ -10,6 +10,7 @@ use clap::Parser;
 use skein_pilot::{Birth, Pilot, PilotError};
 use skein_runtime::{PilotRegistry, Program};
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// An application with pilots of its own. It answers to every command of `skein`.
@@ -22,7 +23,11 @@ use std::process::ExitCode;
 pub struct App {
     pilots: Vec<(String, Box<Make>)>,
     program: Option<Vec<OsString>>,
+    on_folder: Option<Box<OnFolder>>,
 }
+
+/// Receives the folder of a run.
+pub(crate) type OnFolder = dyn Fn(&Path) + Send + Sync;
 
 type Make = dyn Fn(&Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync;
 
@@ -57,6 +62,13 @@ impl App {
         Self { program: Some(words.into_iter().collect()), ..self }
     }
 
+    /// Calls `tell` with the folder of a run, which is then empty, before its pilots and processes are started. Pilots that are
+    /// written in another language keep what is said of their mistakes there.
+    #[must_use]
+    pub fn on_folder(self, tell: impl Fn(&Path) + Send + Sync + 'static) -> Self {
+        Self { on_folder: Some(Box::new(tell)), ..self }
+    }
+
     /// Does what the arguments of this process say.
     #[must_use]
     pub fn main(self) -> ExitCode {
@@ -83,9 +95,10 @@ impl App {
         exit.code()
     }
 
-    fn do_command(self, command: Command) -> Exit {
+    fn do_command(mut self, command: Command) -> Exit {
         start_logging();
-        let done = self.registry().and_then(|pilots| dispatch(command, &pilots));
+        let on_folder = self.on_folder.take();
+        let done = self.registry().and_then(|pilots| dispatch(command, &pilots, on_folder.as_deref()));
         done.unwrap_or_else(|failure| {
             failure.print();
             failure.exit
@@ -105,7 +118,7 @@ impl App {
     }
 }
 
-fn dispatch(command: Command, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+fn dispatch(command: Command, pilots: &PilotRegistry, on_folder: Option<&OnFolder>) -> Result<Exit, Failure> {
     use Command::{Bench, Check, Hunt, Replay, Run, Sweep};
     let flies = matches!(command, Run(_) | Check(_) | Sweep(_) | Hunt(_) | Replay(_) | Bench { .. });
     // What a pilot prints in this process must not get between the data on stdout.
@@ -114,7 +127,7 @@ fn dispatch(command: Command, pilots: &PilotRegistry) -> Result<Exit, Failure> {
         .transpose()
         .map_err(|error| Failure::environment(format!("stdout: {error}")))?;
     match command {
-        Command::Run(args) => run::run(&args, pilots),
+        Command::Run(args) => run::run(&args, pilots, on_folder),
         Command::Check(args) => check::check(&args, pilots),
         Command::Sweep(args) => sweep::sweep(&args, pilots),
         Command::Hunt(args) => hunt::hunt(&args, pilots),

@@ -1,5 +1,6 @@
 //! `skein run`: flies one mission.
 
+use crate::app::OnFolder;
 use crate::cli::RunArgs;
 use crate::complaint::complain;
 use crate::doctor::check_room;
@@ -25,7 +26,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Flies the mission, writes its folder and prints its summary.
-pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnFolder>) -> Result<Exit, Failure> {
     let started = Instant::now();
     if let Some(parent) = args.parent {
         end_with_parent(parent, Signal::TERM).map_err(Failure::environment)?;
@@ -49,6 +50,9 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry) -> Result<Exit, Failur
     }
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
+    if let Some(tell) = on_folder {
+        tell(folder.path());
+    }
     let manifest = manifest(&facts, &scenario)?;
     let flown = begin(args, &folder, &manifest, scenario.timeout_s()).and_then(|Begun { reserved, mut sink }| {
         let end = fly(args, &scenario, pilots, &folder, &interrupt, &mut sink).map_err(failure)?;

@@ -1,0 +1,185 @@
+"""Pilots in Python: as an application, from scripts, in both runtimes, and with their mistakes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import gossip
+import pytest
+
+import skein
+
+HERE = Path(__file__).parent
+APP = HERE / "gossip.py"
+BOIDS = HERE.parents[1] / "examples" / "boids"
+HEAD = """
+seed = 5
+formation = { shape = "v", drones = 4, spacing_m = 60, start_jitter_m = 3 }
+mission = { stop_x_m = 1e5 }
+time = { timeout_s = 2 }
+"""
+GOSSIP = HEAD + '[[pilot]]\nname = "gossip"\nparams = { k = 0.25 }\n'
+FIELD = """
+formation = { shape = "circle", drones = 8, spacing_m = 25, start_jitter_m = 4 }
+mission = { end = "time", duration_s = 20 }
+drone = { speed_mps = 5, speed_change_mps = 2.5, safe_distance_m = 2 }
+sensors = { detection_range_m = 40, ranging_m = 80 }
+avoidance = { clearance_m = 2, planning_distance_m = 2 }
+pilot = [{ name = "boids" }]
+obstacle = [{ shape = "circle", centre_m = [80, 10], radius_m = 5 }]
+"""
+
+
+def app(folder, *words, script=APP, check=None):
+    done = subprocess.run(
+        [sys.executable, str(script), *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=120
+    )
+    if check is not None:
+        assert done.returncode == check, done.stderr
+    return done
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    path = tmp_path / "gossip.toml"
+    path.write_text(GOSSIP)
+    return path
+
+
+def digest(done):
+    return json.loads(done.stdout)["digest"]
+
+
+def test_an_application_flies_with_equal_digests_in_both_runtimes(tmp_path, scenario):
+    words = ["run", scenario, "--json", "--set", "radio.loss=0.5"]
+    processes = app(tmp_path, *words, "--out", "p", check=1)
+    inline = app(tmp_path, *words, "--runtime", "inline", "--out", "i", check=1)
+    packed = app(tmp_path, *words, "--drones-per-process", 4, "--out", "k", check=1)
+    assert digest(processes) == digest(inline) == digest(packed)
+    summary = json.loads(processes.stdout)
+    assert summary["pilots"][0]["name"] == "gossip" and summary["failures"] == []
+    app(tmp_path, "replay", "p", check=0)
+
+
+def test_faults_do_to_python_what_they_do_to_rust(tmp_path, scenario):
+    faults = '{ kind = "kill", drone = 1, at_s = 0.5 }, { kind = "freeze", drone = 2, at_s = 0.6, for_s = 0.5 }'
+    words = ["run", scenario, "--json", "--set", f"fault=[{faults}]"]
+    digests = {digest(app(tmp_path, *words, "--runtime", runtime, "--out", runtime)) for runtime in ("inline", "processes")}
+    assert len(digests) == 1
+
+
+def test_functions_fly_what_the_application_flies(tmp_path, scenario):
+    inline = skein.run(scenario, pilots={"gossip": gossip.Gossip})
+    processes = skein.run(scenario, pilots={"gossip": gossip.Gossip}, runtime="processes", out=tmp_path / "run")
+    assert inline.digest == processes.digest == digest(app(tmp_path, "run", scenario, "--json"))
+    loaded = skein.load(tmp_path / "run")
+    assert loaded.outcome == "timeout" and loaded.manifest["seed"] == 5
+    assert len(loaded.trace["x_m"]) > 4 and any(event["event"] == "end" for event in loaded.events)
+    assert loaded.summary["metrics_own"]["heard"]["max"] == 3
+
+
+def test_a_single_pilot_flies_a_scenario_without_pilots_and_keys_can_be_set():
+    run = skein.run(HEAD, pilots={"gossip": gossip.Gossip}, set={"formation.drones": 2, "pilot.0.params": {"k": 0.1}}, seed=9)
+    assert run.summary["drones"] == 2 and run.summary["seed"] == 9
+    assert run.summary["pilots"][0]["params"] == {"k": 0.1}
+
+
+def test_classes_of_the_main_module_fly_by_processes(tmp_path, scenario):
+    script = tmp_path / "script.py"
+    script.write_text(
+        f"""
+import sys
+sys.path.insert(0, {str(HERE)!r})
+import gossip, skein
+class Mine(gossip.Gossip):
+    pass
+if __name__ == "__main__":
+    runs = [skein.run({str(scenario)!r}, pilots={{"gossip": Mine}}, runtime=r) for r in ("inline", "processes")]
+    print(runs[0].digest == runs[1].digest)
+"""
+    )
+    assert app(tmp_path, script=script, check=0).stdout == "True\n"
+
+
+def test_a_class_that_no_other_process_can_import_is_refused(scenario):
+    class Local(gossip.Gossip):
+        pass
+
+    assert skein.run(scenario, pilots={"gossip": Local}).outcome == "timeout"
+    with pytest.raises(ValueError, match="inline"):
+        skein.run(scenario, pilots={"gossip": Local}, runtime="processes")
+
+
+def test_wrong_scenarios_are_errors_with_their_place(tmp_path, scenario):
+    with pytest.raises(skein.Error, match="params.k: expected a number") as refused:
+        skein.run(scenario, pilots={"gossip": gossip.Gossip}, set={"pilot.0.params.k": "much"})
+    assert refused.value.code == 2
+    with pytest.raises(skein.Error, match="gossip.toml:.*did you mean"):
+        skein.run(scenario, pilots={"gosip": gossip.Gossip})
+    assert app(tmp_path, "run", scenario, "--set", "pilot.0.params.k=true").returncode == 2
+
+
+@pytest.mark.parametrize("runtime", ["inline", "processes"])
+def test_ctrl_c_ends_a_run_cleanly(tmp_path, scenario, runtime):
+    words = ["run", scenario, "--set", "time.timeout_s=10000", "--runtime", runtime, "--no-record", "--out", "run"]
+    flying = subprocess.Popen([sys.executable, APP, *words], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    end = time.monotonic() + 30
+    while not (tmp_path / "run" / "processes.json").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    time.sleep(0.3)
+    os.kill(flying.pid, signal.SIGINT)
+    _, said = flying.communicate(timeout=30)
+    assert flying.returncode == 130, said.decode()
+    assert b"Traceback" not in said
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "aborted"
+
+
+def test_what_is_lent_for_a_step_cannot_be_used_after_it():
+    kept = []
+
+    class Keeps(skein.Pilot):
+        def step(self, senses, inbox, out):
+            kept[:] = [senses, inbox, out, senses.position_m, senses.neighbours, senses.neighbours_array()]
+            out.mark("here", senses.position_m)
+            out.line("up", (0, 0, 0), [0, 0, 1])
+            out.done()
+            assert re.match(r"Senses\(now_s=", repr(senses))
+            return skein.Velocity(1.0, 0.0)
+
+    assert skein.run(HEAD, pilots={"keeps": Keeps}, set={"time.timeout_s": 0.1}, record=False).summary["failures"] == []
+    senses, inbox, out, position, neighbours, array = kept
+    for use in (lambda: senses.now_s, lambda: inbox.all(), lambda: out.say("a", b""), lambda: out.metric("a", 1.0)):
+        with pytest.raises(RuntimeError, match="during its step only"):
+            use()
+    assert len(position) == 3 and len(neighbours) == len(array)
+
+
+def test_a_sweep_flies_python_pilots(tmp_path, scenario):
+    experiment = tmp_path / "loss.toml"
+    experiment.write_text(
+        'name = "loss"\nscenario = "gossip.toml"\nseeds = 2\nmetrics = ["mission_s"]\n[grid]\nradio.loss = [0.0, 0.5]\n'
+    )
+    sweep = skein.sweep(experiment, pilots={"gossip": gossip.Gossip}, out=tmp_path / "sweep", jobs=2)
+    assert len(sweep.results["seed"]) == 4
+
+
+def test_the_example_is_the_same_in_both_runtimes(tmp_path):
+    path = tmp_path / "field.toml"
+    path.write_text(FIELD)
+    words = ["run", path, "--json", "--no-record", "--seed", 2]
+    runs = [app(tmp_path, *words, "--runtime", r, script=BOIDS / "boids.py", check=0) for r in ("inline", "processes")]
+    assert digest(runs[0]) == digest(runs[1])
+    assert json.loads(runs[1].stdout)["violations"] == []
+
+
+def test_the_package_is_typed_and_documented():
+    assert (Path(skein.__file__).parent / "py.typed").exists()
+    for name in set(skein.__all__) - {"Env", "ParallelEnv", "VectorEnv", "parallel_env", "vector_env", "__version__"}:
+        assert getattr(skein, name).__doc__, name
