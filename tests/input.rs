@@ -232,8 +232,10 @@ fn assert_valid(value: &Value, schema: &Value, root: &Value, at: &str) {
         assert_valid(item, &schema["items"], root, &format!("{at}/{number}"));
     }
     let Some(object) = value.as_object() else { return };
-    if schema["additionalProperties"] == true {
-        return;
+    let others = &schema["additionalProperties"];
+    if *others == true || others.is_object() {
+        let items = object.iter().filter(|_| others.is_object());
+        return items.for_each(|(key, item)| assert_valid(item, others, root, &format!("{at}/{key}")));
     }
     let known = schema["properties"].as_object().unwrap_or_else(|| panic!("{at}: {schema}"));
     for key in schema["required"].as_array().into_iter().flatten() {
