@@ -12,6 +12,8 @@ use crate::record_files::RecordFiles;
 use crate::spool;
 use crate::summary::Summary;
 use skein_protocol::record::{Outcome, RecordView};
+use skein_protocol::telemetry::TelemetryRow;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::path::PathBuf;
@@ -21,13 +23,20 @@ use std::path::PathBuf;
 pub struct FlightRecord {
     folder: RunFolder,
     file: File,
+    /// Whether there may be figures of pilots in it.
+    has_metrics: bool,
     /// Why the last records are missing.
     cut_short: Option<io::Error>,
 }
 
 impl FlightRecord {
     pub(crate) fn new(folder: &RunFolder, file: File) -> Self {
-        Self { folder: folder.clone(), file, cut_short: None }
+        Self { folder: folder.clone(), file, has_metrics: true, cut_short: None }
+    }
+
+    /// The same, of a flight in which pilots reported figures or did not.
+    pub(crate) fn with_metrics(self, has_metrics: bool) -> Self {
+        Self { has_metrics, ..self }
     }
 
     /// The same, with the reason why the last records are missing.
@@ -59,7 +68,15 @@ impl FlightRecord {
     /// The first error with the record or with the files; [`ReportError::Interrupted`]. If only the record is at fault, the
     /// files hold everything before the fault.
     pub fn write_files(&self, manifest: &Manifest, interrupted: &Interrupted<'_>) -> Result<(), ReportError> {
-        let mut files = RecordFiles::begin(self.folder.files(), manifest)?;
+        let mut metrics = BTreeSet::new();
+        if self.has_metrics {
+            spool::read(&self.file, &self.path(), |record| {
+                metrics.extend(record.telemetry.iter().filter_map(TelemetryRow::metric).map(|(name, _)| name));
+                interrupted.check()
+            })
+            .or_else(|error| if matches!(error, ReportError::Content { .. }) { Ok(()) } else { Err(error) })?;
+        }
+        let mut files = RecordFiles::begin(self.folder.files(), manifest, &metrics)?;
         let read = spool::read(&self.file, &self.path(), |record| {
             interrupted.check()?;
             files.write(record, &events(record).map_err(|error| self.invalid(&error))?)

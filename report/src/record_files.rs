@@ -6,7 +6,9 @@ use crate::folder::Manifest;
 use crate::mcap::McapWriter;
 use crate::trace::TraceWriter;
 use crate::work_folder::WorkFolder;
+use skein_protocol::MetricName;
 use skein_protocol::record::{RecordView, RunEvent};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
@@ -24,11 +26,16 @@ pub(crate) struct RecordFiles {
 }
 
 impl RecordFiles {
-    pub(crate) fn begin(folder: &WorkFolder, manifest: &Manifest) -> Result<Self, ReportError> {
+    /// `metrics` are the figures that pilots report.
+    pub(crate) fn begin(
+        folder: &WorkFolder,
+        manifest: &Manifest,
+        metrics: &BTreeSet<MetricName>,
+    ) -> Result<Self, ReportError> {
         let begin = |name: &str| Ok(BufWriter::with_capacity(BUFFER_BYTES, folder.begin(name)?));
         let path = |name: &str| folder.path().join(name);
         Ok(Self {
-            trace: TraceWriter::new(begin(TRACE)?).map_err(ReportError::io(&path(TRACE)))?,
+            trace: TraceWriter::new(begin(TRACE)?, metrics).map_err(ReportError::io(&path(TRACE)))?,
             events: begin(EVENTS)?,
             mcap: McapWriter::new(begin(RECORDING)?, path(RECORDING), &manifest.facts, &manifest.scenario)?,
             last_tick: None,
@@ -42,7 +49,7 @@ impl RecordFiles {
         // The last record of a run repeats the rows of the record before it.
         if self.last_tick.is_none_or(|last| record.head.tick > last) {
             self.last_tick = Some(record.head.tick);
-            let written = self.trace.tick(record.head.now.secs(), record.rows);
+            let written = self.trace.tick(record.head.now.secs(), record.rows, record.telemetry);
             written.map_err(ReportError::io(&self.path(TRACE)))?;
         }
         if record.events.is_empty() {

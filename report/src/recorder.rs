@@ -50,7 +50,10 @@ impl Recorder {
 
     /// Returns the summary, and the record of a run with a folder. [`Summary::report_s`] is left to the caller.
     pub fn finish(self, completion: &RunCompletion) -> (Summary, Option<FlightRecord>) {
-        (self.accumulator.finish(completion), self.kept.map(Kept::finish))
+        let summary = self.accumulator.finish(completion);
+        let has_metrics = !summary.metrics_own.is_empty();
+        let record = self.kept.map(|kept| kept.finish().with_metrics(has_metrics));
+        (summary, record)
     }
 }
 

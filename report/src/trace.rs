@@ -4,8 +4,10 @@ use crate::error::ReportError;
 use crate::files::TRACE;
 use crate::folder::RunFolder;
 use crate::interruption::Interrupted;
-use skein_protocol::Vec2;
 use skein_protocol::record::DroneRow;
+use skein_protocol::telemetry::TelemetryRow;
+use skein_protocol::{MetricName, Vec2};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
 
 const HEADER: &str = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j";
@@ -15,17 +17,24 @@ pub(crate) struct TraceWriter<W: Write> {
     out: W,
     lines: Vec<u8>,
     number: zmij::Buffer,
+    /// The figures of pilots, each of which has a column.
+    metrics: Vec<MetricName>,
 }
 
 impl<W: Write> TraceWriter<W> {
-    /// Writes the header.
-    pub(crate) fn new(mut out: W) -> std::io::Result<Self> {
-        writeln!(out, "{HEADER}")?;
-        Ok(Self { out, lines: Vec::new(), number: zmij::Buffer::new() })
+    /// Writes the header. `metrics` are the figures that pilots report.
+    pub(crate) fn new(mut out: W, metrics: &BTreeSet<MetricName>) -> std::io::Result<Self> {
+        write!(out, "{HEADER}")?;
+        for name in metrics {
+            write!(out, ",metric.{name}")?;
+        }
+        writeln!(out)?;
+        let metrics = metrics.iter().copied().collect();
+        Ok(Self { out, lines: Vec::new(), number: zmij::Buffer::new(), metrics })
     }
 
-    /// Writes the living drones of one tick.
-    pub(crate) fn tick(&mut self, t_s: f64, rows: &[DroneRow]) -> std::io::Result<()> {
+    /// Writes the living drones of one tick, and the figures that they report.
+    pub(crate) fn tick(&mut self, t_s: f64, rows: &[DroneRow], telemetry: &[TelemetryRow]) -> std::io::Result<()> {
         self.lines.clear();
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
             self.field(t_s);
@@ -39,6 +48,7 @@ impl<W: Write> TraceWriter<W> {
             }
             self.lines.push(b',');
             self.lines.extend_from_slice(self.number.format(row.energy_j).as_bytes());
+            self.metrics(drone, telemetry);
             self.lines.push(b'\n');
         }
         self.out.write_all(&self.lines)
@@ -47,6 +57,20 @@ impl<W: Write> TraceWriter<W> {
     /// Writes what is still buffered.
     pub(crate) fn flush(&mut self) -> std::io::Result<()> {
         self.out.flush()
+    }
+
+    /// The figures of a drone, empty where it reports none.
+    fn metrics(&mut self, drone: usize, telemetry: &[TelemetryRow]) {
+        let Self { metrics, lines, number, .. } = self;
+        let first = telemetry.partition_point(|row| row.drone.index() < drone);
+        let own = telemetry[first..].iter().take_while(|row| row.drone.index() == drone);
+        for name in metrics {
+            lines.push(b',');
+            let value = own.clone().filter_map(TelemetryRow::metric).find(|(known, _)| known == name);
+            if let Some((_, value)) = value {
+                lines.extend_from_slice(number.format(value).as_bytes());
+            }
+        }
     }
 
     fn field(&mut self, value: f64) {
@@ -76,7 +100,8 @@ pub(crate) fn read(
     let mut lines = BufReader::new(folder.files().read(TRACE)?).lines();
     let content = |found: String| ReportError::Content { path: path.clone(), expected: HEADER, found };
     let header = lines.next().transpose().map_err(ReportError::io(&path))?.unwrap_or_default();
-    if header != HEADER {
+    let rest = header.strip_prefix(HEADER);
+    if !rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(",metric.")) {
         return Err(content(format!("line 1 is \"{header}\"")));
     }
     let mut rows: Vec<TraceRow> = Vec::new();
@@ -100,13 +125,15 @@ fn parse(line: &str) -> Option<TraceRow> {
     let (position_m, velocity_mps) = (Vec2::new(number()?, number()?), Vec2::new(number()?, number()?));
     let group = fields.next()?.to_owned();
     let energy_j = fields.nth(1)?.parse().ok()?;
-    (fields.count() == 0).then_some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, group, energy_j })
+    // The figures of pilots follow.
+    Some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, group, energy_j })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use skein_protocol::record::ROW_ALIVE;
+    use skein_protocol::telemetry::Telemetry;
     use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp};
 
     fn rows() -> [DroneRow; 3] {
@@ -125,7 +152,7 @@ mod tests {
     #[test]
     fn living_drones_are_written_in_full() {
         let mut bytes = Vec::new();
-        TraceWriter::new(&mut bytes).unwrap().tick(0.02, &rows()).unwrap();
+        TraceWriter::new(&mut bytes, &BTreeSet::new()).unwrap().tick(0.02, &rows(), &[]).unwrap();
         let wanted = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n\
             0.02,0,0.1,-35.0,10.0,1e-7,N,,2.5\n\
             0.02,2,0.1,-35.0,10.0,1e-7,N12,2,2.5\n";
@@ -136,9 +163,9 @@ mod tests {
     fn a_written_trace_is_read_tick_by_tick() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        let mut writer = TraceWriter::new(folder.files().create(TRACE).unwrap()).unwrap();
-        writer.tick(0.02, &rows()).unwrap();
-        writer.tick(0.04, &rows()).unwrap();
+        let mut writer = TraceWriter::new(folder.files().create(TRACE).unwrap(), &BTreeSet::new()).unwrap();
+        writer.tick(0.02, &rows(), &[]).unwrap();
+        writer.tick(0.04, &rows(), &[]).unwrap();
         writer.flush().unwrap();
         let mut ticks = Vec::new();
         let take = |rows: &[TraceRow]| {
@@ -162,5 +189,23 @@ mod tests {
             let error = read(&folder, &Interrupted::never(), |_| Ok(())).unwrap_err().to_string();
             assert!(error.contains(place), "{error}");
         }
+    }
+
+    #[test]
+    fn figures_of_pilots_are_columns_that_are_empty_where_there_is_none() {
+        let name = |name| MetricName::new(name).unwrap();
+        let metric = |drone, of, value| {
+            let metric = Telemetry::Metric { name: name(of), value };
+            TelemetryRow::new(DroneId(drone), &metric).unwrap()
+        };
+        let rows = [DroneRow { flags: ROW_ALIVE, ..DroneRow::default() }; 2];
+        let mut bytes = Vec::new();
+        let names = [name("order"), name("gap")].into();
+        let telemetry = [metric(0, "gap", 2.5), metric(1, "order", 1.0)];
+        TraceWriter::new(&mut bytes, &names).unwrap().tick(0.02, &rows, &telemetry).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let ends: Vec<String> =
+            text.lines().map(|line| line.rsplitn(3, ',').take(2).collect::<Vec<_>>().join(" ")).collect();
+        assert_eq!(ends, ["metric.order metric.gap", " 2.5", "1.0 "]);
     }
 }

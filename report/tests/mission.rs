@@ -423,7 +423,7 @@ fn a_killed_run_gets_the_summary_of_its_record() {
 fn the_text_of_a_summary_starts_with_the_outcome() {
     let text = skein_report::text::summary(&flown(), false);
     let wanted = "\
-reached after 10.00 s: the formation is closed and every invariant held
+reached after 10.00 s: goal met and every invariant held
 
   run           disc: 4 drones, congestion-aware, seed 18446744073709551615, processes, lockstep
   stage 1       passed in 4.00 s from 1.00 s; split 3/1, left to right; predicted 3.60 s, 5 groupings simulated

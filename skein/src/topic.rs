@@ -11,7 +11,7 @@ use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::record::RecordView;
-use skein_protocol::{Message, SimTime};
+use skein_protocol::{Message, SimTime, TopicName};
 use skein_report::scene::message_json;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -59,7 +59,7 @@ pub(crate) struct Filter {
     /// Only messages of this drone
     #[arg(long, value_name = "ID")]
     pub(crate) drone: Option<u32>,
-    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed, arrivals
+    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed, arrivals, or a topic that pilots define
     #[arg(long, value_parser = kind)]
     pub(crate) kind: Option<String>,
     /// Stop after N lines
@@ -90,21 +90,17 @@ impl Name {
 }
 
 fn kind(text: &str) -> Result<String, KindError> {
-    let known: Vec<String> = Topic::ALL.iter().map(|topic| name(*topic as u16)).collect();
-    if known.iter().any(|name| name == text) {
+    let known = Topic::ALL.map(Topic::name);
+    if known.contains(&text) || TopicName::new(text).is_ok() {
         Ok(text.to_owned())
     } else {
         Err(KindError { expected: known.join(", ") })
     }
 }
 
-fn name(kind: u16) -> String {
-    Topic::from_wire(kind).map_or("unknown", Topic::name).to_owned()
-}
-
 /// Why a kind of frame is refused.
 #[derive(Debug, thiserror::Error)]
-#[error("expected one of {expected}")]
+#[error("expected one of {expected}, or the name of a topic that pilots define")]
 struct KindError {
     expected: String,
 }
@@ -258,7 +254,7 @@ fn frames(frames: &[AirFrame], filter: &Filter, dt_s: f64) -> Vec<Value> {
     let of_drone = |frame: &&AirFrame| filter.drone.is_none_or(|only| only == frame.source.0);
     let mut lines = Vec::new();
     for frame in frames.iter().filter(of_drone) {
-        let kind = name(frame.frame.kind);
+        let kind = skein_report::scene::topic(frame);
         if filter.kind.as_ref().is_some_and(|only| *only != kind) {
             continue;
         }

@@ -12,11 +12,13 @@ use crate::scene::{Sample, State};
 use crate::testing::{facts, row};
 use skein_protocol::DroneId;
 use skein_protocol::SimTime;
+use skein_protocol::frame::AirFrame;
 use skein_protocol::record::{
     DroneRow, EventKind, FaultKind, Outcome, ROW_LEADS, RecordHeader, RecordView, RunEvent, Totals,
 };
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{GroupId, Vec2};
+use skein_protocol::telemetry::{Telemetry, TelemetryRow};
+use skein_protocol::{GroupId, Message, MetricName, TopicName, UserMessage, Vec2};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -93,6 +95,39 @@ fn the_mcap_library_finds_topics_schemas_and_the_scenario() {
     let count =
         |topic: Topic| counts.iter().find(|(id, _)| summary.channels[id].topic == TOPICS[topic as usize]).unwrap().1;
     assert_eq!((*count(Topic::State), *count(Topic::Scene), *count(Topic::Log), *count(Topic::Events)), (20, 6, 2, 2));
+}
+
+#[test]
+fn what_pilots_say_is_recorded_as_bytes_and_their_figures_by_drone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(RECORDING);
+    let file = std::fs::File::create(&path).unwrap();
+    let mut writer = McapWriter::new(file, path.clone(), &facts(1), &serde_json::Value::Null).unwrap();
+    let said = UserMessage::new(TopicName::new("gossip").unwrap(), b"hello").unwrap();
+    let frame = AirFrame {
+        tick: 0,
+        source: DroneId(0),
+        sequence: 3,
+        position_m: [0.0; 3],
+        queue_ns: 0,
+        link_faults: Default::default(),
+        frame: Message::User(said).encode(),
+    };
+    let metric = Telemetry::Metric { name: MetricName::new("order").unwrap(), value: 0.5 };
+    let telemetry = [TelemetryRow::new(DroneId(0), &metric).unwrap()];
+    let (head, rows) = (RecordHeader { now: SimTime(20_000_000), ..RecordHeader::default() }, [row(0.0, 0.0)]);
+    let record = RecordView { head: &head, rows: &rows, frames: &[frame], telemetry: &telemetry, events: &[] };
+    writer.take(record, &[]).unwrap();
+    writer.finish().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let found: BTreeMap<String, Vec<u8>> = ::mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap)
+        .map(|message| (message.channel.topic.clone(), message.data.to_vec()))
+        .collect();
+    assert_eq!(found["/pilots/gossip"], b"\0\0\0\0hello");
+    let metrics: serde_json::Value = serde_json::from_slice(&found["/skein/metrics"]).unwrap();
+    assert_eq!(metrics, serde_json::json!({"t_s": 0.02, "metrics": {"order": {"0": 0.5}}}));
 }
 
 #[test]

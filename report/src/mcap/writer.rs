@@ -13,8 +13,8 @@ use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
-use skein_protocol::SimTime;
 use skein_protocol::record::{EventKind, RecordView, RunEvent};
+use skein_protocol::{OWN_TOPIC, SimTime, TopicName, UserMessage};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -25,7 +25,7 @@ const COMPRESSION_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// The topics, in the order of [`Topic`].
-pub(super) const TOPICS: [&str; 10] = [
+pub(super) const TOPICS: [&str; 11] = [
     "/tf",
     "/drones",
     "/scene",
@@ -36,6 +36,7 @@ pub(super) const TOPICS: [&str; 10] = [
     "/skein/groups",
     "/skein/leadership",
     "/skein/events",
+    "/skein/metrics",
 ];
 
 /// The topics of the recording, as indices of [`TOPICS`].
@@ -52,6 +53,7 @@ pub(super) enum Topic {
     Groups,
     Leadership,
     Events,
+    Metrics,
 }
 
 /// Writes run.mcap.
@@ -62,6 +64,8 @@ pub(crate) struct McapWriter<W: Write + Seek> {
     channels: Vec<u16>,
     /// Number of messages on each topic so far.
     sequences: Vec<u32>,
+    /// The channel of each topic that pilots define.
+    own: BTreeMap<TopicName, u16>,
     facts: RunFacts,
     observer: Observer,
     /// Ticks from one sample to the next.
@@ -71,6 +75,15 @@ pub(crate) struct McapWriter<W: Write + Seek> {
     drones: Drones,
     /// Buffer for the JSON of one message.
     json: Vec<u8>,
+}
+
+/// The figures that pilots reported in a tick.
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
+struct MetricsSample {
+    /// Simulated time, s.
+    t_s: f64,
+    /// The values by the figure's name and the drone's number.
+    metrics: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 /// Ticks from one sample to the next.
@@ -101,6 +114,7 @@ impl<W: Write + Seek> McapWriter<W> {
             stride: stride(facts),
             samples: 0,
             drones: Drones::default(),
+            own: BTreeMap::new(),
             json: Vec::new(),
             observer: Observer::new(facts.clone()),
             facts: facts.clone(),
@@ -113,9 +127,11 @@ impl<W: Write + Seek> McapWriter<W> {
     /// Takes the record of a tick and its events.
     pub(crate) fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), ReportError> {
         let wanted = (record.head.tick + 1).is_multiple_of(self.stride);
+        let fresh = !record.rows.is_empty();
         let sample = self.observer.take(record, wanted);
         let written = sample
             .map_or(Ok(()), |sample| self.sample(&sample, record.head.now))
+            .and_then(|()| if fresh { self.of_pilots(record) } else { Ok(()) })
             .and_then(|()| events.iter().try_for_each(|event| self.event(event)));
         written.map_err(ReportError::recording(&self.path))
     }
@@ -137,7 +153,8 @@ impl<W: Write + Seek> McapWriter<W> {
             ("skein.Radio", schema::<RadioSample>()),
         ];
         let event = ("skein.Event", serde_json::json!({"type": "object", "required": ["t_s", "event"]}));
-        let all = schemas.into_iter().chain(std::iter::repeat(event));
+        let events = std::iter::repeat_n(event, 3);
+        let all = schemas.into_iter().chain(events).chain([("skein.Metrics", schema::<MetricsSample>())]);
         for (topic, (name, schema)) in TOPICS.iter().zip(all) {
             let id = self.out.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
             self.channels.push(self.out.add_channel(id, topic, "json", &BTreeMap::new())?);
@@ -168,6 +185,40 @@ impl<W: Write + Seek> McapWriter<W> {
             self.put(Topic::Scene, now, &draw::moving_scene(&self.facts, sample, at))?;
         }
         Ok(())
+    }
+
+    /// Writes what pilots say under topics of their own, as bytes, and the figures that they report.
+    fn of_pilots(&mut self, record: RecordView<'_>) -> McapResult<()> {
+        for frame in record.frames.iter().filter(|frame| frame.frame.kind & OWN_TOPIC != 0) {
+            let Ok(message) = UserMessage::read(&frame.frame) else { continue };
+            let channel_id = self.own_channel(*message.topic())?;
+            let sequence = frame.sequence;
+            let time = record.head.now.0.max(0).unsigned_abs();
+            let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
+            self.json.clear();
+            self.json.extend_from_slice(&frame.source.0.to_le_bytes());
+            self.json.extend_from_slice(message.bytes());
+            self.out.write_to_known_channel(&header, &self.json)?;
+        }
+        let mut sample = MetricsSample { t_s: record.head.now.secs(), ..MetricsSample::default() };
+        for row in record.telemetry {
+            let Some((name, value)) = row.metric() else { continue };
+            sample.metrics.entry(name.as_str().to_owned()).or_default().insert(row.drone.0.to_string(), value);
+        }
+        if sample.metrics.is_empty() { Ok(()) } else { self.put(Topic::Metrics, record.head.now, &sample) }
+    }
+
+    /// The channel of a topic that pilots define. The messages on it have no schema.
+    fn own_channel(&mut self, topic: TopicName) -> McapResult<u16> {
+        if let Some(&channel) = self.own.get(&topic) {
+            return Ok(channel);
+        }
+        let about =
+            [("layout".to_owned(), "the sender's number (4 bytes, little-endian), then what it said".to_owned())];
+        let channel =
+            self.out.add_channel(0, &format!("/pilots/{topic}"), "application/octet-stream", &about.into())?;
+        self.own.insert(topic, channel);
+        Ok(channel)
     }
 
     fn event(&mut self, event: &RunEvent) -> McapResult<()> {

@@ -7,7 +7,8 @@ use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::radio::{Delivery, DropReason};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{DroneId, Message, Vec3};
+use skein_protocol::{DroneId, Message, UserMessage, Vec3};
+use std::borrow::Cow;
 use std::sync::LazyLock;
 
 /// The letter of a receiver that a frame does not concern: its sender or a dead drone.
@@ -40,11 +41,16 @@ fn letter(why: DropReason) -> char {
     reason(why).chars().next().unwrap_or('?')
 }
 
-/// Name of a frame's topic.
-pub(super) fn topic(frame: &AirFrame) -> &'static str {
-    static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| Topic::ALL.iter().map(name).collect());
-    let place = Topic::ALL.iter().position(|topic| *topic as u16 == frame.frame.kind);
-    place.map_or("unknown", |place| &NAMES[place])
+/// Name of a frame's topic: a built-in one, or one that pilots define; `unknown` for a frame that names none.
+#[must_use]
+pub fn topic(frame: &AirFrame) -> Cow<'static, str> {
+    match Topic::from_wire(frame.frame.kind) {
+        Some(topic) => topic.name().into(),
+        None => match UserMessage::read(&frame.frame) {
+            Ok(message) => message.topic().as_str().to_owned().into(),
+            Err(_) => "unknown".into(),
+        },
+    }
 }
 
 /// The name of a value in JSON.
@@ -129,7 +135,7 @@ mod tests {
 
     #[test]
     fn frames_have_a_topic_and_a_content() {
-        assert_eq!((topic(&frame(0)), content(&frame(0)).as_str()), ("passed", "passed 2 obstacles"));
+        assert_eq!((&*topic(&frame(0)), content(&frame(0)).as_str()), ("passed", "passed 2 obstacles"));
         let mut strange = frame(0);
         strange.frame.kind = 99;
         assert_eq!(topic(&strange), "unknown");

@@ -88,9 +88,9 @@ impl Observer {
                 let (source, sequence) = (frame.source.0, frame.sequence);
                 let t_s = SimTime(frame.tick as i64 * self.dt_ns).secs();
                 let content = frames::content(frame);
-                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: topic.into(), content, deliveries });
+                self.radio.frames.push(SentFrame { t_s, source, sequence, kind: topic.clone(), content, deliveries });
             }
-            add(&mut self.radio.sent, topic, 1);
+            add(&mut self.radio.sent, &topic, 1);
         }
         let surplus = self.radio.frames.len().saturating_sub(SAMPLE_FRAMES_MAX);
         self.radio.frames.drain(..surplus);
