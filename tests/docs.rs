@@ -17,6 +17,9 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "bytes/s",
     "false/h",
     "frames/s",
+    // Files of the reader's own program.
+    "src/main.rs",
+    "swirl.toml",
     // Folders and files that a command writes.
     "runs/",
     "plots/",
@@ -311,6 +314,8 @@ fn stale_names(page: &Page, sources: &Sources) -> Vec<String> {
     let mut stale = Vec::new();
     for span in page.spans() {
         let missing = match owner_and_member(&span) {
+            // A module of one of the crates.
+            Some((of, module)) if of.starts_with("skein_") => !sources.members.contains_key(module),
             Some((of, member)) => !sources.has(of, member),
             None if is_type(&span) => !NOT_TYPES.contains(&span.as_str()) && !sources.members.contains_key(&span),
             None if is_constant(&span) => !ENVIRONMENT.contains(&span.as_str()) && !sources.constants.contains(&span),
