@@ -22,6 +22,7 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "swirl.toml",
     // Folders and files that a command writes.
     "runs/",
+    "failures/drone-N.txt",
     "plots/",
     "plots/bending.svg",
     "plots/disturbance.svg",

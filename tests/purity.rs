@@ -117,9 +117,15 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
-fn packages() -> Vec<Package> {
+/// The packages of the workspace, examples included.
+fn all_packages() -> Vec<Package> {
     let mut command = MetadataCommand::new();
     command.manifest_path(root().join("Cargo.toml")).no_deps().exec().unwrap().packages
+}
+
+/// The packages that are published.
+fn packages() -> Vec<Package> {
+    all_packages().into_iter().filter(|package| package.publish.is_none()).collect()
 }
 
 /// All packages that one of ours needs at run time, with its own features only. Procedural macros run in the compiler and do
@@ -156,6 +162,17 @@ fn dependencies_run_one_way() {
         for dep in normal.filter(|dep| members.contains(dep.name.as_str())) {
             assert!(allowed.contains(&dep.name.as_str()), "{of} names {}", dep.name);
         }
+    }
+}
+
+#[test]
+fn examples_need_nothing_of_skein_but_the_application() {
+    let examples: Vec<Package> = all_packages().into_iter().filter(|package| package.publish.is_some()).collect();
+    assert!(!examples.is_empty());
+    for example in examples {
+        let normal = example.dependencies.iter().filter(|dep| dep.kind == DependencyKind::Normal);
+        let inner: Vec<&str> = normal.map(|dep| dep.name.as_str()).filter(|name| name.starts_with("skein-")).collect();
+        assert!(inner.is_empty(), "{} names {inner:?}", example.name);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::cli::{self, Cli, Command};
 use crate::exit::{Exit, Failure};
 use crate::output::KeptStdout;
+use crate::run::OnFolder;
 use crate::{
     bench, check, clean, doctor, hunt, replay, report, reproduce, roles, run, schema, sweep, top, topic, view,
 };
@@ -25,9 +26,6 @@ pub struct App {
     program: Option<Vec<OsString>>,
     on_folder: Option<Box<OnFolder>>,
 }
-
-/// Receives the folder of a run.
-pub(crate) type OnFolder = dyn Fn(&Path) + Send + Sync;
 
 type Make = dyn Fn(&Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync;
 

@@ -1,6 +1,5 @@
 //! `skein run`: flies one mission.
 
-use crate::app::OnFolder;
 use crate::cli::RunArgs;
 use crate::complaint::complain;
 use crate::doctor::check_room;
@@ -24,6 +23,9 @@ use skein_runtime::{
 use skein_scenario::Scenario;
 use std::path::Path;
 use std::time::Instant;
+
+/// Receives the folder of a run.
+pub(crate) type OnFolder = dyn Fn(&Path) + Send + Sync;
 
 /// Flies the mission, writes its folder and prints its summary.
 pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnFolder>) -> Result<Exit, Failure> {
