@@ -259,7 +259,7 @@ fn the_summary_follows_its_schema_and_its_contract() {
     }
     let contract = "schema scenario strategy seed runtime clock drones dt_s ticks sim_s realtime_factor \
         agent_steps_per_s wall_s startup_s report_s outcome stages mission_s reform_start_s reform_end_s \
-        formation_error_m formation_rmse_m mean_distance_error_m energy_j min_separation_m min_clearance_m violations \
+        formation_error_m formation_rmse_m mean_distance_error_m energy_j min_separation_m min_clearance_m min_altitude_m violations \
         metrics elections leaders split_brain_s failover_s messages faults deadline_misses step_us digest";
     let required: BTreeSet<&str> = schema["required"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     for key in contract.split_whitespace() {
@@ -332,9 +332,9 @@ fn a_runs_folder_holds_all_documented_files() {
     }
     let trace = std::fs::read_to_string(folder.join("trace.csv")).unwrap();
     let mut lines = trace.lines();
-    assert_eq!(lines.next(), Some("t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j"));
+    assert_eq!(lines.next(), Some("t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j"));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
-    assert!(rows.iter().all(|row| row.len() == 9));
+    assert!(rows.iter().all(|row| row.len() == 11));
     assert_eq!(rows.len() as u64, 8 * summary["ticks"].as_u64().unwrap(), "one row per drone and tick");
     let last: f64 = rows[rows.len() - 1][0].parse().unwrap();
     assert_eq!(json!(last), summary["sim_s"]);

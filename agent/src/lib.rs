@@ -17,6 +17,7 @@
 //! its own. A pilot knows nothing of other drones but what it senses and hears.
 //
 
+mod altitude;
 pub mod braking_filter;
 pub mod braking_path;
 pub mod detection;

@@ -31,6 +31,8 @@ pub struct PilotParams {
     pub guidance: GuidanceParams,
     /// The safety filter.
     pub safety: SafetyParams,
+    /// Height above the ground that it keeps, m.
+    pub altitude_m: f64,
     /// Range of its obstacle sensor, m.
     pub detection_range_m: f64,
     /// Greatest speed, m/s.

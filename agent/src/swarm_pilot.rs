@@ -1,6 +1,7 @@
 //! The paper's pilot: it detects obstacles, obeys plans, avoids, queues and re-forms, and it plans while it leads (paper,
 //! Algorithm 1).
 
+use crate::altitude::Altitude;
 use crate::braking_filter::{BrakingFilter, Moving, OwnMotion};
 use crate::detection::Detection;
 use crate::emergency_route::EmergencyRoute;
@@ -31,7 +32,7 @@ use skein_leader::routes::Routes;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{MAX_PLACES, Plan, QueuePlace, set_tag};
-use skein_protocol::{DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
+use skein_protocol::{DroneId, Message, MessageRef, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
 
 /// The pilot of one drone, composed of machines that each own their state.
 #[derive(Clone, Debug)]
@@ -42,6 +43,7 @@ pub struct SwarmPilot {
     queue: QueuePacer,
     safety: Safety,
     braking_filter: BrakingFilter,
+    altitude: Altitude,
     navigator: Navigator,
     /// The end of the planned route, while a known obstacle blocks it (world frame, m).
     detour_to: Option<Vec2>,
@@ -72,6 +74,7 @@ impl SwarmPilot {
             queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
             braking_filter: BrakingFilter::new(params.braking_filter()),
+            altitude: Altitude::new(params.altitude_m, params.planner.routes.planning_distance_m),
             navigator: Navigator::new(params.safety.clearance_m, params.planner.routes.planning_distance_m),
             detour_to: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
@@ -376,9 +379,9 @@ impl SwarmPilot {
         safe
     }
 
-    fn command(&self, acceleration: Vec2, open: &[QueuePlace; MAX_PLACES]) -> Command {
+    fn command(&self, acceleration_mps2: [f64; 3], open: &[QueuePlace; MAX_PLACES]) -> Command {
         let first = open.iter().find(|place| place.set != 0);
-        Command::acceleration(raised(acceleration, 0.0)).with_status(Status {
+        Command::acceleration(acceleration_mps2).with_status(Status {
             obeyed: self.leading.stamp(),
             part_hash: self.leading.part_hash(),
             group: self.leading.group(),
@@ -388,10 +391,9 @@ impl SwarmPilot {
             place: first.map(|place| (place.route, place.rank)),
         })
     }
-}
 
-impl Pilot for SwarmPilot {
-    fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
+    /// Steps one tick on senses that hold no obstacles but those in the way.
+    fn step_level(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
         let say = out.messages_mut();
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
@@ -403,6 +405,9 @@ impl Pilot for SwarmPilot {
             climb_mps: senses.velocity_mps[2],
         };
         for &Heard { source, message } in inbox.heard() {
+            if matches!(message, MessageRef::Obstacle(obstacle) if !self.altitude.is_blocked_by(&obstacle.shape)) {
+                continue;
+            }
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(message);
         }
@@ -419,9 +424,20 @@ impl Pilot for SwarmPilot {
         let open = self.route.open_places(places);
         let safe = self.steer(senses, &open);
         let acceleration = self.reaction.push(safe);
-        let command = self.command(acceleration, &open);
+        let climb_mps2 = self.altitude.climb_mps2(senses, acceleration, safety.acceleration_max_mps2);
+        let command = self.command(raised(acceleration, climb_mps2), &open);
         self.leading.speak(senses.now, &own, &places, say);
         command
+    }
+}
+
+impl Pilot for SwarmPilot {
+    fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
+        if !self.altitude.look(senses) {
+            return self.step_level(senses, inbox, out);
+        }
+        let altitude = self.altitude.clone();
+        self.step_level(&altitude.level(senses), inbox, out)
     }
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {

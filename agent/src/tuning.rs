@@ -87,3 +87,16 @@ pub(crate) const MIN_TIME_SAVING_SAME_LENGTH: f64 = 0.09;
 /// Least length that another obstacle set needs ahead, in planning distances. Chosen by hand. `skein sweep
 /// experiments/random-scenes.toml`.
 pub(crate) const ROOM_FOR_A_SET: f64 = 3.0;
+
+/// Greatest speed at which a drone returns to its altitude, m/s. Chosen by hand; no command measures it.
+pub(crate) const CLIMB_MPS: f64 = 2.0;
+
+/// Climb speed per error of the altitude, 1/s. Chosen by hand; no command measures it.
+pub(crate) const ALTITUDE_GAIN_PER_S: f64 = 0.5;
+
+/// Vertical acceleration per error of the climb speed, 1/s. Chosen by hand; no command measures it.
+pub(crate) const CLIMB_GAIN_PER_S: f64 = 2.0;
+
+/// Share of the acceleration that the horizontal command leaves which may be vertical. Chosen by hand, below 1, so that rounding never
+/// shortens the horizontal part.
+pub(crate) const CLIMB_SHARE: f64 = 0.99;

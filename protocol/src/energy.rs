@@ -1,4 +1,4 @@
-//! Power of a rotary-wing drone in level flight, as in the paper's model P1 (Zeng, Xu, Zhang 2019). The drone weighs 20 N; its
+//! Power of a rotary-wing drone: in level flight as in the paper's model P1 (Zeng, Xu, Zhang 2019). The drone weighs 20 N; its
 //! rotor has four blades and a radius of 0.4 m. Hovering takes a third more power than flight at [`CHEAPEST_MPS`], so a drone
 //! that waits uses more energy than one that flies on.
 
@@ -18,6 +18,8 @@ const DENSITY_KGPM3: f64 = 1.225;
 const SOLIDITY: f64 = 0.05;
 /// Area of the rotor disc, m².
 const DISC_M2: f64 = 0.503;
+/// Weight of the drone, N.
+const WEIGHT_N: f64 = 20.0;
 
 /// The airspeed at which [`power_w`] is smallest, m/s.
 pub const CHEAPEST_MPS: f64 = 10.21;
@@ -33,9 +35,28 @@ pub fn power_w(speed_mps: f64) -> f64 {
     profile + induced + parasite
 }
 
+/// Power of flight in any direction, W: that of level flight at the speed `speed_mps` (the length of the velocity), plus the
+/// weight times the climb rate `climb_mps` (positive upward), at least the blade profile power in hover. The climb term is that of
+/// the power balance of a rotor in forward climbing flight (Leishman, Principles of Helicopter Aerodynamics, P = P_i + P_0 + P_p +
+/// P_c with P_c = W·V_c). In level flight this is [`power_w`].
+#[must_use]
+pub fn flight_power_w(speed_mps: f64, climb_mps: f64) -> f64 {
+    (power_w(speed_mps) + WEIGHT_N * climb_mps).max(PROFILE_W)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn climbing_costs_the_weight_times_the_climb_rate() {
+        for speed in [0.0, 7.0, 10.21, 30.0] {
+            assert_eq!(flight_power_w(speed, 0.0).to_bits(), power_w(speed).to_bits());
+        }
+        assert!((flight_power_w(10.0, 2.0) - power_w(10.0) - 40.0).abs() < 1e-9);
+        assert!((flight_power_w(10.0, -1.0) - power_w(10.0) + 20.0).abs() < 1e-9);
+        assert_eq!(flight_power_w(10.0, -10.0), PROFILE_W, "the rotor turns in a fast descent, too");
+    }
 
     #[test]
     fn power_matches_the_paper() {

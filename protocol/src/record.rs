@@ -153,6 +153,8 @@ pub enum ViolationKind {
     Separation,
     /// A drone is closer to an obstacle than the obstacle clearance. The event's value is the distance, m.
     Clearance,
+    /// A living drone is closer to the ground than the obstacle clearance. The event's value is its altitude, m.
+    Ground,
     /// A drone obeys two different assignments under the same plan. The event's value is 0.
     ConflictingAssignment,
     /// A drone obeys an older plan than before, although its process has not restarted. The event's value is 0.
@@ -164,7 +166,7 @@ impl ViolationKind {
     #[must_use]
     pub fn is_distance(self) -> bool {
         match self {
-            Self::Separation | Self::Clearance => true,
+            Self::Separation | Self::Clearance | Self::Ground => true,
             Self::ConflictingAssignment | Self::BallotWentBack => false,
         }
     }

@@ -1,5 +1,5 @@
-//! The shape of every obstacle: a convex polygon with a rounding radius. A circle is one vertex with a radius. A rectangle
-//! is four vertices with radius 0.
+//! The shape of every obstacle: an upright prism over a convex polygon with a rounding radius. A circle is one vertex with a
+//! radius. A rectangle is four vertices with radius 0. The prism reaches from its floor to its top; by default it has neither.
 
 use crate::Vec2;
 use bytemuck::{Pod, Zeroable};
@@ -16,6 +16,10 @@ pub const MAX_VERTICES: usize = 16;
 pub struct ConvexShape {
     /// Rounding radius, m, ≥ 0.
     pub radius_m: f64,
+    /// Altitude of the lower face, m; −∞ if the obstacle stands on the ground.
+    pub floor_m: f64,
+    /// Altitude of the upper face, m; +∞ if the obstacle reaches to the sky.
+    pub top_m: f64,
     /// Number of vertices in use, 1 to [`MAX_VERTICES`].
     pub count: u32,
     /// Always 0.
@@ -36,6 +40,9 @@ pub enum ShapeError {
     /// The vertices are in clockwise order, the polygon is not convex, or three consecutive vertices are collinear.
     #[error("an obstacle's vertices must be convex and counter-clockwise")]
     NotConvex,
+    /// The floor is not below the top, or one of them is not a number.
+    #[error("an obstacle's floor must be below its top")]
+    Heights,
 }
 
 impl ConvexShape {
@@ -50,7 +57,14 @@ impl ConvexShape {
         if vertices.is_empty() || vertices.len() > MAX_VERTICES {
             return Err(ShapeError::Count(count));
         }
-        let mut shape = Self { radius_m, count, reserved: 0, vertices_m: [[0.0; 2]; MAX_VERTICES] };
+        let mut shape = Self {
+            radius_m,
+            floor_m: f64::NEG_INFINITY,
+            top_m: f64::INFINITY,
+            count,
+            reserved: 0,
+            vertices_m: [[0.0; 2]; MAX_VERTICES],
+        };
         for (place, vertex) in shape.vertices_m.iter_mut().zip(vertices) {
             *place = [vertex.x, vertex.y];
         }
@@ -64,6 +78,27 @@ impl ConvexShape {
     /// [`ShapeError::NotFinite`] if a number is not finite or the radius is negative.
     pub fn circle(centre: Vec2, radius_m: f64) -> Result<Self, ShapeError> {
         Self::new(&[centre], radius_m)
+    }
+
+    /// The same outline between these altitudes, m. −∞ and +∞ stand for the ground and the sky.
+    ///
+    /// # Errors
+    /// [`ShapeError::Heights`] if the floor is not below the top.
+    pub fn between(self, floor_m: f64, top_m: f64) -> Result<Self, ShapeError> {
+        if floor_m < top_m { Ok(Self { floor_m, top_m, ..self }) } else { Err(ShapeError::Heights) }
+    }
+
+    /// Whether a drone at this altitude could come closer to the shape than `margin_m` by flying on at its altitude.
+    #[must_use]
+    pub fn blocks(&self, altitude_m: f64, margin_m: f64) -> bool {
+        self.height_gap_m(altitude_m) < margin_m
+    }
+
+    /// How far an altitude is above the top or below the floor, m; negative between them.
+    #[must_use]
+    #[inline]
+    pub fn height_gap_m(&self, altitude_m: f64) -> f64 {
+        (self.floor_m - altitude_m).max(altitude_m - self.top_m)
     }
 
     /// A rectangle with this centre (world frame, m) and these half sizes along its own axes, m, turned counter-clockwise
@@ -85,8 +120,8 @@ impl ConvexShape {
     /// Checks a shape that another process wrote.
     ///
     /// # Errors
-    /// [`ShapeError`] if the number of vertices is wrong, a number is not finite, the radius is negative, or the polygon
-    /// is not convex and counter-clockwise.
+    /// [`ShapeError`] if the number of vertices is wrong, a number is not finite, the radius is negative, the polygon
+    /// is not convex and counter-clockwise, or the floor is not below the top.
     pub fn check(&self) -> Result<(), ShapeError> {
         if self.count == 0 || self.count as usize > MAX_VERTICES {
             return Err(ShapeError::Count(self.count));
@@ -94,6 +129,9 @@ impl ConvexShape {
         let finite = self.vertices().all(|v| v.x.is_finite() && v.y.is_finite());
         if !finite || !self.radius_m.is_finite() || self.radius_m < 0.0 {
             return Err(ShapeError::NotFinite);
+        }
+        if self.floor_m.is_nan() || self.top_m.is_nan() || self.floor_m >= self.top_m {
+            return Err(ShapeError::Heights);
         }
         let n = self.count as usize;
         let turn = |i: usize| {
@@ -159,6 +197,18 @@ mod tests {
         };
         assert!(ConvexShape::new(&star(1.0), 0.0).is_ok());
         assert_eq!(ConvexShape::new(&star(2.0), 0.0), Err(ShapeError::NotConvex));
+    }
+
+    #[test]
+    fn a_floor_is_below_its_top() {
+        let disc = ConvexShape::circle(Vec2::zeros(), 1.0).unwrap();
+        let low = disc.between(f64::NEG_INFINITY, 30.0).unwrap();
+        assert!(low.blocks(30.0, 1.0) && low.blocks(44.9, 15.0) && !low.blocks(45.0, 15.0));
+        assert!(disc.blocks(1e6, 1.0));
+        for (floor_m, top_m) in [(5.0, 5.0), (6.0, 5.0), (f64::NAN, 5.0)] {
+            assert_eq!(disc.between(floor_m, top_m), Err(ShapeError::Heights));
+            assert_eq!(ConvexShape { floor_m, top_m, ..disc }.check(), Err(ShapeError::Heights));
+        }
     }
 
     #[test]

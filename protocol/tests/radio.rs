@@ -454,3 +454,13 @@ proptest! {
         prop_assert_eq!(radio.delivery_at(&channels, &frame, here, 20), radio.delivery(&frame, receiver, here, 20));
     }
 }
+
+#[test]
+fn the_range_is_a_distance_in_space() {
+    let range = Range { half_m: 50.0, shadowing_db: 0.0, exponent: 2.0 };
+    let radio = Radio { channel: ChannelModel { range: Some(range), ..ChannelModel::default() }, ..Radio::default() };
+    let at = |z| radio.outcome(link(0, 1, 0), Vec3::new(30.0, 0.0, z), SimTime::ZERO);
+    assert!(matches!(at(40.0), Delivery::Deliver { .. }));
+    assert_eq!(at(40.1), Delivery::Drop(DropReason::Range));
+    assert_eq!(at(-40.1), Delivery::Drop(DropReason::Range));
+}

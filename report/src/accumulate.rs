@@ -237,6 +237,7 @@ impl Accumulator {
             energy_j: self.energy.finish(&self.last, self.stages.any()),
             min_separation_m: self.vicinity.separation_m(),
             min_clearance_m: self.vicinity.clearance_m(),
+            min_altitude_m: self.vicinity.altitude_m(),
             metrics: self.metrics.means(),
             elections: leading.elections,
             messages: messages(&self.counts, totals),

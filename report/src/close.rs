@@ -2,7 +2,10 @@
 
 use skein_protocol::Vec2;
 
-/// Sweep along the axis on which the points extend farther. The order is kept from tick to tick, so that sorting is
+/// A point of a plane or of space, m.
+type Point<const D: usize> = nalgebra::SVector<f64, D>;
+
+/// Sweep along that of the two horizontal axes on which the points extend farther. The order is kept from tick to tick, so that sorting is
 /// cheap.
 #[derive(Default)]
 pub(crate) struct Sweep {
@@ -12,7 +15,7 @@ pub(crate) struct Sweep {
 
 impl Sweep {
     /// The least distance of two points, m; `None` for fewer than two points.
-    pub(crate) fn least_distance(&mut self, points: &[Vec2]) -> Option<f64> {
+    pub(crate) fn least_distance<const D: usize>(&mut self, points: &[Point<D>]) -> Option<f64> {
         self.sort(points);
         let mut least = f64::INFINITY;
         for (place, &a) in self.order.iter().enumerate() {
@@ -46,13 +49,13 @@ impl Sweep {
         }
     }
 
-    fn sort(&mut self, points: &[Vec2]) {
+    fn sort<const D: usize>(&mut self, points: &[Point<D>]) {
         if self.order.len() != points.len() {
             self.order = (0..points.len()).collect();
         }
-        let empty = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+        let empty: (Point<D>, Point<D>) = (Point::repeat(f64::INFINITY), Point::repeat(f64::NEG_INFINITY));
         let (low, high) = points.iter().fold(empty, |(low, high), p| (low.inf(p), high.sup(p)));
-        self.axis = usize::from((high - low).y > (high - low).x);
+        self.axis = usize::from((high - low)[1] > (high - low)[0]);
         let axis = self.axis;
         self.order.sort_by(|&a, &b| points[a][axis].total_cmp(&points[b][axis]));
     }

@@ -117,21 +117,30 @@ mod outlines {
     struct Outline {
         vertices_m: Vec<[f64; 2]>,
         radius_m: f64,
+        /// Absent if the obstacle stands on the ground.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        floor_m: Option<f64>,
+        /// Absent if it reaches to the sky.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        top_m: Option<f64>,
     }
 
     pub(crate) fn serialize<S: Serializer>(shapes: &[ConvexShape], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(
-            shapes.iter().map(|shape| Outline {
-                vertices_m: shape.vertices().map(Into::into).collect(),
-                radius_m: shape.radius_m,
-            }),
-        )
+        to.collect_seq(shapes.iter().map(|shape| Outline {
+            vertices_m: shape.vertices().map(Into::into).collect(),
+            radius_m: shape.radius_m,
+            floor_m: Some(shape.floor_m).filter(|m| m.is_finite()),
+            top_m: Some(shape.top_m).filter(|m| m.is_finite()),
+        }))
     }
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<ConvexShape>, D::Error> {
         let shape = |outline: Outline| {
             let vertices: Vec<Vec2> = outline.vertices_m.into_iter().map(Vec2::from).collect();
-            ConvexShape::new(&vertices, outline.radius_m).map_err(D::Error::custom)
+            let (floor_m, top_m) = (outline.floor_m, outline.top_m);
+            ConvexShape::new(&vertices, outline.radius_m)
+                .and_then(|shape| shape.between(floor_m.unwrap_or(f64::NEG_INFINITY), top_m.unwrap_or(f64::INFINITY)))
+                .map_err(D::Error::custom)
         };
         Vec::<Outline>::deserialize(from)?.into_iter().map(shape).collect()
     }

@@ -1,14 +1,23 @@
 //! Outlines of obstacles, and distances to them.
 
-use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Vec2, Vec3};
 use std::f64::consts::TAU;
 
 /// Segments of a full circle in an outline.
 const CIRCLE_SEGMENTS: f64 = 72.0;
 
 /// Distance from a point to the surface of a shape, m; negative inside the shape.
-pub(crate) fn clearance(shape: &ConvexShape, point: Vec2) -> f64 {
+pub(crate) fn clearance(shape: &ConvexShape, point: Vec3) -> f64 {
+    let (beside, gap) = (outline_distance(shape, point.xy()), shape.height_gap_m(point.z));
+    if gap <= 0.0 {
+        return beside.max(gap);
+    }
+    if beside <= 0.0 { gap } else { (beside * beside + gap * gap).sqrt() }
+}
+
+/// Distance from a place to the outline of a shape, seen from above, m; negative inside.
+fn outline_distance(shape: &ConvexShape, point: Vec2) -> f64 {
     let vertices: Vec<Vec2> = shape.vertices().collect();
     let (mut distance, mut inside) = (f64::INFINITY, vertices.len() > 2);
     for (i, &a) in vertices.iter().enumerate() {
@@ -62,7 +71,24 @@ mod tests {
             (bar, at(2.0, 3.0), 2.0),
             (bar, at(7.0, 4.0), 4.0),
         ] {
-            assert!((clearance(&shape, point) - wanted).abs() < 1e-12, "{point} of {shape:?}");
+            assert!((clearance(&shape, point.push(50.0)) - wanted).abs() < 1e-12, "{point} of {shape:?}");
+        }
+    }
+
+    #[test]
+    fn clearance_counts_floor_and_top() {
+        let block =
+            ConvexShape::rectangle(Vec2::zeros(), Vec2::new(4.0, 4.0), 0.0).unwrap().between(10.0, 30.0).unwrap();
+        let at = Vec3::new;
+        for (point, wanted) in [
+            (at(7.0, 0.0, 20.0), 3.0),
+            (at(0.0, 0.0, 35.0), 5.0),
+            (at(0.0, 0.0, 4.0), 6.0),
+            (at(7.0, 0.0, 34.0), 5.0),
+            (at(0.0, 0.0, 29.0), -1.0),
+            (at(3.5, 0.0, 20.0), -0.5),
+        ] {
+            assert!((clearance(&block, point) - wanted).abs() < 1e-12, "{point}");
         }
     }
 
@@ -77,7 +103,7 @@ mod tests {
         ] {
             let outline = outline(&shape);
             for &(x, y) in &outline {
-                assert!(clearance(&shape, at(x, y)).abs() < 1e-9, "({x}, {y}) of {shape:?}");
+                assert!(outline_distance(&shape, at(x, y)).abs() < 1e-9, "({x}, {y}) of {shape:?}");
             }
             let (low, high) = shape.bounds();
             let widest = outline.iter().fold(0.0f64, |widest, &(x, _)| widest.max(x - low.x));

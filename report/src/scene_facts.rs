@@ -7,6 +7,8 @@ use skein_protocol::radio::Radio;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SceneFacts {
+    /// Altitude of the formation, m. The page names the altitude of drones that are elsewhere.
+    pub altitude_m: f64,
     /// The radio model, from which it follows which drone receives which frame.
     pub radio: Radio,
     /// Distance at which drones sense obstacles, m.

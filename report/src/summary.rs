@@ -75,6 +75,8 @@ pub struct Summary {
     pub min_separation_m: Option<f64>,
     /// Least distance of a flying body's centre to an obstacle over the mission, m; negative inside.
     pub min_clearance_m: Option<f64>,
+    /// Least altitude of a living drone over the mission, m.
+    pub min_altitude_m: Option<f64>,
     /// The invariants that were violated.
     pub violations: Vec<Violation>,
     /// Swarm metrics, averaged over the mission.

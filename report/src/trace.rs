@@ -10,7 +10,7 @@ use skein_protocol::{MetricName, Vec2};
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
 
-const HEADER: &str = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j";
+const HEADER: &str = "t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j";
 
 /// Writes the trace. Reuses its buffers, so that a row costs no allocation.
 pub(crate) struct TraceWriter<W: Write> {
@@ -39,7 +39,8 @@ impl<W: Write> TraceWriter<W> {
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
             self.field(t_s);
             write!(self.lines, "{drone},")?;
-            for value in [row.position_m, row.velocity_mps].into_iter().flat_map(|[x, y, _]| [x, y]) {
+            let ([x, y, z], [vx, vy, vz]) = (row.position_m, row.velocity_mps);
+            for value in [x, y, vx, vy, z, vz] {
                 self.field(value);
             }
             write!(self.lines, "{},", row.group)?;
@@ -86,6 +87,7 @@ pub(crate) struct TraceRow {
     pub drone: usize,
     pub position_m: Vec2,
     pub velocity_mps: Vec2,
+    pub altitude_m: f64,
     pub group: String,
     pub energy_j: f64,
 }
@@ -123,10 +125,11 @@ fn parse(line: &str) -> Option<TraceRow> {
     let mut number = || fields.next()?.parse::<f64>().ok().filter(|value| value.is_finite());
     let (t_s, drone) = (number()?, number()?);
     let (position_m, velocity_mps) = (Vec2::new(number()?, number()?), Vec2::new(number()?, number()?));
+    let (altitude_m, _) = (number()?, number()?);
     let group = fields.next()?.to_owned();
     let energy_j = fields.nth(1)?.parse().ok()?;
     // The figures of pilots follow.
-    Some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, group, energy_j })
+    Some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, altitude_m, group, energy_j })
 }
 
 #[cfg(test)]
@@ -140,7 +143,7 @@ mod tests {
         let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(2) };
         let row = DroneRow {
             position_m: [0.1, -35.0, 50.0],
-            velocity_mps: [10.0, 1e-7, 0.0],
+            velocity_mps: [10.0, 1e-7, -2.0],
             energy_j: 2.5,
             flags: ROW_ALIVE,
             ..DroneRow::default()
@@ -153,9 +156,9 @@ mod tests {
     fn living_drones_are_written_in_full() {
         let mut bytes = Vec::new();
         TraceWriter::new(&mut bytes, &BTreeSet::new()).unwrap().tick(0.02, &rows(), &[]).unwrap();
-        let wanted = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n\
-            0.02,0,0.1,-35.0,10.0,1e-7,N,,2.5\n\
-            0.02,2,0.1,-35.0,10.0,1e-7,N12,2,2.5\n";
+        let wanted = "t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j\n\
+            0.02,0,0.1,-35.0,10.0,1e-7,50.0,-2.0,N,,2.5\n\
+            0.02,2,0.1,-35.0,10.0,1e-7,50.0,-2.0,N12,2,2.5\n";
         assert_eq!(String::from_utf8(bytes).unwrap(), wanted);
     }
 
@@ -175,7 +178,7 @@ mod tests {
         read(&folder, &Interrupted::never(), take).unwrap();
         assert_eq!(ticks.len(), 2);
         assert_eq!((ticks[1][1].t_s, ticks[1][1].drone, ticks[1][1].group.as_str()), (0.04, 2, "N12"));
-        assert_eq!(ticks[0][0].velocity_mps, Vec2::new(10.0, 1e-7));
+        assert_eq!((ticks[0][0].velocity_mps, ticks[0][0].altitude_m), (Vec2::new(10.0, 1e-7), 50.0));
         let stop = read(&folder, &Interrupted::when(&|| true), |_| Ok(()));
         assert!(matches!(stop, Err(ReportError::Interrupted)));
     }
@@ -184,7 +187,7 @@ mod tests {
     fn an_invalid_line_is_named() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        for (text, place) in [("x\n", "line 1"), (&format!("{HEADER}\n0.0,0,1,1,1,1,N,,0\n0.0,x\n"), "line 3")] {
+        for (text, place) in [("x\n", "line 1"), (&format!("{HEADER}\n0.0,0,1,1,1,1,50,0,N,,0\n0.0,x\n"), "line 3")] {
             folder.files().write(TRACE, text.as_bytes()).unwrap();
             let error = read(&folder, &Interrupted::never(), |_| Ok(())).unwrap_err().to_string();
             assert!(error.contains(place), "{error}");

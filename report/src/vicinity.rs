@@ -1,11 +1,11 @@
-//! The least distances between drones, and between drones and obstacles, over a mission.
+//! The least distances between drones, and of drones to obstacles and to the ground, over a mission.
 
 use crate::close::Sweep;
 use crate::facts::RunFacts;
 use crate::geometry::clearance;
 use skein_protocol::record::DroneRow;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Vec2, horizontal};
+use skein_protocol::{Vec2, Vec3};
 
 /// The least distances so far. A dead drone counts as a body until it has landed.
 pub(crate) struct Vicinity {
@@ -13,7 +13,8 @@ pub(crate) struct Vicinity {
     clearance_m: Option<f64>,
     obstacles: Vec<BoxedShape>,
     /// Positions of all bodies in the tick that was taken last, m.
-    bodies: Vec<Vec2>,
+    bodies: Vec<Vec3>,
+    altitude_m: Option<f64>,
     sweep: Sweep,
 }
 
@@ -34,6 +35,7 @@ impl Vicinity {
         Self {
             separation_m: None,
             clearance_m: None,
+            altitude_m: None,
             obstacles: facts.obstacles.iter().map(bounded).collect(),
             bodies: Vec::new(),
             sweep: Sweep::default(),
@@ -50,16 +52,24 @@ impl Vicinity {
         self.clearance_m
     }
 
+    /// Least altitude of a living drone, m; `None` if none ever lived.
+    pub(crate) fn altitude_m(&self) -> Option<f64> {
+        self.altitude_m
+    }
+
     /// Takes the rows of a tick.
     pub(crate) fn take(&mut self, rows: &[DroneRow]) {
         self.bodies.clear();
         let landed = |row: &&DroneRow| !row.alive() && row.position_m[2] <= 0.0;
-        self.bodies.extend(rows.iter().filter(|row| !landed(row)).map(|row| horizontal(row.position_m)));
+        self.bodies.extend(rows.iter().filter(|row| !landed(row)).map(|row| Vec3::from(row.position_m)));
+        let lowest = rows.iter().filter(|row| row.alive()).map(|row| row.position_m[2]).min_by(f64::total_cmp);
+        self.altitude_m = least(self.altitude_m, lowest);
         let separation = self.sweep.least_distance(&self.bodies);
         self.separation_m = least(self.separation_m, separation);
         for &body in &self.bodies {
             for BoxedShape { shape, low, high } in &self.obstacles {
-                let box_distance = (low - body).sup(&(body - high)).sup(&Vec2::zeros()).norm();
+                let place = body.xy();
+                let box_distance = (low - place).sup(&(place - high)).sup(&Vec2::zeros()).norm();
                 if self.clearance_m.is_none_or(|least| box_distance <= least) {
                     self.clearance_m = least(self.clearance_m, Some(clearance(shape, body)));
                 }

@@ -316,7 +316,7 @@ const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s tick
     stages[].routes stages[].split stages[].split_left_right stages[].predicted_s stages[].candidates_rehearsed \
     stages[].groups[].name stages[].groups[].route stages[].groups[].drones stages[].groups[].leader mission_s \
     reform_start_s reform_end_s formation_error_m formation_rmse_m mean_distance_error_m energy_j.total \
-    energy_j.until_passed energy_j.detection_to_pass energy_j.per_drone min_separation_m min_clearance_m \
+    energy_j.until_passed energy_j.detection_to_pass energy_j.per_drone min_separation_m min_clearance_m min_altitude_m \
     violations[].t_s violations[].kind violations[].drones violations[].value_m metrics.order metrics.safety \
     metrics.union metrics.connectivity elections leaders[].t_s leaders[].group leaders[].ballot.round \
     leaders[].ballot.incarnation leaders[].ballot.claimant leaders[].leader split_brain_s failover_s messages.sent \
@@ -371,8 +371,8 @@ fn a_folder_holds_summary_trace_events_recording_and_plots() {
     let read = |name| std::fs::read_to_string(folder.path().join(name)).unwrap();
     let trace = read("trace.csv");
     assert_eq!(trace.lines().count() as u64, 1 + 4 * (LAST + 1) - (LAST + 1 - DEATH));
-    assert_eq!(trace.lines().nth(1), Some("0.1,0,1.0,45.0,10.0,0.0,N1,,10.0"));
-    assert!(trace.ends_with("10.0,2,100.0,15.0,10.0,0.0,N2,0,1000.0\n"), "{trace}");
+    assert_eq!(trace.lines().nth(1), Some("0.1,0,1.0,45.0,10.0,0.0,50.0,0.0,N1,,10.0"));
+    assert!(trace.ends_with("10.0,2,100.0,15.0,10.0,0.0,50.0,0.0,N2,0,1000.0\n"), "{trace}");
     let events = read("events.jsonl");
     let parsed: Vec<RunEvent> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((parsed.len(), parsed.last()), (8, Some(&end())));

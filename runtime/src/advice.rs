@@ -19,7 +19,7 @@ pub fn speed_on_sight_mps(scenario: &Scenario) -> f64 {
 /// # Errors
 /// [`ShapeError`] if an obstacle has an invalid shape. A checked scenario has none.
 pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
-    let shapes = scenario.shapes()?;
+    let shapes = scenario.shapes_in_the_way()?;
     let no_way = scenario.drones_without_a_way()?;
     let found = [
         too_fast(scenario, "drone.speed_mps", scenario.drone.speed_mps),
@@ -84,13 +84,13 @@ fn nearest_pair_m(points: &[Vec2]) -> Option<f64> {
 }
 
 /// A drone that starts so close to an obstacle that it cannot stop before it.
-fn start_too_fast(scenario: &Scenario, shapes: &[ConvexShape]) -> Option<String> {
+fn start_too_fast(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<String> {
     let (stop_m, clearance_m) = (scenario.stopping_distance_m(), scenario.avoidance.clearance_m);
     scenario.starts().into_iter().enumerate().find_map(|(drone, start)| {
         let end = start + Vec2::new(stop_m, 0.0);
-        let distance_m = |shape: &ConvexShape| skein_agent::braking_filter::distance_m(shape, start, end);
+        let distance_m = |(id, shape): &(u32, ConvexShape)| (*id, skein_agent::braking_filter::distance_m(shape, start, end));
         let (obstacle, nearest_m) =
-            shapes.iter().map(distance_m).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            shapes.iter().map(distance_m).min_by(|a, b| a.1.total_cmp(&b.1))?;
         (nearest_m < clearance_m).then(|| {
             format!(
                 "drone {drone} starts at {} m/s and stops within {stop_m:.2} m, {nearest_m:.2} m from obstacle {obstacle}, \
@@ -102,12 +102,12 @@ fn start_too_fast(scenario: &Scenario, shapes: &[ConvexShape]) -> Option<String>
 }
 
 /// A formation that stops before any drone senses the first obstacle, though the mission ends behind it.
-fn stops_unseen(scenario: &Scenario, shapes: &[ConvexShape]) -> Option<String> {
+fn stops_unseen(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<String> {
     let (stop_x_m, range_m) = (scenario.mission.stop_x_m, scenario.sensors.detection_range_m);
     if scenario.mission.end != End::Hold || shapes.is_empty() {
         return None;
     }
-    let first_x_m = shapes.iter().map(|shape| shape.bounds().0.x).fold(f64::INFINITY, f64::min);
+    let first_x_m = shapes.iter().map(|(_, shape)| shape.bounds().0.x).fold(f64::INFINITY, f64::min);
     (stop_x_m + range_m < first_x_m).then(|| {
         format!(
             "the formation stops at mission.stop_x_m = {stop_x_m} m and senses {range_m} m far, but the first obstacle begins at \

@@ -59,7 +59,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         pilots: scenario.pilot_names(),
     };
     let velocity = Vec3::new(drone.speed_mps, 0.0, 0.0);
-    let start = |place: Vec2| (place.push(scenario.formation.altitude_m), velocity);
+    let start = |place: Vec2| (place.push(scenario.altitude_m()), velocity);
     let starts: Vec<(Vec3, Vec3)> = scenario.starts().into_iter().map(start).collect();
     let shapes = scenario.shapes().map_err(RuntimeError::Shape)?;
     Ok(World::new(params, &starts, &shapes)?)
@@ -125,6 +125,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             dt_s: scenario.time.dt_s,
             ranging_m: scenario.ranging_m(),
         },
+        altitude_m: scenario.altitude_m(),
         detection_range_m: scenario.sensors.detection_range_m,
         speed_max_mps: drone.speed_max_mps,
         ranging: scenario.sensors.ranging,

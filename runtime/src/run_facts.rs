@@ -18,17 +18,17 @@ pub struct SetPlan {
     pub routes: Routes,
 }
 
-/// The obstacle sets of a scenario, in flight order.
+/// The sets of the obstacles that are in the way at the formation's altitude, in flight order.
 ///
 /// # Errors
 /// [`ShapeError`] if an obstacle of the scenario is not a convex shape; never for a scenario that was checked.
 pub fn obstacle_sets(scenario: &Scenario) -> Result<Vec<SetPlan>, ShapeError> {
-    let shapes = scenario.shapes()?;
+    let shapes = scenario.shapes_in_the_way()?;
     let planner = mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO).planner;
     let reach_m = 2.0 * planner.routes.planning_distance_m;
     let mut obstacles = Obstacles::new(scenario.formation.drones, reach_m);
-    for (shape, id) in shapes.iter().zip(0..) {
-        obstacles.learn(SimTime::ZERO, ObstacleId(id), *shape, DroneId(0));
+    for (id, shape) in shapes {
+        obstacles.learn(SimTime::ZERO, ObstacleId(id), shape, DroneId(0));
     }
     let plan = |ids: Vec<ObstacleId>| {
         let routes = Routes::new(&obstacles.shapes(&ids).unwrap_or_default(), &planner.routes);
@@ -96,6 +96,7 @@ fn scene(scenario: &Scenario) -> Result<SceneFacts, ShapeError> {
         routes_m: (0..set.routes.count()).map(|route| centre_line(set.routes.route(route))).collect(),
     });
     Ok(SceneFacts {
+        altitude_m: scenario.altitude_m(),
         radio: scenario.radio(),
         detection_range_m: scenario.sensors.detection_range_m,
         // The pilot's own danger zone: the clearance and twice the stopping distance.

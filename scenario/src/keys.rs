@@ -125,9 +125,10 @@ pub struct Formation {
     /// Position of the front slot at the start, [x, y].
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub start_m: [f64; 2],
-    /// Height above the ground at which the formation starts. The paper's pilot keeps it.
-    #[schemars(range(min = 0.0, max = 10_000.0))]
-    pub altitude_m: f64,
+    /// Height above the ground at which the formation starts, at least `avoidance.clearance_m`. The paper's pilot keeps it.
+    /// Default: 50 m, or `avoidance.clearance_m` if that is more.
+    #[schemars(range(min = 0.0, max = 100_000.0))]
+    pub altitude_m: Option<f64>,
     /// Radius of the disc around its slot in which each drone starts. The place is drawn uniformly, by the seed.
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub start_jitter_m: f64,
@@ -141,7 +142,7 @@ impl Default for Formation {
             drones: 8,
             spacing_m: 40.0,
             start_m: [0.0, 0.0],
-            altitude_m: 50.0,
+            altitude_m: None,
             start_jitter_m: 0.0,
         }
     }

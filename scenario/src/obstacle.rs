@@ -1,4 +1,4 @@
-//! The keys of an obstacle, and the convex shape that they describe.
+//! The keys of an obstacle, and the upright prism over a convex shape that they describe.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,14 @@ pub enum Obstacle {
         #[serde(default)]
         #[schemars(range(min = -1000.0, max = 1000.0))]
         rotation_rad: f64,
+        /// Altitude of its lower face. Default: it stands on the ground.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        floor_m: Option<f64>,
+        /// Altitude of its upper face, above `floor_m`. Default: it reaches to the sky.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        top_m: Option<f64>,
     },
     /// A circle.
     Circle {
@@ -31,12 +39,28 @@ pub enum Obstacle {
         /// Its radius.
         #[schemars(range(min = 1e-3, max = 1e5))]
         radius_m: f64,
+        /// Altitude of its lower face. Default: it stands on the ground.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        floor_m: Option<f64>,
+        /// Altitude of its upper face, above `floor_m`. Default: it reaches to the sky.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        top_m: Option<f64>,
     },
     /// A convex polygon.
     Polygon {
         /// Its corners in order, [x, y] each, clockwise or counter-clockwise.
         #[schemars(length(min = 3, max = MAX_VERTICES), inner(inner(range(min = -1e6, max = 1e6))))]
         vertices_m: Vec<[f64; 2]>,
+        /// Altitude of its lower face. Default: it stands on the ground.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        floor_m: Option<f64>,
+        /// Altitude of its upper face, above `floor_m`. Default: it reaches to the sky.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        top_m: Option<f64>,
     },
     /// An ellipse. It is replaced by the polygon of 16 corners that encloses it.
     Ellipse {
@@ -50,6 +74,14 @@ pub enum Obstacle {
         #[serde(default)]
         #[schemars(range(min = -1000.0, max = 1000.0))]
         rotation_rad: f64,
+        /// Altitude of its lower face. Default: it stands on the ground.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        floor_m: Option<f64>,
+        /// Altitude of its upper face, above `floor_m`. Default: it reaches to the sky.
+        #[serde(default)]
+        #[schemars(range(min = -1e4, max = 1e5))]
+        top_m: Option<f64>,
     },
 }
 
@@ -57,15 +89,31 @@ impl Obstacle {
     /// The obstacle's shape, counter-clockwise, world frame, m.
     ///
     /// # Errors
-    /// [`ShapeError`] if a polygon is not convex or a number is outside its key's range.
+    /// [`ShapeError`] if a polygon is not convex, a number is outside its key's range, or the floor is not below the top.
     pub fn shape(&self) -> Result<ConvexShape, ShapeError> {
+        let (floor_m, top_m) = self.heights_m();
+        self.outline()?.between(floor_m.unwrap_or(f64::NEG_INFINITY), top_m.unwrap_or(f64::INFINITY))
+    }
+
+    /// The altitudes of its floor and its top, m.
+    #[must_use]
+    pub fn heights_m(&self) -> (Option<f64>, Option<f64>) {
+        match *self {
+            Self::Rectangle { floor_m, top_m, .. }
+            | Self::Circle { floor_m, top_m, .. }
+            | Self::Polygon { floor_m, top_m, .. }
+            | Self::Ellipse { floor_m, top_m, .. } => (floor_m, top_m),
+        }
+    }
+
+    fn outline(&self) -> Result<ConvexShape, ShapeError> {
         match self {
-            Self::Rectangle { centre_m, half_size_m, rotation_rad } => {
+            Self::Rectangle { centre_m, half_size_m, rotation_rad, .. } => {
                 ConvexShape::rectangle(Vec2::from(*centre_m), Vec2::from(*half_size_m), *rotation_rad)
             }
-            Self::Circle { centre_m, radius_m } => ConvexShape::circle(Vec2::from(*centre_m), *radius_m),
-            Self::Polygon { vertices_m } => polygon(vertices_m),
-            Self::Ellipse { centre_m, semi_axes_m, rotation_rad } => {
+            Self::Circle { centre_m, radius_m, .. } => ConvexShape::circle(Vec2::from(*centre_m), *radius_m),
+            Self::Polygon { vertices_m, .. } => polygon(vertices_m),
+            Self::Ellipse { centre_m, semi_axes_m, rotation_rad, .. } => {
                 ellipse(Vec2::from(*centre_m), Vec2::from(*semi_axes_m), *rotation_rad)
             }
         }

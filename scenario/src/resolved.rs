@@ -19,6 +19,8 @@ const GRAVITY_MPS2: f64 = 9.81;
 const TIMEOUT_S: f64 = 180.0;
 /// The default of `time.timeout_s` is at least this many times the duration of a smooth flight.
 const TIMEOUT_FACTOR: f64 = 2.0;
+/// Default of `formation.altitude_m`, m.
+const ALTITUDE_M: f64 = 50.0;
 /// Default of `protocol.beacon_period_s` where bandwidth is no limit, s.
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
@@ -124,6 +126,13 @@ impl Scenario {
         self.slots().into_iter().enumerate().map(|(drone, slot)| start + slot + jitter(drone)).collect()
     }
 
+    /// The height above the ground at which the formation starts, m: `formation.altitude_m`; or 50 m, or
+    /// `avoidance.clearance_m` if that is more.
+    #[must_use]
+    pub fn altitude_m(&self) -> f64 {
+        self.formation.altitude_m.unwrap_or(ALTITUDE_M.max(self.avoidance.clearance_m))
+    }
+
     /// The shapes of the obstacles, world frame, m, in their order.
     ///
     /// # Errors
@@ -131,6 +140,17 @@ impl Scenario {
     /// has none.
     pub fn shapes(&self) -> Result<Vec<ConvexShape>, ShapeError> {
         self.obstacles.iter().map(crate::Obstacle::shape).collect()
+    }
+
+    /// The obstacles that are in the way of a flight at the formation's altitude, with their numbers: all but those whose floor
+    /// or top is at least `avoidance.planning_distance_m` away from it.
+    ///
+    /// # Errors
+    /// [`ShapeError`], as for [`Self::shapes`].
+    pub fn shapes_in_the_way(&self) -> Result<Vec<(u32, ConvexShape)>, ShapeError> {
+        let (altitude_m, margin_m) = (self.altitude_m(), self.avoidance.planning_distance_m);
+        let shapes = (0..).zip(self.shapes()?);
+        Ok(shapes.filter(|(_, shape)| shape.blocks(altitude_m, margin_m)).collect())
     }
 
     /// Deceleration of a drone that brakes fully, m/s²: g·c_d of the paper's E3, at most the drone's greatest acceleration.
@@ -198,7 +218,7 @@ impl Scenario {
     /// # Errors
     /// [`ShapeError`], as for [`Self::shapes`].
     pub fn drones_without_a_way(&self) -> Result<Vec<u32>, ShapeError> {
-        let shapes = self.shapes()?;
+        let shapes: Vec<ConvexShape> = self.shapes_in_the_way()?.into_iter().map(|(_, shape)| shape).collect();
         let barrier = Barrier::new(&shapes, self.avoidance.clearance_m);
         let far_m = shapes.iter().map(|shape| shape.bounds().1.x).fold(0.0, f64::max) + 1e6;
         let goal = self.mission.goal_m.filter(|_| self.mission.end == End::Goal);

@@ -82,6 +82,7 @@ impl Rules<'_> {
     fn distances(&mut self) {
         let Scenario { avoidance, sensors, .. } = self.scenario;
         let clearance = ("avoidance.clearance_m", avoidance.clearance_m);
+        self.at_most(clearance, ("formation.altitude_m", self.scenario.altitude_m()), "m");
         self.expect(
             avoidance.planning_distance_m >= clearance.1,
             &["avoidance.planning_distance_m", clearance.0],
@@ -193,6 +194,11 @@ impl Rules<'_> {
                         self.clear_of(i, &shape, ("goal", "mission.goal_m"), goals);
                     }
                 }
+                Err(ShapeError::Heights) => self.expect(false, &[&format!("obstacle.{i}.top_m")], || {
+                    let (floor_m, top_m) = obstacle.heights_m();
+                    let found = |height_m: Option<f64>| height_m.map_or("none".to_owned(), |m| quantity(m, "m"));
+                    format!("found {}, expected more than floor_m = {}", found(top_m), found(floor_m))
+                }),
                 Err(ShapeError::NotConvex) => self.expect(false, &[&format!("obstacle.{i}.vertices_m")], || {
                     "found corners that do not form a convex polygon, expected corners in order that all turn the same \
                      way, none of them straight or repeated"
@@ -206,6 +212,9 @@ impl Rules<'_> {
     /// Checks that the slots of the start or of the goal keep the clearance from obstacle `i`.
     fn clear_of(&mut self, i: usize, shape: &ConvexShape, (end, key): (&str, &str), slots: &[Vec2]) {
         let clearance_m = self.scenario.avoidance.clearance_m;
+        if !shape.blocks(self.scenario.altitude_m(), clearance_m - ROUNDING_M) {
+            return;
+        }
         let Some(close) = near::closest_slot(shape, slots, clearance_m - ROUNDING_M) else { return };
         let at = slots[close.slot];
         let place = match close.distance_m {

@@ -213,3 +213,15 @@ fn after_fifty_errors_the_others_are_counted() {
     assert_eq!(message.lines().count(), 51);
     assert!(message.ends_with("… and 19951 more errors"), "{}", message.lines().last().unwrap_or_default());
 }
+
+#[test]
+fn a_floor_above_its_top_and_an_altitude_below_the_clearance_are_rejected() {
+    let high = format!("[formation]\n{BOX}floor_m = 30\ntop_m = 20\n");
+    assert_rejected(&[
+        (&high, &["obstacle.0.top_m: found 20 m, expected more than floor_m = 30 m"]),
+        (
+            "[formation]\naltitude_m = 10",
+            &["avoidance.clearance_m", "found 15 m, expected at most formation.altitude_m = 10 m"],
+        ),
+    ]);
+}

@@ -177,3 +177,17 @@ proptest! {
         prop_assert_eq!(&Scenario::parse(&s.to_toml().unwrap(), SOURCE, &[]).unwrap(), &s);
     }
 }
+
+#[test]
+fn obstacles_above_and_below_are_not_in_the_way() {
+    let block = |x: f64, heights: &str| {
+        format!("[[obstacle]]\nshape = \"rectangle\"\ncentre_m = [{x}, 0]\nhalf_size_m = [5, 5]\n{heights}\n")
+    };
+    let blocks = [(100.0, ""), (200.0, "top_m = 30"), (300.0, "top_m = 30.5"), (400.0, "floor_m = 70\ntop_m = 80")];
+    let text: String = blocks.iter().map(|(x, heights)| block(*x, heights)).collect();
+    let s = parse(&format!("[formation]\n{text}"), &[]);
+    assert_eq!((s.altitude_m(), s.shapes().unwrap().len()), (50.0, 4));
+    let in_the_way: Vec<u32> = s.shapes_in_the_way().unwrap().into_iter().map(|(id, _)| id).collect();
+    assert_eq!(in_the_way, [0, 2]);
+    assert_eq!(parse("[formation]\n[avoidance]\nclearance_m = 80\nplanning_distance_m = 90", &[]).altitude_m(), 80.0);
+}

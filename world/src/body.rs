@@ -3,7 +3,7 @@
 use crate::params::{Failsafe, WorldParams};
 use crate::tuning::DESCENT_MPS;
 use skein_protocol::Vec3;
-use skein_protocol::energy::power_w;
+use skein_protocol::energy::flight_power_w;
 
 /// The true state of one drone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl Body {
     /// start of the tick.
     pub(crate) fn fly(&mut self, acceleration_mps2: Vec3, params: &WorldParams) {
         let dt = params.dt_s();
-        self.energy_j += power_w(self.velocity.norm()) * dt;
+        self.energy_j += self.power_w() * dt;
         self.glide(clip(self.velocity + acceleration_mps2 * dt, params.speed_max_mps), dt);
     }
 
@@ -78,8 +78,13 @@ impl Body {
 
     /// One tick of a drone with a frozen process: it brakes to a stop and stays, whatever the failsafe is.
     pub(crate) fn hover(&mut self, params: &WorldParams) {
-        self.energy_j += power_w(self.velocity.norm()) * params.dt_s();
+        self.energy_j += self.power_w() * params.dt_s();
         self.brake(params);
+    }
+
+    /// The power of the present motion, W.
+    fn power_w(&self) -> f64 {
+        flight_power_w(self.velocity.norm(), self.velocity.z)
     }
 
     /// The drone's process is gone.
@@ -168,7 +173,7 @@ mod tests {
     fn energy_is_power_at_the_old_speed_times_the_tick() {
         let mut body = cruising();
         body.fly(Vec3::new(5.0, 0.0, 0.0), &params());
-        assert_eq!(body.energy_j, power_w(10.0) * 0.02);
+        assert_eq!(body.energy_j, flight_power_w(10.0, 0.0) * 0.02);
     }
 
     #[test]

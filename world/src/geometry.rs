@@ -39,8 +39,8 @@ impl Outline {
             radius_m: shape.radius_m,
             low,
             high,
-            floor_m: f64::NEG_INFINITY,
-            top_m: f64::INFINITY,
+            floor_m: shape.floor_m,
+            top_m: shape.top_m,
         }
     }
 
@@ -168,6 +168,52 @@ mod tests {
             points.extend(arc.map(|t| a + Vec2::new(t.cos(), t.sin()) * shape.radius_m));
         }
         points
+    }
+
+    #[test]
+    fn a_prism_has_a_floor_and_a_top() {
+        let block = Outline::new(&rectangle(0.0, 0.0, 4.0, 4.0).between(10.0, 30.0).unwrap());
+        for (point, wanted) in [
+            ([7.0, 0.0, 20.0], ([4.0, 0.0, 20.0], 3.0)),
+            ([1.0, 2.0, 35.0], ([1.0, 2.0, 30.0], 5.0)),
+            ([1.0, 2.0, 4.0], ([1.0, 2.0, 10.0], 6.0)),
+            ([7.0, 0.0, 34.0], ([4.0, 0.0, 30.0], 5.0)),
+            ([0.0, 1.0, 29.0], ([0.0, 1.0, 30.0], -1.0)),
+            ([3.5, 0.0, 20.0], ([4.0, 0.0, 20.0], -0.5)),
+        ] {
+            let found = block.nearest(Vec3::from(point));
+            assert_eq!((<[f64; 3]>::from(found.point), found.distance_m), wanted, "{point:?}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn distances_to_a_prism_agree_with_dense_sampling(
+            point in [-40f64..40.0, -40f64..40.0, -20f64..90.0], hx in 2f64..20.0, hy in 2f64..20.0,
+            turn in 0f64..3.0, radius in 0f64..5.0, floor in 0f64..20.0, height in 5f64..40.0,
+        ) {
+            let core = ConvexShape::rectangle(Vec2::new(3.0, -2.0), Vec2::new(hx, hy), turn).unwrap();
+            let shape = ConvexShape { radius_m: radius, ..core }.between(floor, floor + height).unwrap();
+            let (point, outline) = (Vec3::from(point), Outline::new(&shape));
+            let found = outline.nearest(point);
+            prop_assert!(((found.point - point).norm() - found.distance_m.abs()).abs() < 1e-9);
+            prop_assert!(outline.nearest(found.point).distance_m.abs() < 1e-9);
+            prop_assert!(outline.box_distance_squared(point).sqrt() <= found.distance_m.max(0.0) + 1e-9);
+            // Every point within the prism, on a grid, is at least as far away as the nearest point of the surface.
+            let mut sampled = f64::INFINITY;
+            for (i, j, k) in (0..21).flat_map(|i| (0..21).flat_map(move |j| (0..21).map(move |k| (i, j, k)))) {
+                let part = |n: i32, low: f64, high: f64| low + (high - low) * f64::from(n) / 20.0;
+                let (low, high) = (outline.low(), outline.high());
+                let sample = Vec3::new(part(i, low.x, high.x), part(j, low.y, high.y), part(k, floor, floor + height));
+                if outline.nearest_on_outline(sample.xy()).1 <= 0.0 {
+                    sampled = sampled.min((sample - point).norm());
+                }
+            }
+            if found.distance_m > 0.0 {
+                prop_assert!(sampled >= found.distance_m - 1e-9 && sampled < found.distance_m + 5.0, "{found:?}, {sampled}");
+            }
+        }
     }
 
     proptest! {

@@ -21,7 +21,7 @@ pub(crate) struct InvariantMonitor {
 }
 
 impl InvariantMonitor {
-    /// A monitor of bodies at their starts, with the least distance between bodies and that to obstacles, m.
+    /// A monitor of bodies at their starts, with the least distance between bodies and that to obstacles and the ground, m.
     pub(crate) fn new(bodies: &[Body], safe_distance_m: f64, clearance_m: f64) -> Self {
         Self {
             distances: DistanceMonitor::new(bodies, safe_distance_m, clearance_m),

@@ -8,10 +8,11 @@ use crate::mcap::foxglove::{
 };
 use crate::palette::GROUP_COLOURS;
 use crate::scene::{Sample, State, rounded};
+use skein_protocol::shape::ConvexShape;
 use std::collections::BTreeMap;
 
-/// Height at which drones are drawn, m: above obstacles and zones, which are on the ground.
-const ALTITUDE_M: f64 = 2.0;
+/// How far above its place a drone is drawn, m: above its slot and its danger zone.
+const LIFT_M: f64 = 2.0;
 /// Length of the arrow of a drone, m.
 const ARROW_LENGTH_M: f64 = 7.0;
 /// Width of the arrow of a drone, m.
@@ -41,11 +42,9 @@ fn line(kind: u8, points: Vec<Vector3>, color: Color, thickness: f64) -> LinePri
 pub(super) fn static_scene(facts: &RunFacts) -> SceneUpdate {
     let mut obstacles = SceneEntity::new("obstacles", Time::default());
     for shape in &facts.obstacles {
-        let points: Vec<Vector3> = outline(shape).into_iter().map(|(x, y)| point([x, y], 0.0)).collect();
-        let indices = (1..points.len().saturating_sub(1) as u32).flat_map(|i| [0, i, i + 1]).collect();
-        let pose = Pose::new(0.0, 0.0, 0.0, 0.0);
-        let color = colour(GREY, 1.0);
-        obstacles.triangles.push(TriangleListPrimitive { pose, points, color, colors: Vec::new(), indices });
+        // An obstacle without a floor stands on the ground. One without a top is drawn as its footprint.
+        obstacles.triangles.push(face(shape, shape.floor_m.max(0.0)));
+        obstacles.triangles.extend(shape.top_m.is_finite().then(|| face(shape, shape.top_m)));
     }
     let (mut hulls, mut routes) =
         (SceneEntity::new("hulls", Time::default()), SceneEntity::new("routes", Time::default()));
@@ -57,6 +56,14 @@ pub(super) fn static_scene(facts: &RunFacts) -> SceneUpdate {
         routes.lines.extend(polylines);
     }
     SceneUpdate { deletions: Vec::new(), entities: vec![obstacles, hulls, routes] }
+}
+
+/// The outline of an obstacle, filled, at this altitude.
+fn face(shape: &ConvexShape, z_m: f64) -> TriangleListPrimitive {
+    let points: Vec<Vector3> = outline(shape).into_iter().map(|(x, y)| point([x, y], z_m)).collect();
+    let indices = (1..points.len().saturating_sub(1) as u32).flat_map(|i| [0, i, i + 1]).collect();
+    let pose = Pose::new(0.0, 0.0, 0.0, 0.0);
+    TriangleListPrimitive { pose, points, color: colour(GREY, 1.0), colors: Vec::new(), indices }
 }
 
 /// Assigns a colour to each group, in the order in which groups appear.
@@ -114,8 +121,8 @@ impl Drones {
 }
 
 /// Position of a drone, m.
-fn position(state: &State, drone: usize) -> [f64; 2] {
-    [state.x_m[drone], state.y_m[drone]]
+fn position(state: &State, drone: usize) -> Vector3 {
+    Vector3 { x: state.x_m[drone], y: state.y_m[drone], z: state.z_m[drone] }
 }
 
 /// The numbers of the living drones.
@@ -131,7 +138,7 @@ fn arrow(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneE
     entity.frame_id = format!("drone_{drone}");
     entity.frame_locked = true;
     entity.arrows.push(ArrowPrimitive {
-        pose: Pose::new(0.0, 0.0, ALTITUDE_M, 0.0),
+        pose: Pose::new(0.0, 0.0, LIFT_M, 0.0),
         shaft_length: ARROW_LENGTH_M / 2.0,
         shaft_diameter: ARROW_WIDTH_M / 2.0,
         head_length: ARROW_LENGTH_M / 2.0,
@@ -140,7 +147,7 @@ fn arrow(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneE
     });
     let leads = state.leads[drone].as_ref().map_or(String::new(), |group| format!(" leads {group}"));
     entity.texts.push(TextPrimitive {
-        pose: Pose::new(0.0, 5.0, ALTITUDE_M, 0.0),
+        pose: Pose::new(0.0, 5.0, LIFT_M, 0.0),
         billboard: true,
         font_size: 12.0,
         scale_invariant: true,
@@ -150,10 +157,16 @@ fn arrow(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneE
     entity
 }
 
-/// A flat disc on the ground.
-fn disc([x, y]: [f64; 2], radius_m: f64, color: Color) -> CylinderPrimitive {
+/// A flat disc at the altitude of its centre.
+fn disc(centre: Vector3, radius_m: f64, color: Color) -> CylinderPrimitive {
     let size = Vector3 { x: rounded(2.0 * radius_m), y: rounded(2.0 * radius_m), z: 0.05 };
-    CylinderPrimitive { pose: Pose::new(x, y, 0.0, 0.0), size, bottom_scale: 1.0, top_scale: 1.0, color }
+    CylinderPrimitive {
+        pose: Pose::new(centre.x, centre.y, centre.z, 0.0),
+        size,
+        bottom_scale: 1.0,
+        top_scale: 1.0,
+        color,
+    }
 }
 
 fn zones(facts: &RunFacts, state: &State, at: Time) -> SceneEntity {
@@ -167,8 +180,14 @@ fn zones(facts: &RunFacts, state: &State, at: Time) -> SceneEntity {
 
 fn slots(state: &State, at: Time) -> SceneEntity {
     let mut entity = SceneEntity::new("slots", at);
-    entity.cylinders.extend(state.slot_m.iter().flatten().map(|&slot| disc(slot, 1.5, colour(BLUE, 0.5))));
+    let slots = state.slot_m.iter().zip(&state.z_m).filter_map(|(slot, &z)| Some(point((*slot)?, z)));
+    entity.cylinders.extend(slots.map(|slot| disc(slot, 1.5, colour(BLUE, 0.5))));
     entity
+}
+
+/// Where the body of a drone at this place is drawn.
+fn lifted(place: Vector3) -> Vector3 {
+    Vector3 { z: place.z + LIFT_M, ..place }
 }
 
 /// Lines from each leader to its followers, and red lines for frames that were dropped although the receiver was in
@@ -179,7 +198,7 @@ fn links(sample: &Sample, at: Time) -> SceneEntity {
     for drone in living(state) {
         let leader = state.leader[drone].map(|leader| leader as usize);
         if let Some(leader) = leader.filter(|&leader| leader != drone && leader < state.x_m.len()) {
-            followed.extend([position(state, leader), position(state, drone)].map(|end| point(end, ALTITUDE_M)));
+            followed.extend([position(state, leader), position(state, drone)].map(lifted));
         }
     }
     let mut dropped_frames = Vec::new();
@@ -187,7 +206,7 @@ fn links(sample: &Sample, at: Time) -> SceneEntity {
         let dropped = frame.deliveries.chars().enumerate().filter(|(_, delivery)| !['h', '-', 'r'].contains(delivery));
         for (receiver, _) in dropped.filter(|&(receiver, _)| receiver < state.x_m.len()) {
             let ends = [position(state, frame.source as usize), position(state, receiver)];
-            dropped_frames.extend(ends.map(|end| point(end, ALTITUDE_M)));
+            dropped_frames.extend(ends.map(lifted));
         }
     }
     let mut entity = SceneEntity::new("radio links", at);

@@ -292,7 +292,7 @@ fn transforms(state: &State, timestamp: Time) -> FrameTransforms {
         timestamp,
         parent_frame_id: WORLD.to_owned(),
         child_frame_id: format!("drone_{drone}"),
-        translation: Vector3 { x: state.x_m[drone], y: state.y_m[drone], z: 0.0 },
+        translation: Vector3 { x: state.x_m[drone], y: state.y_m[drone], z: state.z_m[drone] },
         rotation: Quaternion::yaw(heading(state, drone)),
     };
     FrameTransforms { transforms: (0..state.x_m.len()).map(transform).collect() }

@@ -81,6 +81,7 @@ class Panels {
     const speed = Math.hypot(moment.vx[i], moment.vy[i]);
     row("state", state.alive[i] ? (state.late[i] ? "alive, late" : "alive") : "dead");
     row("position", `${moment.x[i].toFixed(1)}, ${moment.y[i].toFixed(1)} m`);
+    if (moment.z) row("altitude", `${moment.z[i].toFixed(1)} m${state.vz_mps[i] ? `, climbs at ${state.vz_mps[i].toFixed(2)} m/s` : ""}`);
     row("speed", `${speed.toFixed(2)} m/s`);
     row("group", state.group[i] + (state.leads[i] ? `, leads ${state.leads[i]}` : ""));
     row("obeys", state.leader[i] === null ? "no leader" : `drone ${state.leader[i]}, round ${state.plan[i][0]} epoch ${state.plan[i][1]}`);
@@ -97,7 +98,7 @@ class Panels {
   nearest(moment, i) {
     let least = Infinity, nearest = null;
     for (let k = 0; k < moment.x.length; k++) {
-      const d = Math.hypot(moment.x[k] - moment.x[i], moment.y[k] - moment.y[i]);
+      const d = Math.hypot(moment.x[k] - moment.x[i], moment.y[k] - moment.y[i], moment.z ? moment.z[k] - moment.z[i] : 0);
       if (k !== i && d < least) { least = d; nearest = k; }
     }
     return nearest === null ? "no other drone" : `drone ${nearest}, ${least.toFixed(1)} m`;

@@ -49,7 +49,7 @@ class Story {
     const share = span > 0 ? Math.min(Math.max((t - a.state.t_s) / span, 0), 1) : 0;
     const mix = (from, to) => share === 0 ? from : from.map((value, i) => value + (to[i] - value) * share);
     const [sa, sb] = [a.state, b.state];
-    const moment = { x: mix(sa.x_m, sb.x_m), y: mix(sa.y_m, sb.y_m), vx: mix(sa.vx_mps, sb.vx_mps), vy: mix(sa.vy_mps, sb.vy_mps),
+    const moment = { x: mix(sa.x_m, sb.x_m), y: mix(sa.y_m, sb.y_m), z: sa.z_m.length ? mix(sa.z_m, sb.z_m) : null, vx: mix(sa.vx_mps, sb.vx_mps), vy: mix(sa.vy_mps, sb.vy_mps),
       sample: a, place };
     if (trail && sa.x_m.length <= MANY) {
       const first = Math.max(this.before(t - TRAIL_S), 0);

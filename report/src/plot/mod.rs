@@ -227,11 +227,11 @@ mod tests {
     fn recorded(drones: u32, ticks: u32) -> (tempfile::TempDir, RunFolder) {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
+        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j\n".to_owned();
         for tick in 1..=ticks {
             let t_s = f64::from(tick) * 0.02;
             for drone in 0..drones {
-                writeln!(csv, "{t_s},{drone},{},{},10,0,N{},0,1", t_s * 10.0, drone * 40, drone + 1).unwrap();
+                writeln!(csv, "{t_s},{drone},{},{},10,0,50,0,N{},0,1", t_s * 10.0, drone * 40, drone + 1).unwrap();
             }
         }
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();

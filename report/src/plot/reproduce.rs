@@ -343,9 +343,9 @@ mod tests {
     fn snapshots_are_at_the_given_times_or_at_the_end() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n".to_owned();
+        let mut csv = "t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j\n".to_owned();
         for (t_s, y, group) in [(0.02, 10.0, "N"), (1.0, 40.0, "N1"), (2.0, 20.0, "N1")] {
-            writeln!(csv, "{t_s},0,{t_s},0,1,0,N,,0\n{t_s},1,{t_s},{y},1,0,{group},,0").unwrap();
+            writeln!(csv, "{t_s},0,{t_s},0,1,0,50,0,N,,0\n{t_s},1,{t_s},{y},1,0,50,0,{group},,0").unwrap();
         }
         std::fs::write(folder.path().join("trace.csv"), csv).unwrap();
         let found = Snapshots::read(&folder, &[0.0, 0.5, 9.0]).unwrap();

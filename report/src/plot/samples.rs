@@ -196,9 +196,9 @@ mod tests {
     fn a_dip_between_samples_is_kept_and_tracks_end_at_their_last_positions() {
         let root = tempfile::tempdir().unwrap();
         let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
-        let header = "t_s,drone,x_m,y_m,vx_mps,vy_mps,group,leader,energy_j\n";
+        let header = "t_s,drone,x_m,y_m,vx_mps,vy_mps,z_m,vz_mps,group,leader,energy_j\n";
         let line = |tick: u32, drone, x: f64, v: f64, group| {
-            format!("{},{drone},{x},0,{v},0,{group},,0\n", f64::from(tick) * 0.02)
+            format!("{},{drone},{x},0,{v},0,50,0,{group},,0\n", f64::from(tick) * 0.02)
         };
         let mut csv = header.to_owned();
         for tick in 1..=13 {

@@ -111,8 +111,10 @@ impl Observer {
         for (drone, row) in rows.iter().enumerate() {
             state.x_m.push(rounded(row.position_m[0]));
             state.y_m.push(rounded(row.position_m[1]));
+            state.z_m.push(rounded(row.position_m[2]));
             state.vx_mps.push(rounded(row.velocity_mps[0]));
             state.vy_mps.push(rounded(row.velocity_mps[1]));
+            state.vz_mps.push(rounded(row.velocity_mps[2]));
             state.alive.push(u8::from(row.alive()));
             state.group.push(row.group.to_string());
             state.leader.push(row.leader().map(|leader| leader.0));

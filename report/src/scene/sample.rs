@@ -28,10 +28,16 @@ pub struct State {
     pub x_m: Vec<f64>,
     /// Position to the left of the flight direction, m.
     pub y_m: Vec<f64>,
+    /// Height above the ground, m.
+    #[serde(default)]
+    pub z_m: Vec<f64>,
     /// Velocity along x, m/s.
     pub vx_mps: Vec<f64>,
     /// Velocity along y, m/s.
     pub vy_mps: Vec<f64>,
+    /// Vertical velocity, upward, m/s.
+    #[serde(default)]
+    pub vz_mps: Vec<f64>,
     /// 1 if the drone's process lives, else 0.
     pub alive: Vec<u8>,
     /// The drone's group, by lineage.

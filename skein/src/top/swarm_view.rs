@@ -120,7 +120,7 @@ fn separation(rows: &[DroneRow]) -> Option<f64> {
             if least.is_some_and(|least| along >= least) {
                 break;
             }
-            let distance = along.hypot(there[1] - here[1]);
+            let distance = along.hypot(there[1] - here[1]).hypot(there[2] - here[2]);
             least = Some(least.map_or(distance, |least| least.min(distance)));
         }
     }

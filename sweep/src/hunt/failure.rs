@@ -47,7 +47,7 @@ impl Failure {
         let danger = Danger::of(summary, scenario);
         let kind = |kind: ViolationKind| match kind {
             ViolationKind::Separation => FailureKind::Separation,
-            ViolationKind::Clearance => FailureKind::Clearance,
+            ViolationKind::Clearance | ViolationKind::Ground => FailureKind::Clearance,
             _ => FailureKind::Protocol,
         };
         if let Some(kind) = summary.violations.iter().map(|violation| kind(violation.kind)).min() {

@@ -82,7 +82,7 @@ fn shift(obstacle: &mut Obstacle, rng: &mut SplitMix64, by_m: f64) {
         | Obstacle::Ellipse { centre_m, .. } => {
             by_offset(centre_m);
         }
-        Obstacle::Polygon { vertices_m } => vertices_m.iter_mut().for_each(by_offset),
+        Obstacle::Polygon { vertices_m, .. } => vertices_m.iter_mut().for_each(by_offset),
     }
 }
 
@@ -95,7 +95,7 @@ fn resize(obstacle: &mut Obstacle, rng: &mut SplitMix64) {
             scale(&mut sizes_m[1], rng);
             *rotation_rad += rng.between(-0.2, 0.2);
         }
-        Obstacle::Polygon { vertices_m } => {
+        Obstacle::Polygon { vertices_m, .. } => {
             let count = vertices_m.len().max(1) as f64;
             let centre = vertices_m.iter().fold([0.0, 0.0], |c, v| [c[0] + v[0] / count, c[1] + v[1] / count]);
             let factor = rng.between(0.8, 1.25);

@@ -1,4 +1,4 @@
-//! Distances between bodies, and between bodies and obstacles, checked in every tick.
+//! Distances between bodies, and of bodies to obstacles and to the ground, checked in every tick.
 
 use crate::body::Body;
 use crate::event_log::EventLog;
@@ -22,6 +22,8 @@ pub(crate) struct DistanceMonitor {
     close_before: Vec<(u32, u32)>,
     /// Whether each drone is too close to an obstacle.
     grazing: Vec<bool>,
+    /// Whether each drone is too close to the ground.
+    low: Vec<bool>,
 }
 
 impl DistanceMonitor {
@@ -35,6 +37,7 @@ impl DistanceMonitor {
             close: Vec::new(),
             close_before: Vec::new(),
             grazing: vec![false; bodies.len()],
+            low: vec![false; bodies.len()],
         }
     }
 
@@ -51,7 +54,9 @@ impl DistanceMonitor {
     /// Checks the sweep at the end of a tick. Returns the number of violations that begin. The sweep must have looked as
     /// far as both limits and both least distances: what is beyond changes nothing.
     pub(crate) fn check(&mut self, bodies: &[Body], sweep: &SensorSweep, end: SimTime, log: &mut EventLog) -> u64 {
-        self.check_separation(bodies, sweep, end, log) + self.check_clearance(sweep, end, log)
+        self.check_separation(bodies, sweep, end, log)
+            + self.check_clearance(sweep, end, log)
+            + self.check_ground(bodies, end, log)
     }
 
     fn check_separation(&mut self, bodies: &[Body], sweep: &SensorSweep, end: SimTime, log: &mut EventLog) -> u64 {
@@ -89,6 +94,20 @@ impl DistanceMonitor {
             if *grazing && !before {
                 violations += 1;
                 log.push_violation(end, ViolationKind::Clearance, &[DroneId(i as u32)], distance_m);
+            }
+        }
+        violations
+    }
+
+    /// A drone without a process may land.
+    fn check_ground(&mut self, bodies: &[Body], end: SimTime, log: &mut EventLog) -> u64 {
+        let mut violations = 0;
+        for (i, (body, low)) in bodies.iter().zip(&mut self.low).enumerate() {
+            let altitude_m = body.position().z;
+            let before = std::mem::replace(low, body.is_alive() && altitude_m < self.clearance_m - ROUNDING_M);
+            if *low && !before {
+                violations += 1;
+                log.push_violation(end, ViolationKind::Ground, &[DroneId(i as u32)], altitude_m);
             }
         }
         violations

@@ -333,3 +333,76 @@ fn the_grid_senses_and_checks_a_swarm_of_a_thousand() {
     assert!((world.min_separation_m() - 35.0).abs() < 1e-6);
     assert_eq!(world.violations(), 0);
 }
+
+/// A world of two drones at this altitude, 40 m apart, without obstacles.
+fn pair_at(altitude_m: f64) -> World {
+    let starts = [0.0, 40.0].map(|y| (Vec3::new(0.0, y, altitude_m), Vec3::new(10.0, 0.0, 0.0)));
+    World::new(params(), &starts, &[]).unwrap()
+}
+
+/// Flies this number of ticks; drone 1 accelerates upward at this rate, m/s².
+fn climb(world: &mut World, climb_mps2: f64, ticks: usize) -> Vec<RunEvent> {
+    let mut all = Vec::new();
+    for _ in 0..ticks {
+        world.take_slot(DroneId(0), &Slot::default());
+        world.take_slot(DroneId(1), &Slot { acceleration_mps2: [0.0, 0.0, climb_mps2], ..Slot::default() });
+        world.advance();
+        all.extend(events(world));
+    }
+    all
+}
+
+#[test]
+fn a_body_climbs_and_is_ranged_in_space() {
+    let mut world = pair_at(50.0);
+    climb(&mut world, 1.0, 200);
+    let rows = world.record().rows;
+    assert!(
+        (rows[1].position_m[2] - 58.0).abs() < 1e-9 && (rows[1].velocity_mps[2] - 4.0).abs() < 1e-9,
+        "{:?}",
+        rows[1]
+    );
+    assert_eq!(rows[0].position_m[2], 50.0);
+    assert!(rows[1].energy_j > rows[0].energy_j + 20.0 * 7.9, "8 m of height cost 160 J: {}", rows[1].energy_j);
+    let down = world.downlink().clone();
+    let near = down.view().senses(DroneId(0)).unwrap().neighbours[0];
+    assert!((near.position_m[2] - 8.0).abs() < 1e-9 && (near.velocity_mps[2] - 4.0).abs() < 1e-9, "{near:?}");
+    // Ranging reaches 66 m: 40 m beside and 52.5 m above.
+    climb(&mut world, 2.0, 280);
+    assert!(world.downlink().neighbours.is_empty());
+    assert_eq!(world.violations(), 0);
+}
+
+#[test]
+fn the_digest_contains_the_altitude() {
+    let digest = |altitude_m| {
+        let mut world = pair_at(altitude_m);
+        climb(&mut world, 0.0, 1);
+        world.digest()
+    };
+    assert_ne!(digest(50.0), digest(60.0));
+    assert_eq!(digest(50.0), digest(50.0));
+}
+
+#[test]
+fn a_drone_too_close_to_the_ground_is_a_violation_once() {
+    let mut world = pair_at(20.0);
+    let logged = climb(&mut world, -1.0, 200);
+    let violations: Vec<_> = event_kinds(logged);
+    let [EventKind::Violation { kind: ViolationKind::Ground, drones, value_m }] = violations.as_slice() else {
+        panic!("{violations:?}");
+    };
+    assert_eq!(drones, &[DroneId(1)]);
+    assert!((14.9..15.0).contains(value_m), "{value_m}");
+    assert_eq!(world.violations(), 1);
+}
+
+#[test]
+fn a_block_below_is_kept_clear_of_by_its_distance_in_space() {
+    let block = rectangle(60.0, 20.0, 10.0, 40.0).between(f64::NEG_INFINITY, 34.9).unwrap();
+    let starts = [0.0, 40.0].map(|y| (Vec3::new(0.0, y, 50.0), Vec3::new(10.0, 0.0, 0.0)));
+    let mut world = World::new(params(), &starts, &[block]).unwrap();
+    climb(&mut world, 0.0, 450);
+    assert!((world.min_clearance_m() - 15.1).abs() < 1e-9, "{}", world.min_clearance_m());
+    assert_eq!(world.violations(), 0);
+}
