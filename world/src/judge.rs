@@ -67,17 +67,16 @@ impl MissionJudge {
     /// Why the mission has reached its end; `None` if it has not.
     fn reached(&mut self, params: &WorldParams, state: &MissionState<'_>) -> Option<String> {
         let living = state.bodies.iter().any(Body::is_alive);
-        let (met, reason) = match params.end {
-            End::Time { duration_s } => {
-                let over = living && state.end >= SimTime::from_secs(duration_s);
-                (over, format!("the mission lasted its {duration_s} s"))
-            }
-            End::Pilots => (state.all_done, "all living drones say that they are done".to_owned()),
-            End::Hold { .. } | End::Goal { .. } => {
-                (self.condition.is_met(params, state.bodies, state.stages), "the end condition is met".to_owned())
-            }
+        let met = match params.end {
+            End::Time { duration_s } => living && state.end >= SimTime::from_secs(duration_s),
+            End::Pilots => state.all_done,
+            End::Hold { .. } | End::Goal { .. } => self.condition.is_met(params, state.bodies, state.stages),
         };
-        met.then_some(reason)
+        met.then(|| match params.end {
+            End::Time { duration_s } => format!("the mission lasted its {duration_s} s"),
+            End::Pilots => "all living drones say that they are done".to_owned(),
+            End::Hold { .. } | End::Goal { .. } => "the end condition is met".to_owned(),
+        })
     }
 }
 
