@@ -55,6 +55,18 @@ fn a_reaction_time_breaks_no_distance() {
     }
 }
 
+/// A member that nobody hears, or that hears nobody, once stood in the way of others or shut one out of the formation.
+#[test]
+fn a_silent_member_does_not_hold_up_the_forest() {
+    for (kind, seed) in [("mute", "7"), ("deaf", "15")] {
+        let fault = format!("{{ kind = \"{kind}\", on = \"queued\", after_s = 1, target = \"member\" }}");
+        let sets = [("seed", seed), ("formation.start_jitter_m", "1"), ("fault.0", &fault)];
+        let world = fly_to_the_end(&scenario("paper/forest", &sets), None);
+        assert_eq!(world.ended(), Some(Outcome::Reached), "{kind}");
+        assert_eq!(world.violations(), 0, "{kind}");
+    }
+}
+
 /// Four walls around the only drone.
 #[test]
 fn a_mission_without_a_way_is_stuck_at_once() {

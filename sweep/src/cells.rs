@@ -106,9 +106,9 @@ mod tests {
     use crate::experiment::{Axis, Experiment, Mission};
     use crate::random_scene::SceneBounds;
 
-    #[test]
-    fn times_are_averaged_over_reached_runs_and_distances_over_all() {
-        let experiment = Experiment {
+    /// Two values of one key, three seeds each.
+    fn experiment() -> Experiment {
+        Experiment {
             name: "e".to_owned(),
             scenarios: vec![Mission::Random],
             strategies: vec![],
@@ -117,7 +117,12 @@ mod tests {
             processes: false,
             metrics: vec![],
             bounds: SceneBounds::default(),
-        };
+        }
+    }
+
+    #[test]
+    fn times_are_averaged_over_reached_runs_and_distances_over_all() {
+        let experiment = experiment();
         let grid = Grid::new(&experiment, &[]);
         let row = |job: usize, outcome: &str, time_s: f64, separation_m: f64| Row {
             metrics: METRICS
@@ -151,16 +156,7 @@ mod tests {
 
     #[test]
     fn runs_with_equal_digests_give_no_interval() {
-        let experiment = Experiment {
-            name: "e".to_owned(),
-            scenarios: vec![Mission::Random],
-            strategies: vec![],
-            seeds: vec![1, 2, 3],
-            grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
-            processes: false,
-            metrics: vec![],
-            bounds: SceneBounds::default(),
-        };
+        let experiment = experiment();
         let grid = Grid::new(&experiment, &[]);
         let row = |job: usize, digest: &str| Row {
             metrics: METRICS.iter().map(|_| Some(50.0)).collect(),
