@@ -6,6 +6,7 @@ mod support;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
+use support::data_page::documented;
 use support::{Place, assert_near, names};
 
 /// The published numbers and the tolerance of each, relative or absolute.
@@ -80,6 +81,18 @@ fn the_published_numbers_are_met_and_the_report_is_complete() {
     report(&place);
     commands(&place, &rows);
     folders(&place);
+    tables(&place, &rows);
+}
+
+/// docs/data.md has the columns of the tables and the keys of the rows.
+fn tables(place: &Place, rows: &BTreeMap<String, Value>) {
+    for table in ["results.csv", "gain.csv"] {
+        let text = fs::read_to_string(place.join("paper").join(table)).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        assert_eq!(header, documented(table), "{table}");
+    }
+    let keys: Vec<&String> = rows.values().next().unwrap().as_object().unwrap().keys().collect();
+    assert_eq!(keys, documented("reproduction.json").iter().collect::<Vec<_>>());
 }
 
 fn numbers(rows: &BTreeMap<String, Value>) {

@@ -36,7 +36,7 @@ unsafe impl ZeroCopySend for DownWord {
 // SAFETY: a `repr(transparent)` integer: it has no pointers, and the same layout in every process.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
-        "skein.record.v4"
+        "skein.record.v5"
     }
 }
 

@@ -55,6 +55,9 @@ pub struct DroneRow {
     pub position_m: [f64; 3],
     /// True velocity, world frame, m/s.
     pub velocity_mps: [f64; 3],
+    /// Acceleration that the pilot commanded in this tick, world frame, m/s². NaN if no command was carried out, because the
+    /// drone was dead, frozen or late.
+    pub commanded_mps2: [f64; 3],
     /// Energy used since the start of the mission, J.
     pub energy_j: f64,
     /// The plan that the drone obeys.

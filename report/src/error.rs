@@ -1,5 +1,6 @@
 //! What can go wrong with a run's record and folder.
 
+use crate::table::TableError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -26,6 +27,17 @@ pub enum ReportError {
         /// Its owner.
         owner: u32,
     },
+    /// The recording of a large swarm does not list its frames.
+    #[error("the frames of {drones} drones are not recorded; expected a run of at most {most} drones")]
+    NotListed {
+        /// Number of drones.
+        drones: u32,
+        /// Largest number of drones whose frames are recorded.
+        most: usize,
+    },
+    /// Parquet is wanted from a program that cannot write it.
+    #[error(transparent)]
+    NoParquet(TableError),
     /// A signal came in while files were written.
     #[error("interrupted while the files of the run were written")]
     Interrupted,
@@ -69,8 +81,11 @@ impl ReportError {
     /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        use ReportError::{Content, Exists, Foreign, InUse, NoSummary, NotARun};
-        matches!(self, Exists(_) | NotARun(_) | NoSummary(_) | InUse(_) | Foreign { .. } | Content { .. })
+        match self {
+            Self::Exists(_) | Self::NotARun(_) | Self::NoSummary(_) | Self::InUse(_) | Self::NoParquet(_) => true,
+            Self::Foreign { .. } | Self::Content { .. } | Self::NotListed { .. } => true,
+            Self::Interrupted | Self::Io { .. } | Self::Recording { .. } | Self::Plot { .. } => false,
+        }
     }
 
     /// For `map_err`: an I/O error at `path`.

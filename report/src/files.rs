@@ -8,8 +8,14 @@ pub(crate) const PROCESSES: &str = "processes.json";
 pub(crate) const SUMMARY: &str = "summary.json";
 /// The events of the run, one JSON object per line.
 pub(crate) const EVENTS: &str = "events.jsonl";
-/// State of each living drone in each tick.
+/// State of each drone in each tick.
 pub(crate) const TRACE: &str = "trace.csv";
+/// The same as Parquet.
+pub(crate) const TRACE_PARQUET: &str = "trace.parquet";
+/// The messages, a row for each frame and receiver.
+pub(crate) const MESSAGES: &str = "messages.csv";
+/// The same as Parquet.
+pub(crate) const MESSAGES_PARQUET: &str = "messages.parquet";
 /// Deviation of the swarm from its target shape over time.
 pub(crate) const FORMATION: &str = "formation.csv";
 /// The recording for Foxglove and other readers of MCAP.
@@ -22,7 +28,20 @@ pub(crate) const SPOOL: &str = "flight.spool";
 pub(crate) const PLOTS: &str = "plots";
 
 /// All files that a run leaves in its folder, except for its plots.
-pub(crate) const ALL: [&str; 9] = [MANIFEST, PROCESSES, SUMMARY, EVENTS, TRACE, FORMATION, RECORDING, PAGE, SPOOL];
+pub(crate) const ALL: [&str; 12] = [
+    MANIFEST,
+    PROCESSES,
+    SUMMARY,
+    EVENTS,
+    TRACE,
+    TRACE_PARQUET,
+    MESSAGES,
+    MESSAGES_PARQUET,
+    FORMATION,
+    RECORDING,
+    PAGE,
+    SPOOL,
+];
 
 /// Names of the plots in a run's `plots` folder, in this order: tracks, least separation, speed, distance between
 /// drones, energy, slot error, leaders, messages, animated flight, distance from the target shape, bending energy.

@@ -59,6 +59,7 @@
 mod accumulate;
 mod close;
 mod completion;
+mod data_files;
 pub mod deviation;
 mod energy;
 mod error;
@@ -73,6 +74,7 @@ mod json_text;
 mod leading;
 mod markup;
 mod mcap;
+mod messages;
 mod metrics;
 mod own_metrics;
 pub mod page;
@@ -89,6 +91,7 @@ mod spool;
 mod stages;
 mod steps;
 mod summary;
+pub mod table;
 #[cfg(test)]
 mod testing;
 pub mod text;
@@ -98,6 +101,7 @@ mod vicinity;
 mod work_folder;
 
 pub use completion::RunCompletion;
+pub use data_files::DataFiles;
 pub use error::{DrawError, ReportError};
 pub use facts::{MissionEnd, RunFacts};
 pub use flight_record::FlightRecord;

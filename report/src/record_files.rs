@@ -19,7 +19,8 @@ const BUFFER_BYTES: usize = 1 << 18;
 /// The files while they are written. They get their names once they are complete; otherwise they are removed.
 pub(crate) struct RecordFiles {
     folder: WorkFolder,
-    trace: TraceWriter<BufWriter<File>>,
+    /// `None` once it is complete.
+    trace: Option<TraceWriter<BufWriter<File>>>,
     events: BufWriter<File>,
     mcap: McapWriter<BufWriter<File>>,
     last_tick: Option<u64>,
@@ -35,7 +36,7 @@ impl RecordFiles {
         let begin = |name: &str| Ok(BufWriter::with_capacity(BUFFER_BYTES, folder.begin(name)?));
         let path = |name: &str| folder.path().join(name);
         Ok(Self {
-            trace: TraceWriter::new(begin(TRACE)?, metrics).map_err(ReportError::io(&path(TRACE)))?,
+            trace: Some(TraceWriter::new(begin(TRACE)?, metrics).map_err(ReportError::io(&path(TRACE)))?),
             events: begin(EVENTS)?,
             mcap: McapWriter::new(begin(RECORDING)?, path(RECORDING), &manifest.facts, &manifest.scenario)?,
             last_tick: None,
@@ -49,8 +50,9 @@ impl RecordFiles {
         // The last record of a run repeats the rows of the record before it.
         if self.last_tick.is_none_or(|last| record.head.tick > last) {
             self.last_tick = Some(record.head.tick);
-            let written = self.trace.tick(record.head.now.secs(), record.rows, record.telemetry);
-            written.map_err(ReportError::io(&self.path(TRACE)))?;
+            let written =
+                self.trace.as_mut().map(|trace| trace.tick(record.head.now.secs(), record.rows, record.telemetry));
+            written.transpose().map_err(ReportError::io(&self.path(TRACE)))?;
         }
         if record.events.is_empty() {
             return Ok(());
@@ -62,7 +64,8 @@ impl RecordFiles {
 
     /// Completes the files and gives them their names.
     pub(crate) fn keep(mut self) -> Result<(), ReportError> {
-        self.trace.flush().map_err(ReportError::io(&self.path(TRACE)))?;
+        let trace = self.trace.take().map(TraceWriter::finish);
+        trace.transpose().map_err(ReportError::io(&self.path(TRACE)))?;
         self.events.flush().map_err(ReportError::io(&self.path(EVENTS)))?;
         self.mcap.finish()?;
         [TRACE, EVENTS, RECORDING].iter().try_for_each(|name| self.folder.keep(name))

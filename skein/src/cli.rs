@@ -5,6 +5,7 @@ use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value, seconds};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use skein_runtime::Clock;
+use std::num::NonZero;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -145,10 +146,29 @@ pub(crate) struct CheckArgs {
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  skein report runs/s2-right-1")]
+#[command(after_help = "Examples:
+  skein report runs/s2-right-1
+  skein report runs/s2-right-1 --messages --parquet")]
 pub(crate) struct ReportArgs {
     /// Folder of a recorded run
     pub(crate) run_dir: PathBuf,
+    /// Write messages.csv as well: a row for each frame and receiver
+    #[arg(long)]
+    pub(crate) messages: bool,
+    /// The tables.
+    #[command(flatten)]
+    pub(crate) tables: TableArgs,
+}
+
+/// How the tables of a run are written.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct TableArgs {
+    /// Leave only every N-th tick in trace.csv, and the last one; plots show all ticks that are there
+    #[arg(long, value_name = "N")]
+    pub(crate) every: Option<NonZero<u64>>,
+    /// Write the tables as Parquet as well
+    #[arg(long)]
+    pub(crate) parquet: bool,
 }
 
 /// Arguments of `run`.
@@ -181,8 +201,11 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub(crate) quiet: bool,
     /// Write no trace, events, recording, plots or report
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["every", "parquet"])]
     pub(crate) no_record: bool,
+    /// The tables.
+    #[command(flatten)]
+    pub(crate) tables: TableArgs,
     /// Pin each process to one core
     #[arg(long, value_enum, default_value_t)]
     pub(crate) pin: PinChoice,

@@ -1,13 +1,13 @@
 //! `skein report`: writes report.html and the plots of a recorded run, and prints its summary. A run that was killed first
 //! gets its other files from its record.
 
-use crate::cli::ReportArgs;
+use crate::cli::{ReportArgs, TableArgs};
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output;
 use crate::run_folder;
 use skein_report::ReportError::{self, Content, NoSummary};
-use skein_report::{FlightRecord, Interrupted, Manifest, RunFolder, Summary, page, text};
+use skein_report::{DataFiles, FlightRecord, Interrupted, Manifest, RunFolder, Summary, page, text};
 use std::path::PathBuf;
 
 /// Writes the files of the run again, and prints the summary.
@@ -16,7 +16,10 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     let folder = run_folder::open(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let stop = || interrupt.signal().is_some();
-    match write(&folder, &manifest, &Interrupted::when(&stop)) {
+    let TableArgs { every, parquet } = args.tables;
+    let data = DataFiles { every, parquet, messages: args.messages };
+    data.check(&manifest.facts).map_err(Failure::report)?;
+    match write(&folder, &manifest, &data, &Interrupted::when(&stop)) {
         Ok((summary, written)) => print(&summary, &written).map(|_| Exit::Reached),
         Err(ReportError::Interrupted) => Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default())),
         Err(error) => Err(Failure::report(error)),
@@ -27,6 +30,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
 fn write(
     folder: &RunFolder,
     manifest: &Manifest,
+    data: &DataFiles,
     interrupted: &Interrupted<'_>,
 ) -> Result<(Summary, Vec<PathBuf>), ReportError> {
     let record = FlightRecord::left_in(folder)?;
@@ -41,7 +45,8 @@ fn write(
     if let Some(record) = &record {
         record.write_files(manifest, interrupted)?;
     }
-    let written = page::write(folder, manifest, &summary, interrupted)?;
+    let mut written = page::write(folder, manifest, &summary, interrupted)?;
+    written.extend(data.write(folder, &manifest.facts, interrupted)?);
     record.map_or(Ok(()), FlightRecord::remove)?;
     Ok((summary, written))
 }

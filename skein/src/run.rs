@@ -1,6 +1,6 @@
 //! `skein run`: flies one mission.
 
-use crate::cli::RunArgs;
+use crate::cli::{RunArgs, TableArgs};
 use crate::complaint::complain;
 use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
@@ -12,8 +12,8 @@ use crate::progress::MissionBar;
 use rustix::process::Signal;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{
-    FlightRecord, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary, Role, RunCompletion,
-    RunFacts, RunFolder, Summary, page, text,
+    DataFiles, FlightRecord, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary, Role,
+    RunCompletion, RunFacts, RunFolder, Summary, page, text,
 };
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
@@ -44,6 +44,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     };
     let mut facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
     facts.pilots = pilots.entries(&scenario).map_err(Failure::usage)?;
+    data_files(args).check(&facts).map_err(Failure::report)?;
     if !args.quiet {
         for warning in advice::warnings(&scenario).map_err(Failure::usage)? {
             complain(format!("warning: {warning}"));
@@ -84,7 +85,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     trouble.extend(reserved.write(&summary).err().map(|error| error.to_string()));
     trouble.extend(print(args, &summary, &folder).err().map(|failure| failure.to_string()));
     let stop = || late_signal.or(interrupt.signal());
-    let written = record.map_or(Ok(()), |record| write_files(&folder, &manifest, &summary, record, &stop));
+    let written = record.map_or(Ok(()), |record| write_files(args, &folder, &manifest, &summary, record, &stop));
     summary.report_s = Some(reporting.elapsed().as_secs_f64());
     let written = written.and_then(|()| folder.write_summary(&summary));
     let stopped = matches!(written, Err(ReportError::Interrupted)).then(stop).flatten();
@@ -164,8 +165,15 @@ fn manifest(facts: &RunFacts, scenario: &Scenario) -> Result<Manifest, Failure> 
     Ok(Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit))
 }
 
+/// Which data files are wanted.
+fn data_files(args: &RunArgs) -> DataFiles {
+    let TableArgs { every, parquet } = args.tables;
+    DataFiles { every, parquet, messages: false }
+}
+
 /// Writes everything that is made from the record, and removes the record once all is written.
 fn write_files(
+    args: &RunArgs,
     folder: &RunFolder,
     manifest: &Manifest,
     summary: &Summary,
@@ -176,6 +184,7 @@ fn write_files(
     let interrupted = Interrupted::when(&stop);
     record.write_files(manifest, &interrupted)?;
     page::write(folder, manifest, summary, &interrupted)?;
+    data_files(args).write(folder, &manifest.facts, &interrupted)?;
     record.remove()
 }
 

@@ -8,6 +8,7 @@ use crate::options::{ArgumentError, key_value};
 use crate::output;
 use crate::progress::RunsBar;
 use clap::Args;
+use skein_report::table::check_parquet;
 use skein_runtime::PilotRegistry;
 use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,9 @@ pub(crate) struct SweepArgs {
     /// Override a scenario key in every run, such as radio.range_m=200; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
+    /// Write the table of runs as Parquet as well: runs.parquet
+    #[arg(long)]
+    pub(crate) parquet: bool,
     /// Print summary.json as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
@@ -90,6 +94,9 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
 /// Flies the runs of an experiment that are not done yet, and prints the results once all are done.
 pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     check_experiment(&args.experiment)?;
+    if args.parquet {
+        check_parquet().map_err(Failure::usage)?;
+    }
     let experiment = Experiment::read(&args.experiment).map_err(Failure::usage)?;
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;
@@ -97,6 +104,7 @@ pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
     let folder = args.out.clone().unwrap_or_else(|| Path::new("sweeps").join(&experiment.name));
     let mut bar = RunsBar::new(args.quiet || args.json);
     let mut sweep = Sweep::new(&grid, pilots).interrupted(&interrupted).progress(|progress| bar.show(progress));
+    sweep = sweep.parquet(args.parquet);
     if let Some(jobs) = args.jobs {
         sweep = sweep.workers(jobs);
     }

@@ -1,5 +1,6 @@
 //! What can go wrong in a sweep.
 
+use skein_report::table::TableError;
 use skein_report::{DrawError, ReportError};
 use skein_runtime::{PilotProblem, RuntimeError};
 use skein_scenario::{ScenarioErrors, StrategyError};
@@ -55,6 +56,9 @@ pub enum SweepError {
         /// Runs of the experiment.
         runs: usize,
     },
+    /// The table of runs cannot be converted.
+    #[error("runs.parquet: {0}")]
+    Table(#[from] TableError),
     /// A plot cannot be drawn.
     #[error("{name}: {source}")]
     Plot {

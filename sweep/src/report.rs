@@ -9,6 +9,11 @@ use crate::plots::{Plot, plots};
 use crate::row::{Row, write_csv};
 use crate::table::table;
 use serde_json::{Value, json};
+use skein_report::table::{ColumnKind, csv_to_parquet, inferred};
+
+/// Columns of runs.csv that are texts, even if they look like numbers.
+const TEXTS: [&str; 8] =
+    ["scenario", "strategy", "outcome", "pass_times_s", "splits_left_to_right", "digest", "reason", "command"];
 
 /// The results of a complete sweep.
 #[derive(Debug)]
@@ -64,6 +69,18 @@ impl<'a> SweepReport<'a> {
         // Writing to memory cannot fail.
         let _ = write_csv(&mut csv, self.grid, &self.rows);
         csv
+    }
+
+    /// The content of runs.parquet: the columns of runs.csv. A column is of numbers if each of its fields that is not empty is
+    /// one.
+    ///
+    /// # Errors
+    /// [`SweepError::Table`].
+    pub fn parquet(&self) -> Result<Vec<u8>, SweepError> {
+        let csv = self.csv();
+        let numbers = inferred(&csv);
+        let kind = |name: &str| if TEXTS.contains(&name) { ColumnKind::Text } else { numbers(name) };
+        Ok(csv_to_parquet(&csv[..], Vec::new(), kind)?)
     }
 
     /// The content of ratios.csv; `None` if there are no energy ratios.

@@ -3,6 +3,7 @@
 use crate::grid::Grid;
 use crate::metrics::METRICS;
 use serde::{Deserialize, Serialize};
+use skein_report::table::quoted;
 use skein_report::text::split;
 use skein_report::{Summary, Violation};
 use skein_scenario::Scenario;
@@ -111,10 +112,7 @@ fn fields(grid: &Grid<'_>, row: &Row) -> Vec<String> {
 }
 
 fn line(out: &mut impl Write, fields: impl Iterator<Item = String>) -> std::io::Result<()> {
-    let quoted = |field: String| {
-        if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field }
-    };
-    writeln!(out, "{}", fields.map(quoted).collect::<Vec<_>>().join(","))
+    writeln!(out, "{}", fields.map(|field| quoted(&field).into_owned()).collect::<Vec<_>>().join(","))
 }
 
 #[cfg(test)]

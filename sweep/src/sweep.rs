@@ -47,6 +47,7 @@ impl<'a> SweepEnd<'a> {
 pub struct Sweep<'g, 'c> {
     grid: &'g Grid<'g>,
     workers: usize,
+    parquet: bool,
     pilots: &'g PilotRegistry,
     interrupted: &'c Interrupted<'c>,
     progress: Box<dyn FnMut(Progress) + 'c>,
@@ -58,13 +59,19 @@ impl<'g, 'c> Sweep<'g, 'c> {
     #[must_use]
     pub fn new(grid: &'g Grid<'g>, pilots: &'g PilotRegistry) -> Self {
         let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        Self { grid, workers, pilots, interrupted: &|| None, progress: Box::new(|_| {}) }
+        Self { grid, workers, parquet: false, pilots, interrupted: &|| None, progress: Box::new(|_| {}) }
     }
 
     /// Flies this many runs side by side.
     #[must_use]
     pub fn workers(self, workers: usize) -> Self {
         Self { workers, ..self }
+    }
+
+    /// Writes the table of runs as Parquet as well.
+    #[must_use]
+    pub fn parquet(self, parquet: bool) -> Self {
+        Self { parquet, ..self }
     }
 
     /// Stops as soon as this returns the number of a signal.
@@ -90,8 +97,8 @@ impl<'g, 'c> Sweep<'g, 'c> {
         self.end(rows)
     }
 
-    /// Flies the runs that the folder does not hold yet. Once all are done, writes `runs.csv`, `summary.json` and the
-    /// plots. The folder is made if it does not exist.
+    /// Flies the runs that the folder does not hold yet. Once all are done, writes `runs.csv`, `summary.json`, the plots, and
+    /// `runs.parquet` if it is wanted. The folder is made if it does not exist.
     ///
     /// # Errors
     /// [`SweepError`]. If it is a usage error, nothing was flown.
@@ -109,6 +116,9 @@ impl<'g, 'c> Sweep<'g, 'c> {
         let end = self.end(rows)?;
         if let SweepEnd::Complete(report) = &end {
             write(store.folder(), report)?;
+            if self.parquet {
+                store.folder().write("runs.parquet", &report.parquet()?)?;
+            }
         }
         Ok(end)
     }

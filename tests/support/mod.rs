@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 pub(crate) mod browser;
+pub(crate) mod data_page;
 pub(crate) mod process;
 
 use process::{Role, is_alive, shared_files};

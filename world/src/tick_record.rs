@@ -85,7 +85,9 @@ fn row(body: &Body, process: &Process, link_faults: LinkFaults) -> DroneRow {
         | flag(process.is_late(), ROW_LATE)
         | flag(process.is_frozen(), ROW_FROZEN)
         | ROW_ALIVE;
+    let commands = body.is_alive() && !process.is_frozen() && !process.is_late();
     DroneRow {
+        commanded_mps2: if commands { slot.acceleration_mps2 } else { [f64::NAN; 3] },
         position_m: body.position().into(),
         velocity_mps: body.velocity().into(),
         energy_j: body.energy_j(),

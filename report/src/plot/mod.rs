@@ -133,7 +133,11 @@ fn separation(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
         title: format!("Least separation: {}", run(facts)),
         y_label: "distance between the two nearest drones (m)",
-        line_label: "least separation",
+        line_label: if samples.is_thinned {
+            "least separation, in the recorded ticks alone"
+        } else {
+            "least separation"
+        },
         band: without_deviation(samples.separation.samples().iter().copied()),
         level: Some(safe_distance(facts)),
     }

@@ -32,6 +32,8 @@ pub(super) struct Samples {
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
     pub end_s: f64,
+    /// Whether the trace was thinned: what happened between two of its ticks is not known.
+    pub is_thinned: bool,
     /// Samples from one point of a track to the next.
     pub(super) stride: usize,
     /// Samples so far.
@@ -63,6 +65,7 @@ impl Default for Samples {
             formation: Series::new(|(_, most), (_, other)| *most = most.max(other)),
             tracks: BTreeMap::new(),
             end_s: 0.0,
+            is_thinned: false,
             stride: 1,
             taken: 0,
         }
@@ -84,6 +87,7 @@ impl Samples {
         let (mut samples, mut sweep, mut period) = (Self::default(), Sweep::default(), None);
         let mut sampler = DeviationSampler::default();
         trace::read(folder, interrupted, |rows| {
+            samples.is_thinned |= samples.end_s > 0.0 && rows[0].t_s - samples.end_s > 1.5 * facts.dt_s;
             let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
             if let Some(deviation) = sampler.take(facts, rows[0].t_s, &positions) {
                 deviated(&deviation)?;

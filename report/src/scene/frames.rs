@@ -32,7 +32,7 @@ pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, 
 }
 
 /// Name of a drop reason.
-pub(super) fn reason(reason: DropReason) -> &'static str {
+pub(crate) fn reason(reason: DropReason) -> &'static str {
     static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| DropReason::ALL.iter().map(name).collect());
     &NAMES[reason as usize]
 }

@@ -10,6 +10,7 @@ mod sample;
 mod slots;
 
 pub use crate::scene_facts::{SceneFacts, SetOutline};
+pub(crate) use frames::reason as drop_reason_name;
 pub use frames::topic;
 pub use message_json::message_json;
 pub use observer::{MAX_LISTED_DRONES, Observer};
