@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::fs::{self, File};
 use std::os::unix::fs::{chown, symlink};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use support::process::signal;
 use support::{Place, json, names, number, paper};
@@ -218,6 +218,66 @@ fn a_full_stdout_is_a_failure_and_costs_no_file() {
         assert_eq!(done.status.code(), Some(3), "{args:?}: {done:?}");
         let done = place.command(args).stdout(full()).stderr(full()).output().unwrap();
         assert_eq!(done.status.code(), Some(3), "{args:?} without stderr: {done:?}");
+    }
+}
+
+/// Runs `script` with a shared memory of this size for itself; `$1` is the program, `$2` the scenario. `None`, with the reason
+/// printed, if this user may not have one.
+fn with_shared_memory(place: &Place, size: &str, script: &str) -> Option<Output> {
+    let mounted = format!("mount -t tmpfs -o size={size} skein /dev/shm || exit 99; {script}");
+    let words = ["-c", &mounted, "sh", env!("CARGO_BIN_EXE_skein"), &paper("s2-right")];
+    let run = Command::new("unshare")
+        .args(["--mount", "sh"])
+        .args(words)
+        .current_dir(place.join(""))
+        .env("XDG_RUNTIME_DIR", place.join("x"))
+        .output();
+    match run {
+        Ok(done) if done.status.code() != Some(99) && !done.stderr.starts_with(b"unshare:") => Some(done),
+        other => {
+            eprintln!("skipped: a shared memory of its own cannot be mounted: {other:?}");
+            None
+        }
+    }
+}
+
+#[test]
+fn a_run_that_does_not_fit_into_shared_memory_is_refused_with_both_numbers() {
+    let place = Place::new();
+    for size in ["100k", "2m"] {
+        let Some(done) = with_shared_memory(&place, size, "\"$1\" run \"$2\" --out out; echo $?; ls /dev/shm") else {
+            return;
+        };
+        assert_eq!(String::from_utf8_lossy(&done.stdout), "3\n", "{size}: {done:?}");
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(said.contains("shared memory") && said.contains("needed") && said.contains("free"), "{size}: {said}");
+        assert!(!place.join("out").exists(), "{size}: {said}");
+    }
+}
+
+/// A run that has started does not need another page.
+#[test]
+fn a_full_shared_memory_does_not_end_a_run_that_has_started() {
+    for clock in ["realtime:20", "lockstep"] {
+        let place = Place::new();
+        let script = format!(
+            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s=0.005 & \
+             while [ ! -e out/processes.json ]; do sleep 0.01; done; sleep 0.5; \
+             dd if=/dev/zero of=/dev/shm/others bs=4k 2>dd.txt; cp dd.txt filled.txt; \
+             \"$1\" topic echo senses --count 1 >observer.txt 2>&1; wait $!"
+        );
+        let Some(done) = with_shared_memory(&place, "64m", &script) else { return };
+        assert_eq!(done.status.code(), Some(0), "{clock}: {done:?}");
+        let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(
+            (&summary["outcome"], &summary["faults"]),
+            (&"reached".into(), &Value::Array(Vec::new())),
+            "{clock}"
+        );
+        let filled = fs::read_to_string(place.join("filled.txt")).unwrap();
+        assert!(filled.contains("No space left"), "{clock}: {filled}");
+        let observer = fs::read_to_string(place.join("observer.txt")).unwrap();
+        assert!(observer.contains("shared memory is full"), "{clock}: {observer}");
     }
 }
 

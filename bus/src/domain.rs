@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Where POSIX shared memory has its files.
-const SHARED_MEMORY: &str = "/dev/shm";
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 /// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher is alive.
 const LOCK: &str = "lock";
 /// Maximum number of attempts to make the root, which another process may remove at any time.
@@ -324,7 +324,7 @@ fn remove_run(path: &Path, prefix: &str) -> Result<usize, BusError> {
 }
 
 /// The files of this user in shared memory whose names begin with `prefix`.
-fn shared_files(prefix: &str) -> Result<Vec<PathBuf>, BusError> {
+pub(crate) fn shared_files(prefix: &str) -> Result<Vec<PathBuf>, BusError> {
     let shared = Path::new(SHARED_MEMORY);
     let uid = rustix::process::geteuid().as_raw();
     let mut files = Vec::new();

@@ -75,6 +75,16 @@ pub enum BusError {
         /// Name of the service.
         service: String,
     },
+    /// Shared memory is too full.
+    #[error(
+        "shared memory is full: {needed} more bytes are needed in /dev/shm, {free} are free; `skein clean` removes what dead runs left behind, `mount -o remount,size=` makes it larger"
+    )]
+    NoRoom {
+        /// Bytes that are needed beside those that the run has.
+        needed: u64,
+        /// Bytes that are free.
+        free: u64,
+    },
     /// The other side did not answer.
     #[error("no answer within {limit_s} s: {what}")]
     NoAnswer {

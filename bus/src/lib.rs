@@ -57,6 +57,7 @@ mod mission;
 pub mod payload;
 pub mod ports;
 mod process_request;
+mod room;
 mod segment;
 pub mod services;
 mod spec;

@@ -8,6 +8,7 @@
 
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame, Word};
+use crate::room::{Room, require};
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -17,6 +18,7 @@ use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use skein_protocol::Tick;
 use skein_protocol::frame::Frame;
+use std::cell::Cell;
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
@@ -38,6 +40,9 @@ pub enum RecordPolicy {
     /// Drops the sample and counts it, see [`RecordPublisher::dropped`]. For the wall clock.
     Drop,
 }
+
+/// Most bytes of a sample beside its elements.
+const SAMPLE_HEADER: usize = 128;
 
 /// An open service of `P` with the user header `H`.
 pub(crate) type Factory<P, H> = PortFactory<ipc::Service, [P], H>;
@@ -67,6 +72,36 @@ pub(crate) struct Sender<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + De
     pub(crate) port: Publisher<ipc::Service, [P], H>,
     pub(crate) service: String,
     pub(crate) health: Health,
+    pub(crate) segments: Segments,
+}
+
+/// The data segments of a publisher. iceoryx2 makes another one for a sample that is longer than all before.
+#[derive(Debug)]
+pub(crate) struct Segments {
+    room: Room,
+    /// Greatest number of elements in a sample of the newest segment.
+    longest: Cell<usize>,
+    /// Samples in a segment.
+    chunks: usize,
+}
+
+impl Segments {
+    pub(crate) fn new(room: Room, longest: usize, chunks: usize) -> Self {
+        Self { room, longest: Cell::new(longest), chunks }
+    }
+
+    /// Whether a sample of `len` elements of `P` needs another segment, for which there is room.
+    fn grow<P>(&self, len: usize) -> Result<bool, BusError> {
+        if len <= self.longest.get() {
+            return Ok(false);
+        }
+        let longest = len.next_power_of_two();
+        // Each sample has a header.
+        let sample = (longest * size_of::<P>() + SAMPLE_HEADER).next_power_of_two();
+        require((self.chunks * sample) as u64)?;
+        self.longest.set(longest);
+        Ok(true)
+    }
 }
 
 impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + Default> Sender<P, H> {
@@ -80,7 +115,11 @@ impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + Default> Sende
     /// Loans `len` elements, lets `fill` write them in place, and sends them. Returns the number of receivers.
     fn send(&self, header: H, len: usize, fill: impl FnOnce(&mut [MaybeUninit<P>])) -> Result<usize, BusError> {
         self.health.check(&self.service)?;
+        let grows = self.segments.grow::<P>(len)?;
         let mut sample = self.port.loan_slice_uninit(len).map_err(|error| self.refused(error))?;
+        if grows {
+            self.segments.room.reserve()?;
+        }
         *sample.user_header_mut() = header;
         fill(sample.payload_mut());
         // SAFETY: `P` is plain data without invalid values, and the memory is a mapped file, where every byte has a value.

@@ -5,8 +5,9 @@ use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame};
 use crate::ports::{
     DownlinkPublisher, DownlinkSubscriber, Factory, Health, Receiver, RecordPolicy, RecordPublisher, RecordSubscriber,
-    Sender, StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber, WatchPublisher,
+    Segments, Sender, StreamPublisher, StreamSubscriber, UplinkPublisher, UplinkSubscriber, WatchPublisher,
 };
+use crate::room::{Room, check_join};
 use iceoryx2::port::{BackpressureAction, BackpressureInfo, DegradationAction};
 use iceoryx2::prelude::{
     AllocationStrategy, BackpressureStrategy, CallbackProgression, LogLevel, Node, NodeBuilder, NodeName, NodeState,
@@ -14,10 +15,11 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use skein_protocol::downlink::{DownlinkHeader, SensesHeader};
+use skein_protocol::frame::AirFrame;
 use skein_protocol::record::{DroneRow, RecordHeader};
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Drones per uplink service. Receiving takes time quadratic in the number of a service's publishers.
 pub const SHARD_DRONES: usize = 32;
@@ -35,15 +37,18 @@ const RECORD_BUFFER: [usize; 2] = [64, 512];
 const RECORD_ROWS: usize = 8192;
 /// Samples that a subscriber can hold at a time.
 const BORROWED: usize = 2;
-/// Chunks of the downlink's data segment in addition to those in the buffers, which all hold the same newest samples. So
-/// many subscribers may have died or been frozen while each held an older sample. If more were needed, iceoryx2 0.10 would
-/// make a segment that is larger than its own counters cover, and panic. Its own worst case is gigabytes at 1000 drones.
-/// Services that do not overflow get that worst case, because their buffers hold different samples.
+/// Most chunks of an overflowing service's data segment in addition to those in the buffers, which all hold the same newest
+/// samples. So many subscribers may have died or been frozen while each held an older sample. If more were needed, iceoryx2
+/// 0.10 would make a segment that is larger than its own counters cover, and panic. Its own worst case is gigabytes at 1000
+/// drones. Services that do not overflow get that worst case, because their buffers hold different samples.
 const HELD_CHUNKS: usize = 120;
 /// Frames that fit into an uplink sample before its segment grows.
 const UPLINK_FRAMES: usize = 16;
 /// Space for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
 const DOWNLINK_ROOM: usize = 448;
+/// Frames of a tick that fit into the first segments of downlink and record: per drone, and the number of drones that counts. A run
+/// of a usual tick length then needs no other segment, for which there may be no room.
+const TICK_FRAMES: [usize; 2] = [4, 64];
 /// Maximum number of observers at a time.
 const OBSERVERS: usize = 8;
 
@@ -67,6 +72,7 @@ struct Limits {
 pub struct Services {
     node: Node<ipc::Service>,
     drones: usize,
+    room: Room,
     /// In the launcher: keeps all services open. A service exists as long as at least one process has it open.
     _kept: Option<Kept>,
 }
@@ -103,15 +109,25 @@ impl Services {
         };
         // iceoryx2 makes one of its files open to all users.
         domain.make_private()?;
-        Ok(Self { node, drones, _kept: Some(kept) })
+        Ok(Self { node, drones, room: Room::of(domain), _kept: Some(kept) })
     }
 
     /// Joins the run's services. For every process but the launcher. Each service is opened with its first port.
     ///
     /// # Errors
-    /// [`BusError::Service`].
+    /// [`BusError::NoRoom`], [`BusError::Service`].
     pub fn open(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
-        Ok(Self { node: node(domain, name)?, drones, _kept: None })
+        check_join()?;
+        Ok(Self { node: node(domain, name)?, drones, room: Room::of(domain), _kept: None })
+    }
+
+    /// Reserves all memory that the services have now. Before the first tick, when all ports are made, and after a port was added:
+    /// from then on, the run does not depend on what others do in /dev/shm.
+    ///
+    /// # Errors
+    /// [`BusError::NoRoom`]; then nothing is reserved. [`BusError::Io`].
+    pub fn reserve(&self) -> Result<(), BusError> {
+        self.room.reserve()
     }
 
     /// Sends senses and frames. For the world.
@@ -120,7 +136,7 @@ impl Services {
     /// [`BusError::Service`], [`BusError::Degraded`].
     pub fn downlink_publisher(&self) -> Result<DownlinkPublisher, BusError> {
         let drone = size_of::<SensesHeader>() + DOWNLINK_ROOM;
-        let room = (size_of::<DownlinkHeader>() + self.drones * drone) / size_of::<u64>();
+        let room = (size_of::<DownlinkHeader>() + self.drones * drone + self.frames_room()) / size_of::<u64>();
         Ok(StreamPublisher(self.sender(DOWNLINK, room, |_| BackpressureAction::DiscardData)?))
     }
 
@@ -188,9 +204,15 @@ impl Services {
         Ok(StreamSubscriber(self.receiver(WATCH)?))
     }
 
-    /// Number of words in a record with few frames.
+    /// Number of words in a record.
     fn record_room(&self) -> usize {
-        (size_of::<RecordHeader>() + self.drones * size_of::<DroneRow>() + 4096) / size_of::<u64>()
+        (size_of::<RecordHeader>() + self.drones * size_of::<DroneRow>() + self.frames_room()) / size_of::<u64>()
+    }
+
+    /// Space for the frames of a tick, bytes.
+    fn frames_room(&self) -> usize {
+        let [per_drone, drones] = TICK_FRAMES;
+        per_drone * self.drones.min(drones) * size_of::<AirFrame>()
     }
 
     /// Opens a service and makes a publisher. Its first segment has `room` elements per sample. `on_full` decides what to do
@@ -205,12 +227,20 @@ impl Services {
         let health = Health::default();
         let degraded = health.clone();
         let overflows = service.static_config().has_safe_overflow();
+        let buffer = service.static_config().subscriber_max_buffer_size();
+        let held = held_chunks(service.static_config().max_subscribers());
+        let chunks = Arc::new(AtomicUsize::new(0));
+        let counted = Arc::clone(&chunks);
         let builder = service
             .publisher_builder()
             .initial_max_slice_len(room)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .max_loaned_samples(1)
-            .override_sample_preallocation(move |worst| if overflows { worst.min(BUFFER + HELD_CHUNKS) } else { worst })
+            .override_sample_preallocation(move |worst| {
+                let chunks = if overflows { worst.min(buffer + held) } else { worst };
+                counted.store(chunks, Ordering::Relaxed);
+                chunks
+            })
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .set_backpressure_handler(on_full)
             .set_degradation_handler(move |_, _| {
@@ -219,7 +249,8 @@ impl Services {
             });
         let port = builder.create().map_err(failed("make a publisher of", name))?;
         health.check(name)?;
-        Ok(Sender { port, service: name.to_owned(), health })
+        let segments = Segments::new(self.room.clone(), room, chunks.load(Ordering::Relaxed));
+        Ok(Sender { port, service: name.to_owned(), health, segments })
     }
 
     /// Opens a service and makes a subscriber.
@@ -276,6 +307,11 @@ fn record_limits(drones: usize) -> Limits {
 
 fn watch_limits() -> Limits {
     Limits { publishers: 1, subscribers: OBSERVERS, nodes: OBSERVERS + 3, buffer: WATCH_BUFFER, overflow: true }
+}
+
+/// Chunks of an overflowing service that subscribers can hold in addition to those in their buffers, and the loaned one.
+fn held_chunks(subscribers: usize) -> usize {
+    (subscribers * BORROWED + 2).min(HELD_CHUNKS)
 }
 
 /// Decides what to do when the recorder's buffer is full.

@@ -57,7 +57,7 @@ struct Supervisor<'l, 's, 'd> {
     stopped_since: Option<Instant>,
     end: RunEnd,
     /// Keeps the services open for as long as the run lasts.
-    _services: Services,
+    services: Services,
 }
 
 impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
@@ -93,7 +93,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             looked: Instant::now(),
             stopped_since: None,
             end: RunEnd::default(),
-            _services: services,
+            services,
         })
     }
 
@@ -108,6 +108,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             return Ok(());
         }
         self.record.connect()?;
+        self.services.reserve()?;
         self.processes.push(ProcessInfo { role: ProcessRole::Launcher, id: None, pid: std::process::id() });
         self.processes.extend(self.children.list());
         (self.launch.on_ready)(&self.processes).map_err(RuntimeError::OnReady)?;

@@ -46,6 +46,8 @@ pub fn run(args: &ChildArgs, clock: Clock, patience: Duration) -> Result<(), Run
     if control.wait_go(|| true) {
         control.set_world_state(WorldState::Flying);
         server.connect()?;
+        // The connections are new, and the launcher has reserved everything else.
+        services.reserve()?;
         server.fly(clock, scenario.time.dt_s)?;
     }
     control.set_world_state(WorldState::Finished);

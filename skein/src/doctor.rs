@@ -21,8 +21,12 @@ pub(crate) struct DoctorArgs {
 /// Memory per drone without shared memory, bytes: 2.3 to 2.9 MiB in its own process (proportional set size) and 0.35 MiB in
 /// the world's, measured with 8, 64 and 200 drones by `skein bench runtime`.
 const DRONE_BYTES: u64 = 7 << 19;
-/// Shared memory per drone, bytes. Measured: 76 to 86 KiB.
-const DRONE_SHARED: u64 = 1 << 17;
+/// Shared memory that a run reserves, bytes: for the run, and for each drone. Measured in flight: 9.0 MiB for 8 drones, 45.0 MiB for
+/// 64 and 114.4 MiB for 200 (`df -B1 /dev/shm`).
+const RUN_SHARED: u64 = 4 << 20;
+const DRONE_SHARED: u64 = 700 << 10;
+/// What to do about too little shared memory.
+const SHARED_HINT: &str = "`skein clean`; mount -o remount,size=";
 /// Descriptors per drone in the world process, which has the most. Measured: 4.1.
 const DRONE_FILES: u64 = 5;
 /// Further descriptors of a process.
@@ -69,7 +73,14 @@ pub(crate) fn doctor(args: &DoctorArgs) -> Result<Exit, Failure> {
 /// Refuses a swarm that does not fit on this machine with `per_process` drones per process.
 pub(crate) fn check_room(drones: u32, per_process: u32) -> Result<(), Failure> {
     let pack = u64::from(per_process);
-    for (limit, pack) in [(files(), pack), (processes(), pack), (memory(), 1), (shared_memory()?, 1)] {
+    let (needed, [free, _]) = (RUN_SHARED + u64::from(drones) * DRONE_SHARED, shared_bytes()?);
+    if needed > free {
+        let why = format!(
+            "{drones} drones do not fit into shared memory: about {needed} bytes are needed in /dev/shm, {free} are free; see {SHARED_HINT}"
+        );
+        return Err(Failure::environment(why));
+    }
+    for (limit, pack) in [(files(), pack), (processes(), pack), (memory(), 1)] {
         let fits = limit.drones.unwrap_or(u64::MAX).saturating_mul(pack);
         if u64::from(drones) > fits {
             let Limit { name, has, hint, .. } = limit;
@@ -159,14 +170,19 @@ fn memory() -> Limit {
     }
 }
 
-fn shared_memory() -> Result<Limit, Failure> {
+/// Bytes of shared memory that are free, and all.
+fn shared_bytes() -> Result<[u64; 2], Failure> {
     let about = rustix::fs::statvfs("/dev/shm").map_err(|error| Failure::environment(format!("/dev/shm: {error}")))?;
-    let (free, all) = (about.f_bavail * about.f_frsize, about.f_blocks * about.f_frsize);
+    Ok([about.f_bavail, about.f_blocks].map(|blocks| blocks * about.f_frsize))
+}
+
+fn shared_memory() -> Result<Limit, Failure> {
+    let [free, all] = shared_bytes()?;
     Ok(Limit {
         name: "shared memory",
         has: format!("{} MiB free of {} MiB in /dev/shm", free >> 20, all >> 20),
-        drones: Some(free / DRONE_SHARED),
-        hint: "`skein clean`; mount -o remount,size=",
+        drones: Some(free.saturating_sub(RUN_SHARED) / DRONE_SHARED),
+        hint: SHARED_HINT,
     })
 }
 
