@@ -167,6 +167,7 @@ impl<'a> MessageRef<'a> {
         let finite = |values: &[f64], name| {
             if values.iter().all(|v| v.abs() <= MAX_ABS) { Ok(()) } else { Err(DecodeError::Field(name)) }
         };
+        let bounded_or_never = |value: f64, name| if value == f64::INFINITY { Ok(()) } else { finite(&[value], name) };
         let below = |value: u32, limit: u32, name| if value < limit { Ok(()) } else { Err(DecodeError::Field(name)) };
         let lineage = |group: GroupId| if group.is_lineage() { Ok(()) } else { Err(DecodeError::Field("group")) };
         let set_limit = payload::MAX_SET as u32 + 1;
@@ -190,8 +191,10 @@ impl<'a> MessageRef<'a> {
                 lineage(p.group)?;
                 finite(&p.anchor_m, "anchor")?;
                 finite(&p.anchor_mps, "anchor velocity")?;
-                if p.anchor_stop_x_m.is_nan() {
-                    return Err(DecodeError::Field("anchor stop"));
+                bounded_or_never(p.anchor_stop_x_m, "anchor stop")?;
+                // A plan that predicts nothing has no number there.
+                if !p.predicted_s.is_nan() {
+                    finite(&[p.predicted_s], "prediction")?;
                 }
                 known(Phase::from_wire(p.phase))?;
                 below(p.set_count, set_limit, "obstacle count")
@@ -206,8 +209,7 @@ impl<'a> MessageRef<'a> {
                 lineage(a.group)?;
                 known(ArrivalsKind::from_wire(a.kind))?;
                 below(a.routes, payload::MAX_ROUTES as u32 + 1, "route count")?;
-                let invalid = |s: &f32| s.is_nan() || *s == f32::NEG_INFINITY;
-                if a.gate_s.iter().any(invalid) { Err(DecodeError::Field("arrival")) } else { Ok(()) }
+                a.gate_s.iter().try_for_each(|&gate_s| bounded_or_never(gate_s.into(), "arrival"))
             }
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
             // Checked when it is read: only the name has rules.
