@@ -2,7 +2,7 @@
 
 use crate::grid::Grid;
 use crate::metrics::{METRICS, SUCCESS};
-use crate::row::Row;
+use crate::row::{Row, own_names};
 use crate::statistics::{Estimate, mean, rate};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -25,6 +25,8 @@ pub struct Cell {
     pub success: Option<Estimate>,
     /// One mean for each of [`METRICS`]; `None` if no run has a value.
     pub metrics: Vec<Option<Estimate>>,
+    /// The mean of each figure that pilots reported, by its name, over all runs that have it.
+    pub metrics_own: BTreeMap<String, Estimate>,
 }
 
 impl Cell {
@@ -47,7 +49,7 @@ impl Cell {
         json!({
             "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
             "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
-            "equal_digests": self.equal > 0, "success": self.success, "metrics": metrics,
+            "equal_digests": self.equal > 0, "success": self.success, "metrics": metrics, "metrics_own": self.metrics_own,
         })
     }
 }
@@ -89,7 +91,12 @@ fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
         let values = rows.iter().filter(counts).filter_map(|row| row.metrics.get(i).copied().flatten());
         mean(&values.collect::<Vec<f64>>()).map(valid)
     };
+    let own = |name: &str| {
+        let values: Vec<f64> = rows.iter().filter_map(|row| row.metrics_own.get(name).copied()).collect();
+        Some((name.to_owned(), valid(mean(&values)?)))
+    };
     Cell {
+        metrics_own: own_names(rows).into_iter().filter_map(own).collect(),
         scenario: grid.scenario_name(combination),
         strategy: flown.or(combination.strategy.as_ref()).cloned().unwrap_or_default(),
         values: combination.values.clone(),
@@ -176,5 +183,35 @@ mod tests {
         let text = crate::table::table(&cells, &["radio.loss"], &["mission_s"]);
         assert!(text.contains("3, all equal") && text.contains("\n3 runs of random with 0 are one flight"), "{text}");
         assert!(text.contains("50 ± 0"), "{text}");
+    }
+
+    #[test]
+    fn figures_of_pilots_are_columns_and_have_intervals() {
+        let experiment = Experiment {
+            name: "e".to_owned(),
+            scenarios: vec![Mission::Random],
+            strategies: vec![],
+            seeds: vec![1, 2, 3],
+            grid: vec![],
+            processes: false,
+            metrics: vec![],
+            bounds: SceneBounds::default(),
+        };
+        let grid = Grid::new(&experiment, &[]);
+        let row = |job: usize, own: &[(&str, f64)]| Row {
+            metrics_own: own.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
+            ..Row::unflown(job, "reached", "")
+        };
+        let rows = [row(0, &[("order", 0.5)]), row(1, &[("order", 1.0), ("gap", 3.0)]), row(2, &[])];
+        let cells = cells(&grid, &rows);
+        let order = cells[0].metrics_own["order"];
+        assert!(order.mean == 0.75 && order.interval().is_some());
+        assert_eq!(cells[0].json(&[])["metrics_own"]["gap"]["mean"], 3.0);
+        let mut csv = Vec::new();
+        crate::row::write_csv(&mut csv, &grid, &rows).unwrap();
+        let csv = String::from_utf8(csv).unwrap();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert!(lines[0].contains(",metric.gap,metric.order,digest,"), "{csv}");
+        assert!(lines[1].contains(",,0.5,") && lines[2].contains(",3,1,"), "{csv}");
     }
 }

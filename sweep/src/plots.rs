@@ -221,6 +221,7 @@ mod tests {
             equal: 0,
             success: rate(1, 2),
             metrics: METRICS.iter().map(|_| mean(&[1.0, 2.0])).collect(),
+            metrics_own: BTreeMap::new(),
         }
     }
 

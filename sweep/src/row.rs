@@ -4,6 +4,7 @@ use crate::grid::Grid;
 use crate::metrics::METRICS;
 use serde::{Deserialize, Serialize};
 use skein_report::table::quoted;
+use std::collections::{BTreeMap, BTreeSet};
 use skein_report::text::split;
 use skein_report::{Summary, Violation};
 use skein_scenario::Scenario;
@@ -27,6 +28,9 @@ pub struct Row {
     pub splits: Vec<Option<Vec<u32>>>,
     /// One value for each of [`METRICS`]; empty if the run was not flown.
     pub metrics: Vec<Option<f64>>,
+    /// The mean of each figure that pilots reported, by its name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metrics_own: BTreeMap<String, f64>,
     /// Digest of the run, hex.
     pub digest: Option<String>,
 }
@@ -46,6 +50,7 @@ impl Row {
             pass_times_s: summary.stages.iter().map(|stage| stage.pass_time_s).collect(),
             splits: summary.stages.iter().map(|stage| stage.split.clone()).collect(),
             metrics: METRICS.iter().map(|metric| (metric.value)(summary, scenario)).collect(),
+            metrics_own: summary.metrics_own.iter().map(|(name, found)| (name.clone(), found.mean)).collect(),
             digest: summary.digest.clone(),
         }
     }
@@ -61,6 +66,7 @@ impl Row {
             pass_times_s: Vec::new(),
             splits: Vec::new(),
             metrics: Vec::new(),
+            metrics_own: BTreeMap::new(),
             digest: None,
         }
     }
@@ -79,21 +85,28 @@ fn violation_text(first: &Violation, count: usize) -> String {
     format!("{kind} of {:?}{value} at {} s, {count} in all", first.drones, first.t_s)
 }
 
+/// The names of all figures that pilots reported in these runs.
+pub(crate) fn own_names(rows: &[Row]) -> BTreeSet<&str> {
+    rows.iter().flat_map(|row| row.metrics_own.keys().map(String::as_str)).collect()
+}
+
 /// Writes runs.csv: one line for each row. Rows are in the order of their jobs.
 pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> std::io::Result<()> {
-    let mut head: Vec<&str> = vec!["scenario", "strategy", "seed"];
-    head.extend(grid.keys());
-    head.extend(["outcome", "pass_times_s", "splits_left_to_right"]);
-    head.extend(METRICS.iter().map(|metric| metric.name));
-    head.extend(["digest", "reason", "command"]);
-    line(out, head.iter().map(|&name| name.to_owned()))?;
+    let own = own_names(rows);
+    let mut head: Vec<String> = ["scenario", "strategy", "seed"].map(str::to_owned).to_vec();
+    head.extend(grid.keys().into_iter().map(str::to_owned));
+    head.extend(["outcome", "pass_times_s", "splits_left_to_right"].map(str::to_owned));
+    head.extend(METRICS.iter().map(|metric| metric.name.to_owned()));
+    head.extend(own.iter().map(|name| format!("metric.{name}")));
+    head.extend(["digest", "reason", "command"].map(str::to_owned));
+    line(out, head.into_iter())?;
     for row in rows {
-        line(out, fields(grid, row).into_iter())?;
+        line(out, fields(grid, row, &own).into_iter())?;
     }
     Ok(())
 }
 
-fn fields(grid: &Grid<'_>, row: &Row) -> Vec<String> {
+fn fields(grid: &Grid<'_>, row: &Row, own: &BTreeSet<&str>) -> Vec<String> {
     let (combination, seed) = grid.job(row.job);
     let number = |value: &Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     let strategy =
@@ -106,6 +119,7 @@ fn fields(grid: &Grid<'_>, row: &Row) -> Vec<String> {
         row.splits.iter().map(|drones| drones.as_deref().map(split).unwrap_or_default()).collect::<Vec<_>>().join(" "),
     );
     fields.extend((0..METRICS.len()).map(|i| row.metrics.get(i).map(number).unwrap_or_default()));
+    fields.extend(own.iter().map(|name| number(&row.metrics_own.get(*name).copied())));
     fields.extend([row.digest.clone(), row.reason.clone()].map(Option::unwrap_or_default));
     fields.push(grid.command(row.job));
     fields
