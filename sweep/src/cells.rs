@@ -1,7 +1,7 @@
 //! Cells: the runs of one combination, averaged over the seeds, with 95 % intervals.
 
 use crate::grid::Grid;
-use crate::metrics::{METRICS, SUCCESS};
+use crate::metrics::{METRICS, SUCCESS, own_name};
 use crate::row::{Row, own_names};
 use crate::statistics::{Estimate, mean, rate};
 use serde_json::{Map, Value, json};
@@ -30,13 +30,14 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The estimate of the metric with this name; `None` if there is none.
+    /// The estimate of the metric with this name; `None` if there is none. Figures that pilots report are called
+    /// `metric.NAME`.
     #[must_use]
     pub fn estimate(&self, name: &str) -> Option<Estimate> {
         match METRICS.iter().position(|metric| metric.name == name) {
             Some(i) => self.metrics[i],
             None if name == SUCCESS => self.success,
-            None => None,
+            None => self.metrics_own.get(own_name(name)?).copied(),
         }
     }
 
@@ -122,7 +123,7 @@ mod tests {
             seeds: vec![1, 2, 3],
             grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
             processes: false,
-            metrics: vec![],
+            metrics: None,
             bounds: SceneBounds::default(),
         }
     }
@@ -180,23 +181,14 @@ mod tests {
         }
         let json = cells[0].json(&["radio.loss"]);
         assert_eq!((&json["equal_digests"], &json["metrics"]["mission_s"]["low"]), (&json!(true), &Value::Null));
-        let text = crate::table::table(&cells, &["radio.loss"], &["mission_s"]);
+        let text = crate::table::table(&cells, &["radio.loss"], &["mission_s".to_owned()]);
         assert!(text.contains("3, all equal") && text.contains("\n3 runs of random with 0 are one flight"), "{text}");
         assert!(text.contains("50 ± 0"), "{text}");
     }
 
     #[test]
     fn figures_of_pilots_are_columns_and_have_intervals() {
-        let experiment = Experiment {
-            name: "e".to_owned(),
-            scenarios: vec![Mission::Random],
-            strategies: vec![],
-            seeds: vec![1, 2, 3],
-            grid: vec![],
-            processes: false,
-            metrics: vec![],
-            bounds: SceneBounds::default(),
-        };
+        let experiment = Experiment { grid: vec![], ..experiment() };
         let grid = Grid::new(&experiment, &[]);
         let row = |job: usize, own: &[(&str, f64)]| Row {
             metrics_own: own.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
@@ -206,6 +198,8 @@ mod tests {
         let cells = cells(&grid, &rows);
         let order = cells[0].metrics_own["order"];
         assert!(order.mean == 0.75 && order.interval().is_some());
+        assert_eq!(cells[0].estimate("metric.gap").map(|gap| gap.n), Some(1));
+        assert!(cells[0].estimate("gap").is_none() && cells[0].estimate("metric.lag").is_none());
         assert_eq!(cells[0].json(&[])["metrics_own"]["gap"]["mean"], 3.0);
         let mut csv = Vec::new();
         crate::row::write_csv(&mut csv, &grid, &rows).unwrap();

@@ -177,7 +177,7 @@ mod tests {
             seeds: vec![7, 8, 9],
             grid: vec![],
             processes: false,
-            metrics: vec![],
+            metrics: None,
             bounds: SceneBounds::default(),
         }
     }

@@ -1,7 +1,7 @@
 //! An experiment: which missions a sweep flies. Read from TOML and checked.
 
 use crate::error::{ExperimentError, Problem};
-use crate::metrics::{DEFAULT, METRICS, SUCCESS, metric};
+use crate::metrics::{METRICS, SUCCESS, metric, own_name};
 use crate::random_scene::SceneBounds;
 use serde::Deserialize;
 use std::ops::Range;
@@ -23,8 +23,9 @@ pub struct Experiment {
     pub grid: Vec<Axis>,
     /// Whether each run is a swarm of processes. Otherwise a run is flown inline, in one thread.
     pub processes: bool,
-    /// Names of the metrics that are plotted and tabled.
-    pub metrics: Vec<&'static str>,
+    /// Names of the metrics that are plotted and tabled. `None`: the most important ones, and every figure that pilots
+    /// report.
+    pub metrics: Option<Vec<String>>,
     /// Size of random scenes.
     pub bounds: SceneBounds,
 }
@@ -341,19 +342,19 @@ fn steps(key: &str, range: &toml::Table) -> Result<Vec<String>, Problem> {
     }
 }
 
-fn metrics(written: Option<Vec<String>>) -> Result<Vec<&'static str>, Problem> {
-    let Some(written) = written else { return Ok(DEFAULT.to_vec()) };
+fn metrics(written: Option<Vec<String>>) -> Result<Option<Vec<String>>, Problem> {
+    let Some(written) = written else { return Ok(None) };
     unique("metrics", &written)?;
     let known: Vec<&str> = std::iter::once(SUCCESS).chain(METRICS.iter().map(|metric| metric.name)).collect();
-    let find = |name: &String| match metric(name) {
-        Some(metric) => Ok(metric.name),
-        None if name == SUCCESS => Ok(SUCCESS),
-        None => {
+    let is_known = |name: &&String| *name == SUCCESS || metric(name).is_some() || own_name(name).is_some();
+    match written.iter().find(|name| !is_known(name)) {
+        None => Ok(Some(written)),
+        Some(name) => {
             let (found, suggestion) = (name.clone(), suggestion(name, &known));
-            Err(Problem::UnknownMetric { found, suggestion, expected: known.join(", ") })
+            let expected = format!("{}, or metric.NAME for a figure that pilots report", known.join(", "));
+            Err(Problem::UnknownMetric { found, suggestion, expected })
         }
-    };
-    written.iter().map(find).collect()
+    }
 }
 
 fn bounds(written: &RawBounds) -> Result<SceneBounds, Problem> {

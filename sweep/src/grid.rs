@@ -223,7 +223,7 @@ mod tests {
             seeds: vec![4, 9],
             grid: vec![axis("radio.delay_s", &["0", "0.5"]), axis("radio.loss", &["0", "0.1", "0.2"])],
             processes: false,
-            metrics: vec![],
+            metrics: None,
             bounds: SceneBounds { drones: [5, 6], ..SceneBounds::default() },
         }
     }

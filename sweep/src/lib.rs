@@ -69,7 +69,7 @@ pub use experiment::{Axis, Experiment, Mission};
 pub use file_kind::FileKind;
 pub use flight::{Interrupted, fly_inline};
 pub use grid::{Combination, Grid};
-pub use metrics::{METRICS, Metric, SUCCESS};
+pub use metrics::{METRICS, Metric, OWN_PREFIX, SUCCESS};
 pub use plots::Plot;
 pub use random_scene::{SceneBounds, random_scene, scene_toml};
 pub use report::SweepReport;

@@ -1,5 +1,6 @@
 //! Metrics: the numbers that each run gives.
 
+use skein_protocol::MetricName;
 use skein_report::Summary;
 use skein_scenario::Scenario;
 
@@ -22,7 +23,7 @@ pub struct Metric {
 pub const SUCCESS: &str = "success";
 
 /// All metrics, in the order of their columns.
-pub const METRICS: [Metric; 17] = [
+pub const METRICS: [Metric; 21] = [
     of_reached("mission_s", "mission time (s)", |s, _| Some(s.mission_s)),
     of_reached("pass_time_s", "time to pass, all obstacle sets (s)", |s, _| {
         (!s.stages.is_empty()).then(|| s.stages.iter().map(|stage| stage.pass_time_s).sum::<Option<f64>>())?
@@ -52,7 +53,14 @@ pub const METRICS: [Metric; 17] = [
         let counts = [d.loss, d.burst, d.range, d.partition, d.deaf, d.malformed, d.queue];
         Some(counts.into_iter().flatten().sum::<u64>() as f64)
     }),
+    of_all("order", "order of the headings, 1 = all alike", |s, _| s.metrics.order),
+    of_all("safety", "share of pairs that keep the safe distance", |s, _| s.metrics.safety),
+    of_all("union", "union of the swarm, 1 = one component", |s, _| s.metrics.union),
+    of_all("connectivity", "algebraic connectivity / number of drones", |s, _| s.metrics.connectivity),
 ];
+
+/// What the names of figures that pilots report begin with, in experiments, columns and files.
+pub const OWN_PREFIX: &str = "metric.";
 
 /// Metrics that are plotted and tabled unless the experiment names others.
 pub(crate) const DEFAULT: [&str; 4] = [SUCCESS, "mission_s", "energy_j", "separation_ratio"];
@@ -63,10 +71,20 @@ pub(crate) fn metric(name: &str) -> Option<&'static Metric> {
     METRICS.iter().find(|metric| metric.name == name)
 }
 
-/// Label of a metric, or of the success rate, on a plot's axis.
+/// The name under which pilots report a figure, if this is the name of such a figure: `metric.gap_m` gives `gap_m`.
 #[must_use]
-pub(crate) fn label(name: &str) -> &'static str {
-    metric(name).map_or("share of runs that reached the goal safely", |metric| metric.label)
+pub(crate) fn own_name(name: &str) -> Option<&str> {
+    name.strip_prefix(OWN_PREFIX).filter(|own| MetricName::new(own).is_ok())
+}
+
+/// Label of a metric, of the success rate, or of a figure of pilots, on a plot's axis.
+#[must_use]
+pub(crate) fn label(name: &str) -> String {
+    match (metric(name), own_name(name)) {
+        (Some(metric), _) => metric.label.to_owned(),
+        (None, Some(own)) => format!("{own}, mean over drones and time"),
+        (None, None) => "share of runs that reached the goal safely".to_owned(),
+    }
 }
 
 type Value = fn(&Summary, &Scenario) -> Option<f64>;

@@ -3,7 +3,7 @@
 use crate::cells::{Cell, toml_value};
 use crate::error::SweepError;
 use crate::experiment::Experiment;
-use crate::metrics::{METRICS, SUCCESS, label, metric};
+use crate::metrics::{SUCCESS, label, metric};
 use skein_report::plot::sweep::{HeatMap, Lines, Point, Series};
 use std::collections::BTreeSet;
 
@@ -16,21 +16,20 @@ pub struct Plot {
     pub svg: String,
 }
 
-/// All plots, by metric. None if no key varies.
-pub(crate) fn plots(experiment: &Experiment, cells: &[Cell]) -> Result<Vec<Plot>, SweepError> {
+/// The plots of these metrics. None if no key varies.
+pub(crate) fn plots(experiment: &Experiment, cells: &[Cell], metrics: &[String]) -> Result<Vec<Plot>, SweepError> {
     let varying: Vec<usize> = (0..experiment.grid.len()).filter(|&i| experiment.grid[i].values.len() > 1).collect();
-    let metrics = || [SUCCESS].into_iter().chain(METRICS.iter().map(|metric| metric.name));
-    let wanted: Vec<&str> = metrics().filter(|name| experiment.metrics.contains(name)).collect();
     let scenarios = || cells.chunk_by(|a, b| a.scenario == b.scenario);
     match varying[..] {
         [x] => {
-            let plots = scenarios().flat_map(|of| wanted.iter().filter_map(move |name| lines(experiment, of, x, name)));
+            let plots =
+                scenarios().flat_map(|of| metrics.iter().filter_map(move |name| lines(experiment, of, x, name)));
             plots.collect()
         }
         [] => Ok(Vec::new()),
         _ => {
             let axes = axes(experiment, varying);
-            Ok(wanted.iter().flat_map(|name| maps(experiment, cells, &axes, name)).collect())
+            Ok(metrics.iter().flat_map(|name| maps(experiment, cells, &axes, name)).collect())
         }
     }
 }
@@ -100,6 +99,15 @@ fn brief(values: &[String]) -> Vec<String> {
     by_key.unwrap_or_else(|| values.iter().zip(&parsed).map(text).collect())
 }
 
+/// Label of a metric on a plot's axis, and the factor to its unit there: energies are in kJ.
+fn unit(metric: &str) -> (String, f64) {
+    let label = label(metric);
+    match label.strip_suffix("(J)") {
+        Some(energy) => (format!("{energy}(kJ)"), 1e-3),
+        None => (label, 1.0),
+    }
+}
+
 /// The plot of one scenario, with one line for each strategy.
 fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> Option<Result<Plot, SweepError>> {
     let values = &experiment.grid[axis].values;
@@ -107,11 +115,12 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     let place = |value: &String| values.iter().position(|v| v == value).unwrap_or(0) as f64;
     let numbers = values.iter().all(|value| value.parse::<f64>().is_ok());
     let x = |value: &String| if numbers { value.parse().unwrap_or(0.0) } else { place(value) };
+    let (y_label, factor) = unit(metric);
     let series = |of: &[Cell]| {
         let point = |cell: &Cell| {
             let found = cell.estimate(metric)?;
-            let [low, high] = found.interval().unwrap_or([found.mean; 2]);
-            Some(Point { x: x(&cell.values[axis]), mean: found.mean, low, high })
+            let [low, high] = found.interval().unwrap_or([found.mean; 2]).map(|end| end * factor);
+            Some(Point { x: x(&cell.values[axis]), mean: found.mean * factor, low, high })
         };
         let mut points: Vec<Point> = of.iter().filter_map(point).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
@@ -124,7 +133,7 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
     let key = &experiment.grid[axis].key;
     let x_label = if numbers { key.clone() } else { format!("{key} (0 = {})", values.join(", ")) };
     let title = title(experiment, cells, metric);
-    let lines = Lines { title, x_label, y_label: label(metric).to_owned(), series };
+    let lines = Lines { title, x_label, y_label, series };
     let file = file(experiment, metric, &cells[0].scenario, None);
     Some(match lines.draw() {
         Ok(svg) => Ok(Plot { file, svg }),
@@ -134,6 +143,7 @@ fn lines(experiment: &Experiment, cells: &[Cell], axis: usize, metric: &str) -> 
 
 fn maps(experiment: &Experiment, cells: &[Cell], axes: &MapAxes, metric: &str) -> Vec<Plot> {
     let MapAxes { columns, rows } = axes;
+    let factor = unit(metric).1;
     let map = |of: &[Cell]| {
         let has = |cell: &Cell, axis: &Axis, wanted: &[String]| {
             axis.keys.iter().zip(wanted).all(|(&key, value)| cell.values[key] == *value)
@@ -141,7 +151,8 @@ fn maps(experiment: &Experiment, cells: &[Cell], axes: &MapAxes, metric: &str) -
         let at = |column: &[String], row: &[String]| {
             let cell = of.iter().find(|cell| has(cell, columns, column) && has(cell, rows, row))?;
             let found = cell.estimate(metric)?;
-            Some(skein_report::plot::sweep::Cell { mean: found.mean, interval: found.interval() })
+            let interval = found.interval().map(|ends| ends.map(|end| end * factor));
+            Some(skein_report::plot::sweep::Cell { mean: found.mean * factor, interval })
         };
         let values =
             rows.ticks.iter().flat_map(|row| columns.ticks.iter().map(|column| at(&column.values, &row.values)));
@@ -184,7 +195,8 @@ fn title(experiment: &Experiment, cells: &[Cell], metric_name: &str) -> String {
     } else {
         ""
     };
-    format!("{}, {scenario}: {}, {interval}{of}, {} seeds", experiment.name, label(metric_name), experiment.seeds.len())
+    let (name, seeds) = (&experiment.name, experiment.seeds.len());
+    format!("{name}, {scenario}: {}, {interval}{of}, {seeds} seeds", unit(metric_name).0)
 }
 
 #[cfg(test)]
@@ -207,7 +219,7 @@ mod tests {
             seeds: vec![1],
             grid: axes.iter().map(axis).collect(),
             processes: false,
-            metrics: vec!["mission_s", SUCCESS],
+            metrics: None,
             bounds: SceneBounds::default(),
         }
     }
@@ -220,13 +232,17 @@ mod tests {
             outcomes: BTreeMap::new(),
             equal: 0,
             success: rate(1, 2),
-            metrics: METRICS.iter().map(|_| mean(&[1.0, 2.0])).collect(),
-            metrics_own: BTreeMap::new(),
+            metrics: crate::metrics::METRICS.iter().map(|_| mean(&[1.0, 2.0])).collect(),
+            metrics_own: mean(&[3.0, 4.0]).map(|found| ("gap_m".to_owned(), found)).into_iter().collect(),
         }
     }
 
+    fn drawn(experiment: &Experiment, cells: &[Cell]) -> Vec<Plot> {
+        plots(experiment, cells, &[SUCCESS, "mission_s", "metric.gap_m"].map(str::to_owned)).unwrap()
+    }
+
     fn names(experiment: &Experiment, cells: &[Cell]) -> Vec<String> {
-        plots(experiment, cells).unwrap().into_iter().map(|plot| plot.file).collect()
+        drawn(experiment, cells).into_iter().map(|plot| plot.file).collect()
     }
 
     #[test]
@@ -234,13 +250,20 @@ mod tests {
         let one = experiment(&[("radio.loss", &["0", "0.5"]), ("radio.delay_s", &["1"])]);
         let cells =
             [cell("a", &["0", "1"]), cell("a", &["0.5", "1"]), cell("b", &["0", "1"]), cell("b", &["0.5", "1"])];
-        assert_eq!(names(&one, &cells), ["success.svg", "mission_s.svg"]);
-        let svg = &plots(&one, &cells).unwrap()[1].svg;
+        assert_eq!(names(&one, &cells), ["success.svg", "mission_s.svg", "metric.gap_m.svg"]);
+        let plots = drawn(&one, &cells);
+        let svg = &plots[1].svg;
         assert!(svg.contains("radio.loss") && svg.contains("mission time (s)") && svg.matches("<circle").count() == 4);
+        let energy = super::plots(&one, &cells, &["energy_j".to_owned()]).unwrap();
+        assert!(energy[0].svg.contains("energy (kJ)") && energy[0].svg.contains("\n0.00"), "{}", energy[0].svg);
+        assert!(plots[2].svg.contains("gap_m, mean over drones and time"), "{}", plots[2].svg);
         let two = experiment(&[("radio.loss", &["0", "0.5"]), ("radio.delay_s", &["0", "1"])]);
         let cells = [cell("fixed:1/2", &["0", "0"]), cell("fixed:1/2", &["0.5", "1"])];
-        assert_eq!(names(&two, &cells), ["success-fixed-1-2.svg", "mission_s-fixed-1-2.svg"]);
-        let svg = &plots(&two, &cells).unwrap()[0].svg;
+        assert_eq!(
+            names(&two, &cells),
+            ["success-fixed-1-2.svg", "mission_s-fixed-1-2.svg", "metric.gap_m-fixed-1-2.svg"]
+        );
+        let svg = &drawn(&two, &cells)[0].svg;
         assert_eq!((svg.matches(">0.5</text>").count(), svg.matches(">–</text>").count()), (3, 2), "{svg}");
         assert_eq!(names(&experiment(&[]), &cells), Vec::<String>::new());
     }
@@ -251,8 +274,8 @@ mod tests {
         let three =
             experiment(&[("fault.0", &kinds), ("on", &["\"gate\"", "\"queued\""]), ("radio.loss", &["0", "0.5"])]);
         let cells = [cell("a", &[kinds[1], "\"queued\"", "0.5"])];
-        assert_eq!(names(&three, &cells), ["success-a.svg", "mission_s-a.svg"]);
-        let svg = &plots(&three, &cells).unwrap()[0].svg;
+        assert_eq!(names(&three, &cells), ["success-a.svg", "mission_s-a.svg", "metric.gap_m-a.svg"]);
+        let svg = &drawn(&three, &cells)[0].svg;
         for text in
             [">kill<", ">deaf<", ">gate, 0<", ">gate, 0.5<", ">queued, 0.5<", ">on, radio.loss ↑<", ">fault.0 →<"]
         {

@@ -5,8 +5,9 @@ use crate::energy_ratios::{self, EnergyRatios, energy_ratios};
 use crate::error::SweepError;
 use crate::experiment::Mission;
 use crate::grid::Grid;
+use crate::metrics::{DEFAULT, METRICS, OWN_PREFIX, SUCCESS};
 use crate::plots::{Plot, plots};
-use crate::row::{Row, write_csv};
+use crate::row::{Row, own_names, write_csv};
 use crate::table::table;
 use serde_json::{Value, json};
 use skein_report::table::{ColumnKind, csv_to_parquet, inferred};
@@ -95,16 +96,35 @@ impl<'a> SweepReport<'a> {
     /// [`SweepError::Plot`].
     pub fn plots(&self) -> Result<Vec<Plot>, SweepError> {
         let experiment = self.grid.experiment();
-        let mut all = plots(experiment, &self.cells)?;
+        let mut all = plots(experiment, &self.cells, &self.in_order())?;
         let ratios = energy_ratios::figure(&experiment.name, &self.ratios)?;
         all.extend(ratios.map(|svg| Plot { file: "ratios.svg".to_owned(), svg }));
         Ok(all)
     }
 
+    /// Names of the metrics that are plotted and tabled, in the experiment's order.
+    fn metrics(&self) -> Vec<String> {
+        self.grid.experiment().metrics.clone().unwrap_or_else(|| {
+            let own = own_names(&self.rows).into_iter().map(|name| format!("{OWN_PREFIX}{name}"));
+            DEFAULT.iter().map(|&name| name.to_owned()).chain(own).collect()
+        })
+    }
+
+    /// The same in the order in which they are plotted: that of the columns of runs.csv.
+    fn in_order(&self) -> Vec<String> {
+        let mut metrics = self.metrics();
+        let built_in = |name: &str| {
+            let mut all = std::iter::once(SUCCESS).chain(METRICS.iter().map(|metric| metric.name));
+            all.position(|known| known == name).unwrap_or(usize::MAX)
+        };
+        metrics.sort_by(|a, b| (built_in(a), a).cmp(&(built_in(b), b)));
+        metrics
+    }
+
     /// The results as a text table, followed by the energy ratios.
     #[must_use]
     pub fn table(&self) -> String {
-        let table = table(&self.cells, &self.grid.keys(), &self.grid.experiment().metrics);
+        let table = table(&self.cells, &self.grid.keys(), &self.metrics());
         table + &energy_ratios::text(&self.ratios)
     }
 }

@@ -1,13 +1,13 @@
 //! The result of one run: a line of rows.jsonl, and of runs.csv.
 
 use crate::grid::Grid;
-use crate::metrics::METRICS;
+use crate::metrics::{METRICS, OWN_PREFIX};
 use serde::{Deserialize, Serialize};
 use skein_report::table::quoted;
-use std::collections::{BTreeMap, BTreeSet};
 use skein_report::text::split;
 use skein_report::{Summary, Violation};
 use skein_scenario::Scenario;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
 /// The result of one run.
@@ -97,7 +97,7 @@ pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> 
     head.extend(grid.keys().into_iter().map(str::to_owned));
     head.extend(["outcome", "pass_times_s", "splits_left_to_right"].map(str::to_owned));
     head.extend(METRICS.iter().map(|metric| metric.name.to_owned()));
-    head.extend(own.iter().map(|name| format!("metric.{name}")));
+    head.extend(own.iter().map(|name| format!("{OWN_PREFIX}{name}")));
     head.extend(["digest", "reason", "command"].map(str::to_owned));
     line(out, head.into_iter())?;
     for row in rows {

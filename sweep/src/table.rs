@@ -9,13 +9,13 @@ const MAX_LINES: usize = 40;
 
 /// The table. Each line is a cell: its scenario and strategy, the keys that vary, the number of runs, and the mean ± half
 /// the interval of each metric.
-pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[&str]) -> String {
+pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[String]) -> String {
     let varies = |&i: &usize| cells.iter().any(|cell| cell.values[i] != cells[0].values[i]);
     let varying: Vec<usize> = (0..keys.len()).filter(varies).collect();
     let mut head = vec!["scenario", "strategy"];
     head.extend(varying.iter().map(|&i| keys[i]));
     head.push("runs");
-    head.extend(metrics);
+    head.extend(metrics.iter().map(String::as_str));
     let mut lines: Vec<Vec<String>> = vec![head.into_iter().map(str::to_owned).collect()];
     for cell in cells.iter().take(MAX_LINES) {
         let mut line = vec![cell.scenario.clone(), cell.strategy.clone()];
