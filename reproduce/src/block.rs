@@ -6,6 +6,8 @@ use crate::figures::Figure;
 pub(crate) enum Block {
     /// Heading of a section.
     Heading(String),
+    /// The list of all headings.
+    Contents,
     /// A paragraph. Code stands between backticks.
     Text(String),
     /// A table.

@@ -6,6 +6,7 @@ use crate::figures::Figure;
 use crate::flight::{Flight, JITTER_M};
 use crate::forest::Forest;
 use crate::gain;
+use crate::headline;
 use crate::results::{Results, split};
 use crate::row::{Row, pass_s};
 use crate::studies::studies;
@@ -14,15 +15,22 @@ use crate::table::{shown, study, table};
 /// The report's title.
 pub(crate) const TITLE: &str = "Swarm Formation Morphing for Congestion Aware Collision Avoidance, reproduced";
 
+/// The figure that stands at the beginning: the whole forest mission.
+const FIRST: [&str; 1] = ["f2-snapshots.svg"];
+
 /// All parts of the report.
 pub(crate) fn content(
     results: &Results,
     forest: &Forest,
     rows: &[Row],
-    figures: Vec<Figure>,
+    mut figures: Vec<Figure>,
     quick: bool,
 ) -> Vec<Block> {
-    let mut blocks = opening(results, quick);
+    let mut blocks = vec![headline::table(rows), Block::Text(headline::MEANING.to_owned())];
+    let forests = figures.extract_if(.., |figure| FIRST.contains(&figure.file.as_str()));
+    blocks.extend(forests.map(Block::Figure));
+    blocks.extend([Block::Contents, Block::Heading("What was flown".to_owned())]);
+    blocks.extend(opening(results, quick));
     blocks.extend(differences(rows));
     let sections: [(&str, &[&str]); 7] = [
         ("One obstacle: time and split (R1, R2, R3)", &["R1", "R2", "R3"]),

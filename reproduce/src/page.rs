@@ -9,6 +9,8 @@ const STYLE: &str = "\
 body{font:16px/1.5 system-ui,Helvetica,Arial,sans-serif;color:var(--ink);background:var(--paper);max-width:1140px;\
 margin:2rem auto;padding:0 1rem}
 p{max-width:48rem}
+nav ol{columns:2;max-width:62rem;font-size:14px}
+summary{cursor:pointer;padding:.2rem 0}
 .wide{overflow-x:auto}
 table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
 th,td{border-bottom:1px solid var(--line);padding:.25rem .6rem;text-align:left;vertical-align:top}
@@ -22,6 +24,9 @@ figcaption{padding:.4rem .8rem}
 table{font-size:7pt}code{font-size:6pt;overflow-wrap:anywhere}tr{break-inside:avoid}}
 ";
 
+/// Number of lines up to which a table is open.
+const FOLDED: usize = 20;
+
 /// The report as Markdown. It links to the files of the figures.
 pub(crate) fn markdown(title: &str, blocks: &[Block]) -> String {
     let mut text = format!("# {title}\n");
@@ -30,6 +35,7 @@ pub(crate) fn markdown(title: &str, blocks: &[Block]) -> String {
         // Writing to a string cannot fail.
         let _ = match block {
             Block::Heading(heading) => writeln!(text, "## {heading}"),
+            Block::Contents => headings(blocks).try_for_each(|heading| writeln!(text, "- {heading}")),
             Block::Text(words) => writeln!(text, "{words}"),
             Block::Table { head, lines } => {
                 let rule = vec!["---"; head.len()].join(" | ");
@@ -54,7 +60,15 @@ pub(crate) fn html(title: &str, blocks: &[Block]) -> String {
     );
     for block in blocks {
         let _ = match block {
-            Block::Heading(heading) => writeln!(page, "<h2>{}</h2>", inline(heading)),
+            Block::Heading(heading) => writeln!(page, "<h2 id=\"{}\">{}</h2>", anchor(heading), inline(heading)),
+            Block::Contents => {
+                let entry = |heading| format!("<li><a href=\"#{}\">{}</a></li>", anchor(heading), inline(heading));
+                writeln!(
+                    page,
+                    "<nav aria-label=\"Contents\"><ol>{}</ol></nav>",
+                    headings(blocks).map(entry).collect::<String>()
+                )
+            }
             Block::Text(words) => writeln!(page, "<p>{}</p>", inline(words)),
             Block::Table { head, lines } => {
                 let cells = |tag: &str, line: &[String]| -> String {
@@ -62,10 +76,15 @@ pub(crate) fn html(title: &str, blocks: &[Block]) -> String {
                 };
                 let body: String = lines.iter().map(|line| format!("<tr>{}</tr>\n", cells("td", line))).collect();
                 let head = cells("th", head);
-                writeln!(
-                    page,
+                let table = format!(
                     "<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>"
-                )
+                );
+                match lines.len() {
+                    rows if rows > FOLDED => {
+                        writeln!(page, "<details><summary>{rows} rows</summary>\n{table}\n</details>")
+                    }
+                    _ => writeln!(page, "{table}"),
+                }
             }
             Block::Figure(figure) => {
                 let caption = inline(&figure.caption);
@@ -75,6 +94,20 @@ pub(crate) fn html(title: &str, blocks: &[Block]) -> String {
     }
     page.push_str("</body>\n</html>\n");
     page
+}
+
+/// The headings of the report, in order.
+fn headings(blocks: &[Block]) -> impl Iterator<Item = &str> {
+    blocks.iter().filter_map(|block| match block {
+        Block::Heading(heading) => Some(heading.as_str()),
+        _ => None,
+    })
+}
+
+/// The name of a heading's place in the page.
+fn anchor(heading: &str) -> String {
+    let letters = heading.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    letters.collect()
 }
 
 /// Escapes text for HTML. Text between backticks becomes code.
@@ -99,6 +132,7 @@ mod tests {
     fn both_forms_hold_the_same_blocks() {
         let blocks = [
             Block::Heading("Times".to_owned()),
+            Block::Contents,
             Block::Text("1 < 2, by `skein run`.".to_owned()),
             Block::Table {
                 head: vec!["a".to_owned(), "b".to_owned()],
@@ -106,11 +140,16 @@ mod tests {
             },
         ];
         let text = markdown("Report", &blocks);
-        assert!(
-            text.starts_with("# Report\n\n## Times\n\n1 < 2, by `skein run`.\n\n| a | b |\n| --- | --- |\n| 1 | 2 |\n")
-        );
+        assert!(text.starts_with(
+            "# Report\n\n## Times\n\n- Times\n\n1 < 2, by `skein run`.\n\n| a | b |\n| --- | --- |\n| 1 | 2 |\n"
+        ));
         let page = html("Report", &blocks);
-        for part in ["<h2>Times</h2>", "1 &lt; 2, by <code>skein run</code>.", "<td>1</td><td>2</td>"] {
+        for part in [
+            "<h2 id=\"times\">Times</h2>",
+            "<li><a href=\"#times\">Times</a></li>",
+            "1 &lt; 2, by <code>skein run</code>.",
+            "<td>1</td><td>2</td>",
+        ] {
             assert!(page.contains(part), "{part} is not in {page}");
         }
     }

@@ -11,7 +11,6 @@ use crate::page::{html, markdown};
 use crate::results::Results;
 use crate::row::Row;
 use crate::rows::rows;
-use crate::table::shown;
 use skein_report::{RunFolder, WorkFolder};
 use skein_sweep::{Interrupted, Progress};
 use std::path::PathBuf;
@@ -111,14 +110,4 @@ fn clear(folder: &WorkFolder) -> Result<(), ReproduceError> {
         }
     }
     Ok(())
-}
-
-/// The rows as a text table: published numbers beside ours.
-#[must_use]
-pub fn table(rows: &[Row]) -> String {
-    let mut text = format!("{:<34} {:>12} {:>12} unit\n", "row", "paper", "ours");
-    for row in rows {
-        text += &format!("{:<34} {:>12} {:>12} {}\n", row.id, shown(&row.published), shown(&row.ours), row.unit);
-    }
-    text
 }

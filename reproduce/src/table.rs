@@ -17,7 +17,7 @@ pub(crate) fn shown(value: &Value) -> String {
 }
 
 /// Our value minus the published one, also relative to it.
-fn difference(row: &Row) -> String {
+pub(crate) fn difference(row: &Row) -> String {
     match (row.published.as_f64(), row.ours.as_f64()) {
         (Some(published), Some(ours)) if published != 0.0 => {
             let off = ours - published;

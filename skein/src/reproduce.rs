@@ -6,7 +6,7 @@ use crate::output::print_line;
 use crate::progress::RunsBar;
 use crate::sweep::jobs;
 use clap::Args;
-use skein_reproduce::{Reproduction, table};
+use skein_reproduce::{Reproduction, headline};
 use std::path::PathBuf;
 
 /// Arguments of `reproduce`.
@@ -32,7 +32,7 @@ pub(crate) struct ReproduceArgs {
     pub(crate) quiet: bool,
 }
 
-/// Flies the paper's missions, writes the report and prints its rows.
+/// Flies the paper's missions, writes the report and prints the rows of the result.
 pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -49,7 +49,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs) -> Result<Exit, Failure> {
     let Some(rows) = rows? else { return Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default())) };
     if !args.quiet {
         let report = args.out.join("report.html");
-        print_line(format!("{}report  {}", table(&rows), report.display()))?;
+        print_line(format!("{}report  {}", headline(&rows), report.display()))?;
     }
     Ok(Exit::Reached)
 }
