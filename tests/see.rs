@@ -41,10 +41,14 @@ fn a_running_swarm_shows_in_the_terminal() {
     assert_eq!(without_swarm.code, Some(3));
     assert!(without_swarm.stderr.contains("no swarm runs"), "{without_swarm:?}");
     assert!(place.run(&["top", "--once"]).stdout.contains("no swarm runs"));
-    let mut flight = place.take_off("s2-right", &["--clock", "realtime:8"]);
+    let topics = "pilot.0={ name = \"paper\", topics = [\"gossip\"] }";
+    let mut flight = place.take_off("s2-right", &["--clock", "realtime:8", "--set", topics]);
     flight.wait_until(0.5);
     let list = place.run(&["topic", "list"]);
-    assert!(list.stdout.lines().count() == 4 && list.stdout.contains("skein/downlink"), "{list:?}");
+    let listed: Vec<Value> = list.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<&str> = listed.iter().map(|line| line["topic"].as_str().unwrap()).collect();
+    assert_eq!(names, ["senses", "air", "uplink", "record", "gossip"]);
+    assert!(listed[4]["service"].as_str().unwrap().contains("--kind gossip"), "{list:?}");
     let frames = place.run(&["topic", "echo", "air", "--count", "40"]);
     assert!(!frames.stdout.contains("4294967295") && !frames.stdout.contains("says"), "{frames:?}");
     let poses = place.run(&["topic", "echo", "air", "--drone", "3", "--kind", "pose", "--count", "2"]);

@@ -5,6 +5,7 @@ use skein_bus::{BusError, Domain, DownlinkSubscriber, RecordSubscriber, Services
 use skein_report::RunFacts;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{mission, scenario_file};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A running swarm of this user.
@@ -40,6 +41,8 @@ pub(crate) struct SwarmTap {
     pub(crate) facts: RunFacts,
     /// The records of its ticks.
     pub(crate) records: RecordSubscriber,
+    /// The topics that its pilots declare.
+    pub(crate) own_topics: BTreeSet<String>,
     // Dropped after the ports, which are made from it.
     services: Services,
     domain: Domain,
@@ -59,7 +62,8 @@ impl SwarmTap {
         let opened = open(&domain).or_else(|_| skein_bus::clean_dead_nodes(&domain).and_then(|_| open(&domain)));
         let (services, records) = opened.map_err(Failure::environment)?;
         let facts = run_facts(&scenario, "processes", "").map_err(Failure::usage)?;
-        Ok(Self { facts, records, services, domain })
+        let own_topics = scenario.declared_topics().into_iter().map(|(_, name)| name.to_owned()).collect();
+        Ok(Self { facts, records, own_topics, services, domain })
     }
 
     /// A port for the downlink: the senses and frames that the world sends to the drones.

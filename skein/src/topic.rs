@@ -42,7 +42,7 @@ pub(crate) struct TopicArgs {
 /// What to do with a topic.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Action {
-    /// Print the topics of the running swarms
+    /// Print the topics of the running swarms, and those that their pilots declare
     List,
     /// Print each message as one line of JSON, until the swarm ends or --count is reached
     Echo(Filter),
@@ -125,9 +125,15 @@ pub(crate) fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
 
 fn list(found: &[RunningSwarm]) -> Result<Exit, Failure> {
     for run in found {
-        let drones = SwarmTap::attach(&run.path)?.facts.drones;
+        let tap = SwarmTap::attach(&run.path)?;
+        let line = |topic: &str, service: &str| {
+            print_line(json!({ "run": run.name(), "topic": topic, "service": service, "drones": tap.facts.drones }))
+        };
         for (_, name, service) in Name::ALL {
-            print_line(json!({ "run": run.name(), "topic": name, "service": service, "drones": drones }))?;
+            line(name, service)?;
+        }
+        for topic in &tap.own_topics {
+            line(topic, &format!("skein/downlink: skein topic echo air --kind {topic}"))?;
         }
     }
     Ok(Exit::Reached)
