@@ -27,6 +27,7 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "plots/bending.svg",
     "plots/disturbance.svg",
     "plots/flight.svg",
+    "plots/metrics.svg",
     "reproduction/report.html",
     "events.jsonl",
     "flight.spool",

@@ -192,6 +192,9 @@ fn a_program_of_its_own_flies_some_drones(bench: &Bench) {
 fn sweep_and_replay_know_the_pilots(bench: &Bench) {
     let scenario = bench.scenario("[[pilot]]\nname = \"drift\"\n");
     let run = bench.fly(&scenario, &[]);
+    assert_eq!(run["metrics_own"]["gain"]["max"], 0.1);
+    let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("<figure id=\"metrics\">") && bench.path("run/plots/metrics.svg").exists());
     let replayed = |runtime: &str| bench.output(&["replay", "run", "--runtime", runtime]);
     for runtime in ["inline", "processes"] {
         let output = replayed(runtime);
@@ -213,6 +216,9 @@ fn sweep_and_replay_know_the_pilots(bench: &Bench) {
     std::fs::write(bench.path("e.toml"), experiment).unwrap();
     let sweep = bench.output(&["sweep", "e.toml", "--json", "--jobs", "1"]);
     assert_eq!(sweep.status.code(), Some(0), "{}", text(&sweep.stderr));
+    let csv = std::fs::read_to_string(bench.path("sweeps/e/runs.csv")).unwrap();
+    assert!(csv.lines().next().unwrap().contains(",metric.gain,"), "{csv}");
+    assert!(bench.path("sweeps/e/plots/metric.gain.svg").exists());
     std::fs::write(bench.path("f.toml"), experiment.replace("0.4", "-0.4")).unwrap();
     let wrong = bench.output(&["sweep", "f.toml"]);
     assert!(

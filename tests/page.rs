@@ -49,6 +49,17 @@ fn a_report_replays_offline() {
     assert_eq!(browser.value("document.getElementById('clock').textContent"), "20.0 s");
     assert_ne!(browser.value(SEEN), start, "another moment, the same picture");
 
+    for name in ["zones", "tracks", "routes", "links", "names", "trails"] {
+        let before = browser.value(SEEN);
+        browser.value(&format!("document.getElementById('show-{name}').click()"));
+        pictured(&mut browser);
+        assert_ne!(browser.value(SEEN), before, "the switch {name} changes nothing");
+    }
+    // What the run has not is not in the key.
+    for name in ["marks", "side"] {
+        assert_eq!(browser.value(&format!("player.key.lines.{name}.hidden")), true, "{name}");
+    }
+
     choose(&mut browser, 3);
     let about = browser.value("document.getElementById('about').textContent");
     let about = about.as_str().unwrap();
@@ -69,6 +80,35 @@ fn a_report_replays_offline() {
     assert_eq!(browser.errors, Vec::<String>::new());
     let elsewhere = |url: &&String| !["file:", "blob:", "data:", "about:"].iter().any(|own| url.starts_with(own));
     assert_eq!(browser.requests.iter().filter(elsewhere).collect::<Vec<_>>(), Vec::<&String>::new());
+}
+
+#[test]
+fn marks_and_altitudes_are_shown_where_there_are_any() {
+    let place = Place::new();
+    let Some(mut browser) = Browser::start(&place.join("profile")) else { return };
+    place.fly("s1-left", &["--runtime", "inline", "--out", "out"]);
+    browser.open(&format!("file://{}", place.join("out/report.html").display()));
+    browser.wait("player.story.samples.length > 100 && player.key.lines.side.hidden");
+    assert_eq!(browser.value("document.getElementById('side').hidden"), true);
+    // Another sample, as a live view gets it: one drone climbs, and one shows a mark and a line.
+    browser.value(
+        "(() => { const s = structuredClone(player.story.samples.at(-1)); s.state.t_s += 1; s.state.z_m[2] += 30;
+            const at = [s.state.x_m[0] - 60, s.state.y_m[0] + 10, 50];
+            s.shown = { marks: [{ drone: 0, label: 'goal', at_m: at }], lines: [{ drone: 1, label: '', from_m: at, to_m: [0, 0, 50] }] };
+            player.take({ sample: s }); player.seek(s.state.t_s); return true; })()",
+    );
+    browser.wait("!player.key.lines.marks.hidden && !player.key.lines.side.hidden");
+    pictured(&mut browser);
+    let seen = SEEN.replace("'scene'", "'side'");
+    assert!(browser.value(&seen)[1].as_u64().unwrap() > 500, "the side view is empty");
+    let with_marks = browser.value(SEEN);
+    browser.value("document.getElementById('show-marks').click()");
+    pictured(&mut browser);
+    assert_ne!(browser.value(SEEN), with_marks, "marks are not drawn");
+    browser.value("document.getElementById('show-side').click()");
+    pictured(&mut browser);
+    assert_eq!(browser.value("document.getElementById('side').hidden"), true);
+    assert_eq!(browser.errors, Vec::<String>::new());
 }
 
 /// A running `skein view`. Dropping this ends it.

@@ -44,8 +44,8 @@ pub(crate) const ALL: [&str; 12] = [
 ];
 
 /// Names of the plots in a run's `plots` folder, in this order: tracks, least separation, speed, distance between
-/// drones, energy, slot error, leaders, messages, animated flight, distance from the target shape, bending energy.
-pub const PLOT_FILES: [&str; 11] = [
+/// drones, energy, slot error, leaders, messages, animated flight, distance from the target shape, bending energy, figures that pilots report.
+pub const PLOT_FILES: [&str; 12] = [
     "trace.svg",
     "separation.svg",
     "speed.svg",
@@ -57,4 +57,5 @@ pub const PLOT_FILES: [&str; 11] = [
     "flight.svg",
     "disturbance.svg",
     "bending.svg",
+    "metrics.svg",
 ];

@@ -69,6 +69,7 @@ mod flight_record;
 mod folder;
 mod formation;
 mod geometry;
+mod group_order;
 mod interruption;
 mod json_text;
 mod leading;

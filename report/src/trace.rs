@@ -121,8 +121,12 @@ pub(crate) struct TraceRow {
     pub altitude_m: f64,
     pub group: String,
     pub energy_j: f64,
+    /// The figures that its pilot reports, in the order of the columns.
+    pub metrics: Vec<Option<f64>>,
 }
 
+/// What the names of the columns of figures begin with.
+const METRIC: &str = "metric.";
 /// What a trace must have.
 const EXPECTED: &str = "a trace with the columns t_s, drone, x_m, y_m, vx_mps, vy_mps, z_m, group and energy_j";
 
@@ -132,6 +136,8 @@ struct Places {
     group: usize,
     /// A trace without this column has only living drones.
     alive: Option<usize>,
+    /// The columns of figures that pilots report.
+    metrics: Vec<usize>,
     count: usize,
 }
 
@@ -143,7 +149,8 @@ impl Places {
         for (number, name) in numbers.iter_mut().zip(names) {
             *number = place(name)?;
         }
-        Some(Self { numbers, group: place("group")?, alive: place("alive"), count: header.len() })
+        let metrics = (0..header.len()).filter(|&i| header[i].starts_with(METRIC)).collect();
+        Some(Self { numbers, group: place("group")?, alive: place("alive"), metrics, count: header.len() })
     }
 
     /// The row of these fields: `Some(None)` for a dead drone, `None` for an invalid row.
@@ -161,22 +168,26 @@ impl Places {
         let [t_s, drone, x, y, vx, vy, altitude_m, energy_j] = numbers;
         let (position_m, velocity_mps) = (Vec2::new(x, y), Vec2::new(vx, vy));
         let group = fields[self.group].clone();
-        Some(Some(TraceRow { t_s, drone: drone as usize, position_m, velocity_mps, altitude_m, group, energy_j }))
+        let metrics = self.metrics.iter().map(|&place| fields[place].parse().ok()).collect();
+        let drone = drone as usize;
+        Some(Some(TraceRow { t_s, drone, position_m, velocity_mps, altitude_m, group, energy_j, metrics }))
     }
 }
 
-/// Reads the trace of a run, and calls `tick` with the rows of the living drones in each tick, in which any lives.
+/// Reads the trace of a run, and calls `tick` with the rows of the living drones in each tick, in which any lives. Returns the
+/// names of the figures that pilots report.
 pub(crate) fn read(
     folder: &RunFolder,
     interrupted: &Interrupted<'_>,
     mut tick: impl FnMut(&[TraceRow]) -> Result<(), ReportError>,
-) -> Result<(), ReportError> {
+) -> Result<Vec<String>, ReportError> {
     let path = folder.path().join(TRACE);
     let (mut lines, mut fields) = (CsvReader::new(BufReader::new(folder.files().read(TRACE)?)), Vec::new());
     let content = |found: String| ReportError::Content { path: path.clone(), expected: EXPECTED, found };
     let found = |lines: &CsvReader<_>| content(format!("line {} is \"{}\"", lines.line_number(), lines.line()));
     lines.read(&mut fields).map_err(ReportError::io(&path))?;
     let places = Places::of(&fields).ok_or_else(|| found(&lines))?;
+    let names = places.metrics.iter().map(|&place| fields[place][METRIC.len()..].to_owned()).collect();
     let mut rows: Vec<TraceRow> = Vec::new();
     while lines.read(&mut fields).map_err(ReportError::io(&path))? {
         let Some(row) = places.row(&fields).ok_or_else(|| found(&lines))? else { continue };
@@ -187,7 +198,10 @@ pub(crate) fn read(
         }
         rows.push(row);
     }
-    if rows.is_empty() { Ok(()) } else { tick(&rows) }
+    if !rows.is_empty() {
+        tick(&rows)?;
+    }
+    Ok(names)
 }
 
 /// Leaves every `every`-th tick of the trace in the file, beginning with the first one, and the last tick.

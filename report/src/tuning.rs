@@ -33,6 +33,8 @@ pub(crate) const FULL_RATE_DRONES: f64 = 100.0;
 pub(crate) const SCENE_PERIOD: u64 = 5;
 /// Largest number of frames in a sample; the oldest frames beyond it are left out. Chosen by hand.
 pub(crate) const SAMPLE_FRAMES_MAX: usize = 4096;
+/// Largest number of marks, and of lines, in a sample; the last ones beyond it are left out. Chosen by hand.
+pub(crate) const SAMPLE_MARKS_MAX: usize = 4096;
 
 /// Time between two samples of a plot, s. Chosen by hand.
 pub(crate) const PLOT_PERIOD_S: f64 = 0.1;
@@ -43,6 +45,8 @@ pub(crate) const PLOT_SAMPLES_MAX: usize = 20_000;
 pub(crate) const PLOT_POINTS_MAX: usize = 60_000;
 /// Largest number of drones for which the slot error is plotted: the best assignment takes O(n³). Chosen by hand.
 pub(crate) const PLOT_SLOT_ERROR_DRONES_MAX: usize = 100;
+/// Largest number of panels in the plot of the figures that pilots report. Chosen by hand.
+pub(crate) const OWN_PANELS_MAX: usize = 24;
 /// Largest number of drones in the animated flight: more would make the file too large. Chosen by hand.
 pub(crate) const ANIMATION_DRONES_MAX: usize = 64;
 /// Largest product of drones and samples in report.html; beyond it, samples are left out evenly. Chosen by hand.

@@ -26,7 +26,10 @@ impl Drift {
 }
 
 impl Pilot for Drift {
-    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) -> Command {
+        out.metric("gain", self.gain_per_s);
+        out.mark("here", senses.position_m);
+        out.line("home", senses.position_m, [0.0; 3]);
         let share = self.gain_per_s / senses.neighbours.len().max(1) as f64;
         let mut velocity_mps = [0.0; 3];
         for neighbour in senses.neighbours {

@@ -2,14 +2,13 @@
 
 use crate::facts::RunFacts;
 use crate::geometry::outline;
+use crate::group_order::GroupOrder;
 use crate::mcap::foxglove::{
     ArrowPrimitive, Color, CylinderPrimitive, LINE_LIST, LINE_LOOP, LINE_STRIP, LinePrimitive, Pose, SceneEntity,
-    SceneUpdate, TextPrimitive, Time, TriangleListPrimitive, Vector3,
+    SceneUpdate, SpherePrimitive, TextPrimitive, Time, TriangleListPrimitive, Vector3,
 };
-use crate::palette::GROUP_COLOURS;
 use crate::scene::{Sample, State, rounded};
 use skein_protocol::shape::ConvexShape;
-use std::collections::BTreeMap;
 
 /// How far above its place a drone is drawn, m: above its slot and its danger zone.
 const LIFT_M: f64 = 2.0;
@@ -19,6 +18,10 @@ const ARROW_LENGTH_M: f64 = 7.0;
 const ARROW_WIDTH_M: f64 = 3.0;
 /// Width of the line of a radio link, pixels.
 const LINK_PX: f64 = 1.0;
+/// Diameter of a pilot's mark, m.
+const MARK_M: f64 = 2.0;
+/// Width of a pilot's line, pixels.
+const MARK_PX: f64 = 2.0;
 const GREY: (u8, u8, u8) = (140, 140, 140);
 const RED: (u8, u8, u8) = (204, 30, 20);
 const BLUE: (u8, u8, u8) = (0, 114, 178);
@@ -66,21 +69,6 @@ fn face(shape: &ConvexShape, z_m: f64) -> TriangleListPrimitive {
     TriangleListPrimitive { pose, points, color: colour(GREY, 1.0), colors: Vec::new(), indices }
 }
 
-/// Assigns a colour to each group, in the order in which groups appear.
-#[derive(Default)]
-struct Colours(BTreeMap<String, usize>);
-
-impl Colours {
-    fn of(&mut self, group: &str) -> (u8, u8, u8) {
-        let next = self.0.len();
-        let place = match self.0.get(group) {
-            Some(&place) => place,
-            None => *self.0.entry(group.to_owned()).or_insert(next),
-        };
-        GROUP_COLOURS[place % GROUP_COLOURS.len()]
-    }
-}
-
 /// The parts of the scene that move: danger zones, slots, radio links.
 pub(super) fn moving_scene(facts: &RunFacts, sample: &Sample, at: Time) -> SceneUpdate {
     let state = &sample.state;
@@ -100,13 +88,16 @@ struct Look {
 #[derive(Default)]
 pub(super) struct Drones {
     looks: Vec<Option<Look>>,
-    colours: Colours,
+    colours: GroupOrder,
+    /// Whether marks were sent that are still there.
+    marked: bool,
 }
 
 impl Drones {
     /// The drones whose look changed; `None` if no look changed.
     pub(crate) fn changed(&mut self, state: &State, at: Time) -> Option<SceneUpdate> {
         self.looks.resize(state.x_m.len(), None);
+        self.colours.note(&state.group);
         let mut entities = Vec::new();
         for (drone, known) in self.looks.iter_mut().enumerate() {
             let (group, leads, alive) = (&state.group[drone], &state.leads[drone], state.alive[drone]);
@@ -118,6 +109,40 @@ impl Drones {
         }
         (!entities.is_empty()).then(|| SceneUpdate { deletions: Vec::new(), entities })
     }
+
+    /// The marks and lines of pilots, in the colours of the drones; once without any when there are none any more. `None` if
+    /// nothing has to be sent.
+    pub(crate) fn marks(&mut self, sample: &Sample, at: Time) -> Option<SceneUpdate> {
+        let (shown, state) = (&sample.shown, &sample.state);
+        let marked = std::mem::replace(&mut self.marked, !shown.is_empty());
+        if !marked && shown.is_empty() {
+            return None;
+        }
+        let mut shade = |drone: u32| state.group.get(drone as usize).map_or(GREY, |group| self.colours.colour(group));
+        let mut entity = SceneEntity::new("marks", at);
+        for mark in &shown.marks {
+            let [x, y, z] = mark.at_m;
+            let (pose, color) = (Pose::new(x, y, z, 0.0), colour(shade(mark.drone), 1.0));
+            let size = Vector3 { x: MARK_M, y: MARK_M, z: MARK_M };
+            entity.spheres.push(SpherePrimitive { pose, size, color });
+            entity.texts.extend(label(&mark.label, [x, y, z], color));
+        }
+        for shown in &shown.lines {
+            let ([x, y, z], [u, v, w]) = (shown.from_m, shown.to_m);
+            let color = colour(shade(shown.drone), 1.0);
+            let ends = vec![Vector3 { x, y, z }, Vector3 { x: u, y: v, z: w }];
+            entity.lines.push(line(LINE_STRIP, ends, color, MARK_PX));
+            entity.texts.extend(label(&shown.label, [(x + u) / 2.0, (y + v) / 2.0, (z + w) / 2.0], color));
+        }
+        Some(SceneUpdate { deletions: Vec::new(), entities: vec![entity] })
+    }
+}
+
+/// The label of a mark beside this place; `None` without one.
+fn label(text: &str, [x, y, z]: [f64; 3], color: Color) -> Option<TextPrimitive> {
+    let pose = Pose::new(x, y + MARK_M, z, 0.0);
+    let text = (!text.is_empty()).then(|| text.to_owned())?;
+    Some(TextPrimitive { pose, billboard: true, font_size: 10.0, scale_invariant: true, color, text })
 }
 
 /// Position of a drone, m.
@@ -131,9 +156,9 @@ fn living(state: &State) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// The entity of a drone: an arrow and its number.
-fn arrow(state: &State, drone: usize, at: Time, colours: &mut Colours) -> SceneEntity {
+fn arrow(state: &State, drone: usize, at: Time, colours: &mut GroupOrder) -> SceneEntity {
     let alive = state.alive[drone] == 1;
-    let shade = if alive { colours.of(&state.group[drone]) } else { GREY };
+    let shade = if alive { colours.colour(&state.group[drone]) } else { GREY };
     let mut entity = SceneEntity::new(&format!("drone {drone}"), at);
     entity.frame_id = format!("drone_{drone}");
     entity.frame_locked = true;

@@ -123,6 +123,13 @@ pub(super) struct CylinderPrimitive {
     pub color: Color,
 }
 
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct SpherePrimitive {
+    pub pose: Pose,
+    pub size: Vector3,
+    pub color: Color,
+}
+
 /// [`LinePrimitive::r#type`]: a closed line.
 pub(super) const LINE_LOOP: u8 = 1;
 /// [`LinePrimitive::r#type`]: an open line.
@@ -175,7 +182,7 @@ pub(super) struct SceneEntity {
     pub metadata: Vec<KeyValuePair>,
     pub arrows: Vec<ArrowPrimitive>,
     pub cubes: Vec<Unused>,
-    pub spheres: Vec<Unused>,
+    pub spheres: Vec<SpherePrimitive>,
     pub cylinders: Vec<CylinderPrimitive>,
     pub lines: Vec<LinePrimitive>,
     pub triangles: Vec<TriangleListPrimitive>,

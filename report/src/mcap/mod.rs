@@ -5,7 +5,8 @@
 //! |---|---|---|
 //! | `/tf` | `foxglove.FrameTransforms`: a frame `drone_3` for each drone, in the frame `world` | every sample |
 //! | `/drones` | `foxglove.PosesInFrame` | every fifth sample |
-//! | `/scene` | `foxglove.SceneUpdate`: obstacles, hulls, routes; drones; danger zones, slots, radio links | once; when they change; every fifth sample |
+//! | `/scene` | `foxglove.SceneUpdate`: obstacles, hulls, routes; drones; marks and lines of pilots; danger zones, slots, radio links | once; when they change; every sample with any; every fifth sample |
+//! | `/skein/marks` | `skein.Marks`: see [`Shown`](crate::scene::Shown) | every sample with marks or lines |
 //! | `/log` | `foxglove.Log` | every event |
 //! | `/skein/state`, `/skein/energy`, `/skein/radio` | `skein.State`, … in JSON, see [`Sample`](crate::scene::Sample) | every sample |
 //! | `/skein/groups`, `/skein/leadership`, `/skein/events` | `skein.Event`: a line of events.jsonl | every event |

@@ -74,6 +74,7 @@ impl<S: FnMut(Sample) -> Result<(), ReportError>, E: FnMut(RunEvent)> Messages<'
                 match topic {
                     "/skein/state" => self.partial.state = parse(self.path, topic, &data)?,
                     "/skein/energy" => self.partial.energy = parse(self.path, topic, &data)?,
+                    "/skein/marks" => self.partial.shown = parse(self.path, topic, &data)?,
                     "/skein/radio" => {
                         self.partial.radio = parse(self.path, topic, &data)?;
                         (self.sample)(std::mem::take(&mut self.partial))?;

@@ -18,7 +18,7 @@ use skein_protocol::record::{
 };
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::telemetry::{Telemetry, TelemetryRow};
-use skein_protocol::{GroupId, Message, MetricName, TopicName, UserMessage, Vec2};
+use skein_protocol::{GroupId, Message, MetricName, ShortText, TopicName, UserMessage, Vec2};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -128,6 +128,51 @@ fn what_pilots_say_is_recorded_as_bytes_and_their_figures_by_drone() {
     assert_eq!(found["/pilots/gossip"], b"\0\0\0\0hello");
     let metrics: serde_json::Value = serde_json::from_slice(&found["/skein/metrics"]).unwrap();
     assert_eq!(metrics, serde_json::json!({"t_s": 0.02, "metrics": {"order": {"0": 0.5}}}));
+}
+
+#[test]
+fn marks_of_pilots_are_in_the_scene_until_they_are_gone_and_read_back() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = RunFolder::at(&root.path().join("run"), false).unwrap();
+    let path = folder.path().join(RECORDING);
+    let file = std::fs::File::create(&path).unwrap();
+    let mut writer = McapWriter::new(file, path.clone(), &facts(1), &serde_json::Value::Null).unwrap();
+    let label = ShortText::cut("goal");
+    let shown = [
+        Telemetry::Mark { label, point_m: [1.0, 2.0, 3.0] },
+        Telemetry::Line { label: ShortText::default(), from_m: [0.0; 3], to_m: [4.0, 5.0, 6.0] },
+    ];
+    let shown = shown.map(|what| TelemetryRow::new(DroneId(0), &what).unwrap());
+    for tick in 0..20u64 {
+        let now = SimTime((tick as i64 + 1) * 20_000_000);
+        let (head, rows) = (RecordHeader { tick, now, ..RecordHeader::default() }, [row(0.0, 0.0)]);
+        // Shown for a tick between two samples only.
+        let telemetry = if tick == 2 { &shown[..] } else { &[] };
+        writer.take(RecordView { head: &head, rows: &rows, frames: &[], telemetry, events: &[] }, &[]).unwrap();
+    }
+    writer.finish().unwrap();
+    let mut samples = Vec::new();
+    let take = |sample: Sample| {
+        samples.push(sample.shown);
+        Ok(())
+    };
+    read(&folder, &Interrupted::never(), take, |_| {}).unwrap();
+    assert_eq!(
+        (samples.len(), samples[0].marks[0].at_m, samples[0].lines[0].to_m),
+        (4, [1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
+    );
+    assert!(samples[1..].iter().all(|shown| shown.is_empty()));
+    let bytes = std::fs::read(&path).unwrap();
+    let scenes = ::mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let scenes = scenes.filter(|message| message.channel.topic == "/scene");
+    let entities = scenes.flat_map(|message| {
+        let scene: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        scene["entities"].as_array().unwrap().clone()
+    });
+    let marks: Vec<_> = entities.filter(|entity| entity["id"] == "marks").collect();
+    let count = |entity: &serde_json::Value, kind: &str| entity[kind].as_array().unwrap().len();
+    let counts: Vec<_> = marks.iter().map(|m| ["spheres", "lines", "texts"].map(|kind| count(m, kind))).collect();
+    assert_eq!(counts, [[1, 1, 1], [0, 0, 0]]);
 }
 
 #[test]

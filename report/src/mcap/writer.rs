@@ -6,7 +6,7 @@ use crate::mcap::draw::{self, Drones};
 use crate::mcap::foxglove::{
     FrameTransform, FrameTransforms, Log, Pose, PosesInFrame, Quaternion, SceneUpdate, Time, Vector3, WORLD,
 };
-use crate::scene::{EnergySample, Observer, RadioSample, Sample, State, event_text, rounded};
+use crate::scene::{EnergySample, Observer, RadioSample, Sample, Shown, State, event_text, rounded};
 use crate::tuning::{FULL_RATE_DRONES, SAMPLE_RATE_HZ, SCENE_PERIOD};
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::{Attachment, McapResult, WriteOptions, Writer};
@@ -25,7 +25,7 @@ const COMPRESSION_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
 const CHUNK_BYTES: u64 = 1 << 20;
 /// The topics, in the order of [`Topic`].
-pub(super) const TOPICS: [&str; 11] = [
+pub(super) const TOPICS: [&str; 12] = [
     "/tf",
     "/drones",
     "/scene",
@@ -37,6 +37,7 @@ pub(super) const TOPICS: [&str; 11] = [
     "/skein/leadership",
     "/skein/events",
     "/skein/metrics",
+    "/skein/marks",
 ];
 
 /// The topics of the recording, as indices of [`TOPICS`].
@@ -54,6 +55,7 @@ pub(super) enum Topic {
     Leadership,
     Events,
     Metrics,
+    Marks,
 }
 
 /// Writes run.mcap.
@@ -154,7 +156,10 @@ impl<W: Write + Seek> McapWriter<W> {
         ];
         let event = ("skein.Event", serde_json::json!({"type": "object", "required": ["t_s", "event"]}));
         let events = std::iter::repeat_n(event, 3);
-        let all = schemas.into_iter().chain(events).chain([("skein.Metrics", schema::<MetricsSample>())]);
+        let all = schemas
+            .into_iter()
+            .chain(events)
+            .chain([("skein.Metrics", schema::<MetricsSample>()), ("skein.Marks", schema::<Shown>())]);
         for (topic, (name, schema)) in TOPICS.iter().zip(all) {
             let id = self.out.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
             self.channels.push(self.out.add_channel(id, topic, "json", &BTreeMap::new())?);
@@ -175,10 +180,16 @@ impl<W: Write + Seek> McapWriter<W> {
         self.put(Topic::Transforms, now, &transforms(state, at))?;
         self.put(Topic::State, now, state)?;
         self.put(Topic::Energy, now, &sample.energy)?;
+        if !sample.shown.is_empty() {
+            self.put(Topic::Marks, now, &sample.shown)?;
+        }
         self.put(Topic::Radio, now, &sample.radio)?;
         self.samples += 1;
         if let Some(changed) = self.drones.changed(state, at) {
             self.put(Topic::Scene, now, &changed)?;
+        }
+        if let Some(marks) = self.drones.marks(sample, at) {
+            self.put(Topic::Scene, now, &marks)?;
         }
         if self.samples % SCENE_PERIOD == 1 {
             self.put(Topic::Drones, now, &poses(state, at))?;

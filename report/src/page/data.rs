@@ -4,6 +4,7 @@ use crate::error::ReportError;
 use crate::facts::RunFacts;
 use crate::folder::RunFolder;
 use crate::geometry::outline;
+use crate::group_order::GroupOrder;
 use crate::interruption::Interrupted;
 use crate::mcap;
 use crate::scene::{Sample, event_text};
@@ -20,8 +21,14 @@ use std::io::{self, Write};
 /// The first line of a run: its facts, and the outlines of the obstacles.
 #[must_use]
 pub fn facts_line(facts: &RunFacts) -> String {
+    facts_and_groups(facts, &GroupOrder::default())
+}
+
+/// The same with the groups of a recorded run, from whose order their colours follow.
+fn facts_and_groups(facts: &RunFacts, groups: &GroupOrder) -> String {
     let mut line = json!({ "facts": facts });
     line["facts"]["outlines"] = json!(facts.obstacles.iter().map(outline).collect::<Vec<_>>());
+    line["facts"]["groups"] = json!(groups.names());
     line.to_string()
 }
 
@@ -58,7 +65,7 @@ pub fn status_line(status: &str) -> String {
 }
 
 /// The recording of a run: lines of JSON, deflated, in Base64. It is read twice, so that it never has to be in memory: the
-/// first time for its length and its events.
+/// first time for its length, its groups and its events.
 pub(super) fn packed(
     folder: &RunFolder,
     facts: &RunFacts,
@@ -66,13 +73,14 @@ pub(super) fn packed(
 ) -> Result<String, ReportError> {
     let mut out = LineWriter(ZlibEncoder::new(Vec::new(), Compression::default()));
     let io = |result: io::Result<()>| result.map_err(ReportError::io(folder.path()));
-    io(out.line(&facts_line(facts)))?;
-    let (mut samples, mut events) = (0, Vec::new());
-    let count = |_| {
+    let (mut samples, mut groups, mut events) = (0, GroupOrder::default(), Vec::new());
+    let count = |sample: Sample| {
         samples += 1;
+        groups.note(&sample.state.group);
         Ok(())
     };
     mcap::read(folder, interrupted, count, |event| events.extend(event_line(&event)))?;
+    io(out.line(&facts_and_groups(facts, &groups)))?;
     io(events.iter().try_for_each(|line| out.line(line)))?;
     let (step, last) = (step(samples, facts.drones as usize), samples.saturating_sub(1));
     let mut place = 0;

@@ -14,13 +14,13 @@ const THEMED: [(&str, &str); 6] = [
 
 /// The figures of the page.
 pub(super) fn all(plots: &[Plot]) -> String {
-    let mut html = "<h2>Figures</h2>".to_owned();
+    let mut html = "<h2>Figures</h2><div class=\"figures\">".to_owned();
     // The replay shows more than the animation, which is left out.
     for Plot { file, svg } in plots.iter().filter(|plot| plot.file != "flight.svg") {
         let name = file.trim_end_matches(".svg");
         html += &format!("<figure id=\"{name}\">{}</figure>", themed(svg));
     }
-    html
+    html + "</div>"
 }
 
 /// Replaces colours only where they are a whole attribute, so that text in a plot does not change.

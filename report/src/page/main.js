@@ -2,16 +2,17 @@
 // The player: connects story, scene and panels, plays a recording, and follows a live run.
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
-// What the check boxes show and hide.
-const SHOWN = { routes: "routes", slots: "slots", zones: "danger zones", links: "links", drops: "dropped frames", trails: "trails",
-  names: "numbers" };
 const byId = id => document.getElementById(id);
 
 class Player {
   constructor() {
     this.story = new Story();
     this.scene = new Scene(byId("scene"));
+    this.side = new Side(byId("side"), this.scene);
     this.panels = new Panels(this.story, this.scene);
+    this.key = new Key(this.scene.shows);
+    // What takes part in the fitted box, or changes the size of the picture.
+    this.key.changed = name => { if (!this.scene.fitted && ["zones", "routes", "key", "side"].includes(name)) this.fit(); };
     this.t = 0;
     this.playing = false;
     this.live = false;
@@ -30,29 +31,21 @@ class Player {
     speed.append(new Option("live", "live"), ...SPEEDS.map(s => new Option(s + " ×", s)));
     speed.value = 1;
     speed.addEventListener("change", () => { this.live = speed.value === "live"; if (this.live) this.play(true); });
-    for (const [key, label] of Object.entries(SHOWN)) {
-      const box = element("input");
-      box.type = "checkbox";
-      box.id = "show-" + key;
-      box.checked = this.scene.shows[key];
-      box.addEventListener("change", () => { this.scene.shows[key] = box.checked; });
-      const holder = element("label");
-      holder.append(box, " " + label);
-      byId("shows").append(holder);
-    }
     byId("play").addEventListener("click", () => this.play(!this.playing));
     byId("time").addEventListener("input", event => this.seek(Number(event.target.value)));
     byId("fit").addEventListener("click", () => this.fit());
     byId("selected").addEventListener("change", event => this.choose(event.target.value === "" ? null : Number(event.target.value)));
     this.panels.seek = t => this.seek(t);
-    document.addEventListener("keydown", event => this.key(event));
+    document.addEventListener("keydown", event => this.press(event));
+    window.addEventListener("resize", () => { if (!this.scene.fitted) this.fit(); });
   }
 
-  key(event) {
+  press(event) {
     if (["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName)) return;
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (event.key === " ") this.play(!this.playing);
     else if (event.key === "f") this.fit();
+    else if (event.key === "k") this.key.open(this.key.aside.hidden);
     else if (event.key === "Escape") this.choose(null);
     else if (step) this.seek(this.t + step * (event.shiftKey ? 5 : 0.5));
     else return;
@@ -104,9 +97,14 @@ class Player {
   }
 
   fit() {
-    this.scene.fit(this.story.box());
+    this.fitBox();
     byId("follow").checked = false;
     this.scene.fitted = false;
+  }
+
+  // A recorded flight gets a picture of its own shape. A live one grows, and its picture must not.
+  fitBox() {
+    this.scene.fit(this.story.box(this.scene.shows, v => this.scene.danger(v)), !this.open);
   }
 
   choose(drone) {
@@ -129,19 +127,26 @@ class Player {
   frame(now) {
     this.advance(now);
     this.t = Math.max(this.t, this.story.start);
-    const moment = this.now = this.story.moment(this.t, this.scene.shows.trails);
+    const moment = this.now = this.story.moment(this.t, this.scene.shows.trails, this.scene.shows.tracks);
     if (moment && this.selected !== null && this.selected < moment.x.length) moment.heard = this.story.heard(this.selected, moment.place);
     if (moment && byId("follow").checked) this.follow(moment);
     this.scene.draw(moment, this.selected);
+    this.side.draw(moment, this.story, this.scene.shows.side && Side.isOfUse(this.story));
     const slider = byId("time");
     slider.min = this.story.start;
     slider.max = this.story.end;
     if (document.activeElement !== slider || this.playing) slider.value = this.t;
     byId("clock").textContent = this.t.toFixed(1) + " s";
     // The text of the panels is updated ten times per second.
-    if (moment && now - this.shown > 100) { this.shown = now; this.panels.show(moment, this.selected); }
+    if (moment && now - this.shown > 100) { this.shown = now; this.panels.show(moment, this.selected); this.offer(); }
     this.frames++;
     requestAnimationFrame(then => this.frame(then));
+  }
+
+  // Lists what only some runs have.
+  offer() {
+    this.key.offer("marks", this.story.shown);
+    this.key.offer("side", Side.isOfUse(this.story));
   }
 
   follow(moment) {
@@ -158,7 +163,8 @@ class Player {
   take(line) {
     if (line.facts) {
       this.panels.clear();
-      this.scene.colours = new Colours();
+      this.scene.colours = new Colours(line.facts.groups);
+      this.key.set("zones", line.facts.drones <= ZONES_UP_TO);
       this.scene.fitted = false;
       this.t = 0;
     }
@@ -167,7 +173,7 @@ class Player {
     if (line.sample) for (const group of line.sample.state.group) this.scene.colours.of(group);
     if (line.status !== undefined) byId("status").textContent = line.status;
     // Refits the view to a live swarm, which flies out of it, unless the user has moved the view.
-    if (line.sample && this.live && !this.scene.fitted && this.story.samples.length % 20 === 1) this.scene.fit(this.story.box());
+    if (line.sample && this.live && !this.scene.fitted && this.story.samples.length % 20 === 1) this.fitBox();
   }
 }
 

@@ -21,8 +21,14 @@ pub use data::{event_line, facts_line, sample_line, status_line};
 /// The page, with places to be filled in as `{{name}}`.
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
-const SCRIPT: [&str; 4] =
-    [include_str!("scene.js"), include_str!("story.js"), include_str!("panels.js"), include_str!("main.js")];
+const SCRIPT: [&str; 6] = [
+    include_str!("scene.js"),
+    include_str!("side.js"),
+    include_str!("story.js"),
+    include_str!("panels.js"),
+    include_str!("key.js"),
+    include_str!("main.js"),
+];
 
 /// The page of the live view. It connects to the WebSocket `/socket` of the server that it came from, on this port of this
 /// machine. Over the socket it receives lines of [`facts_line`], [`sample_line`], [`event_line`] and [`status_line`]. It

@@ -7,11 +7,22 @@ const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#785e3c
 const MANY = 150;
 // Least safe distance on the screen at which drones have numbers, pixels.
 const NAME_PX = 12;
+// Least and greatest size of an arrow, pixels, and its size as a share of the safe distance, so that neighbours do not overlap.
+const ARROW_PX = [5, 16], ARROW_SHARE = 0.3;
+// Greatest number of points of all whole tracks.
+const TRACK_POINTS = 20000;
+// Space for the numbers of the axes, pixels.
+const GUTTER = { left: 48, bottom: 20 };
+// Number of drones up to which danger zones are shown unless the user asks for them.
+const ZONES_UP_TO = 20;
+// Greatest number of marks that have labels.
+const LABELS = 60;
 // Length of the trails, s.
 const TRAIL_S = 8;
 
+// The colours of groups, in the order in which groups appear. A recording knows the order in advance.
 class Colours {
-  constructor() { this.order = new Map(); }
+  constructor(groups) { this.order = new Map((groups || []).map((group, place) => [group, place])); }
   of(group) {
     let place = this.order.get(group);
     if (place === undefined) this.order.set(group, place = this.order.size);
@@ -27,7 +38,7 @@ class Scene {
     this.facts = null;
     this.view = { x: 0, y: 0, scale: 1 };
     this.fitted = false;
-    this.shows = { routes: true, slots: true, zones: true, links: true, drops: true, trails: true, names: true };
+    this.shows = { routes: true, slots: true, zones: true, links: true, drops: true, trails: true, tracks: false, marks: true, names: true, side: true };
     this.readStyle();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.readStyle());
   }
@@ -42,6 +53,7 @@ class Scene {
   resize() {
     const ratio = window.devicePixelRatio || 1;
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!width || !height) return;
     if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
       this.canvas.width = Math.round(width * ratio);
       this.canvas.height = Math.round(height * ratio);
@@ -51,21 +63,32 @@ class Scene {
     this.height = height;
   }
 
-  // Fits the view to the box [x0, y0, x1, y1], m.
-  fit([x0, y0, x1, y1]) {
+  // Fits the view to the box [x0, y0, x1, y1], m. If `shrink`, the picture becomes as low as the box allows.
+  fit([x0, y0, x1, y1], shrink) {
+    const pad = 14, wide = Math.max(x1 - x0, 20), high = Math.max(y1 - y0, 20);
+    this.canvas.style.height = "";
     this.resize();
-    const pad = 24;
-    const wide = Math.max(x1 - x0, 20), high = Math.max(y1 - y0, 20);
-    this.view.scale = Math.min((this.width - 2 * pad) / wide, (this.height - 2 * pad) / high);
+    const across = (this.width - GUTTER.left - 2 * pad) / wide;
+    if (shrink) {
+      this.canvas.style.height = `${Math.max(200, Math.min(this.height, Math.ceil(high * across + GUTTER.bottom + 2 * pad)))}px`;
+      this.resize();
+    }
+    this.view.scale = Math.max(Math.min(across, (this.height - GUTTER.bottom - 2 * pad) / high), 1e-3);
     this.view.x = (x0 + x1) / 2;
     this.view.y = (y0 + y1) / 2;
   }
 
-  px(x) { return this.width / 2 + (x - this.view.x) * this.view.scale; }
-  py(y) { return this.height / 2 - (y - this.view.y) * this.view.scale; }
+  // The middle of the picture without its gutters, pixels.
+  get middle() { return [(this.width + GUTTER.left) / 2, (this.height - GUTTER.bottom) / 2]; }
+  px(x) { return this.middle[0] + (x - this.view.x) * this.view.scale; }
+  py(y) { return this.middle[1] - (y - this.view.y) * this.view.scale; }
   at(px, py) {
-    return [this.view.x + (px - this.width / 2) / this.view.scale, this.view.y - (py - this.height / 2) / this.view.scale];
+    const [mx, my] = this.middle;
+    return [this.view.x + (px - mx) / this.view.scale, this.view.y - (py - my) / this.view.scale];
   }
+
+  // Radius of the danger zone at a speed, m.
+  danger(v) { const d = this.facts.scene.danger_m; return d[0] + v * (d[1] + v * d[2]); }
 
   zoom(factor, px, py) {
     const [x, y] = this.at(px, py);
@@ -82,14 +105,24 @@ class Scene {
     pen.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     pen.clearRect(0, 0, this.width, this.height);
     this.grid();
+    pen.save();
+    pen.beginPath();
+    pen.rect(GUTTER.left, 0, this.width - GUTTER.left, this.height - GUTTER.bottom);
+    pen.clip();
     if (this.facts) this.still();
-    if (!moment) return;
+    if (moment) this.moving(moment, selected);
+    pen.restore();
+  }
+
+  moving(moment, selected) {
     const many = moment.x.length > MANY;
+    if (this.shows.tracks && moment.tracks) this.tracks(moment);
     if (this.shows.trails && moment.trails) this.trails(moment);
     if (this.shows.zones && this.facts) this.zones(moment, many, selected);
     if (this.shows.slots) this.slots(moment);
     if (this.shows.links) this.links(moment, many, selected);
     if (this.shows.drops) this.drops(moment, selected);
+    if (this.shows.marks) this.marks(moment, this.pen, x => this.px(x), (_, y) => this.py(y));
     this.drones(moment, many, selected);
   }
 
@@ -97,22 +130,24 @@ class Scene {
     const pen = this.pen;
     const steps = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
     const step = steps.find(s => s * this.view.scale >= 70) || 10000;
-    const [left, top] = this.at(0, 0), [right, bottom] = this.at(this.width, this.height);
+    const edge = this.height - GUTTER.bottom;
+    const [left, top] = this.at(GUTTER.left, 0), [right, bottom] = this.at(this.width, edge);
     pen.lineWidth = 1;
     pen.strokeStyle = this.ink.grid;
     pen.fillStyle = this.ink.soft;
     pen.font = "11px system-ui,sans-serif";
     pen.textBaseline = "alphabetic";
-    pen.textAlign = "left";
     pen.beginPath();
     const xs = [], ys = [];
     for (let x = Math.ceil(left / step) * step; x <= right; x += step) xs.push(x);
     for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) ys.push(y);
-    for (const x of xs) { pen.moveTo(this.px(x), 0); pen.lineTo(this.px(x), this.height); }
-    for (const y of ys) { pen.moveTo(0, this.py(y)); pen.lineTo(this.width, this.py(y)); }
+    for (const x of xs) { pen.moveTo(this.px(x), 0); pen.lineTo(this.px(x), edge + 4); }
+    for (const y of ys) { pen.moveTo(GUTTER.left - 4, this.py(y)); pen.lineTo(this.width, this.py(y)); }
     pen.stroke();
-    for (const x of xs) pen.fillText(x + " m", this.px(x) + 3, this.height - 5);
-    for (const y of ys) pen.fillText(y + " m", 4, this.py(y) - 3);
+    pen.textAlign = "center";
+    for (const x of xs) if (this.px(x) < this.width - 20) pen.fillText(x + " m", this.px(x), this.height - 5);
+    pen.textAlign = "right";
+    for (const y of ys) if (this.py(y) > 8) pen.fillText(y + " m", GUTTER.left - 7, this.py(y) + 4);
   }
 
   path(points, closed) {
@@ -173,15 +208,70 @@ class Scene {
     pen.globalAlpha = 1;
   }
 
+  // The whole tracks of all drones, in the colours of their groups.
+  tracks(moment) {
+    const pen = this.pen, samples = moment.tracks;
+    const step = Math.max(1, Math.ceil(samples.length * moment.x.length / TRACK_POINTS));
+    const lines = new Map();
+    let before = null;
+    for (let k = 0; k < samples.length; k = k === samples.length - 1 ? k + 1 : Math.min(k + step, samples.length - 1)) {
+      const now = samples[k].state;
+      if (before) {
+        for (let i = 0; i < now.x_m.length; i++) {
+          if (!now.alive[i]) continue;
+          let line = lines.get(before.group[i]);
+          if (!line) lines.set(before.group[i], line = new Path2D());
+          line.moveTo(this.px(before.x_m[i]), this.py(before.y_m[i]));
+          line.lineTo(this.px(now.x_m[i]), this.py(now.y_m[i]));
+        }
+      }
+      before = now;
+    }
+    pen.lineWidth = 1;
+    pen.globalAlpha = 0.7;
+    for (const [group, line] of lines) { pen.strokeStyle = this.colour(group); pen.stroke(line); }
+    pen.globalAlpha = 1;
+  }
+
+  // What pilots show: marks and lines, in the colour of the drone that shows them. The same from above and from the side.
+  marks(moment, pen, right, up) {
+    const shown = moment.sample.shown, state = moment.sample.state;
+    if (!shown) return;
+    const colour = drone => drone < state.group.length ? this.colour(state.group[drone]) : this.ink.soft;
+    const labelled = this.shows.names && shown.marks.length + shown.lines.length <= LABELS;
+    pen.lineWidth = 1.6;
+    pen.font = "11px system-ui,sans-serif";
+    pen.textAlign = "left";
+    const label = (text, x, y) => { if (labelled && text) { pen.fillStyle = this.ink.soft; pen.fillText(text, x, y); } };
+    for (const line of shown.lines) {
+      const [x, y] = [right(line.from_m[0]), up(line.from_m[2], line.from_m[1])], [u, v] = [right(line.to_m[0]), up(line.to_m[2], line.to_m[1])];
+      pen.strokeStyle = colour(line.drone);
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(u, v);
+      pen.stroke();
+      label(line.label, (x + u) / 2 + 4, (y + v) / 2 - 3);
+    }
+    for (const mark of shown.marks) {
+      const x = right(mark.at_m[0]), y = up(mark.at_m[2], mark.at_m[1]);
+      pen.strokeStyle = colour(mark.drone);
+      pen.beginPath();
+      pen.moveTo(x, y - 5); pen.lineTo(x + 5, y); pen.lineTo(x, y + 5); pen.lineTo(x - 5, y);
+      pen.closePath();
+      pen.stroke();
+      label(mark.label, x + 8, y + 4);
+    }
+  }
+
   zones(moment, many, selected) {
-    const pen = this.pen, danger = this.facts.scene.danger_m, state = moment.sample.state;
+    const pen = this.pen, state = moment.sample.state;
     pen.fillStyle = this.ink.bad;
     pen.globalAlpha = 0.07;
     for (let i = 0; i < moment.x.length; i++) {
       if (!state.alive[i] || (many && i !== selected)) continue;
       const v = Math.hypot(moment.vx[i], moment.vy[i]);
       pen.beginPath();
-      pen.arc(this.px(moment.x[i]), this.py(moment.y[i]), (danger[0] + v * (danger[1] + v * danger[2])) * this.view.scale, 0, 7);
+      pen.arc(this.px(moment.x[i]), this.py(moment.y[i]), this.danger(v) * this.view.scale, 0, 7);
       pen.fill();
     }
     pen.globalAlpha = 1;
@@ -266,7 +356,8 @@ class Scene {
 
   drones(moment, many, selected) {
     const pen = this.pen, state = moment.sample.state;
-    const size = Math.min(Math.max(3.5 * this.view.scale, many ? 2.5 : 5), 14);
+    const gap = this.facts ? this.facts.safe_distance_m : 10;
+    const size = Math.min(Math.max(ARROW_SHARE * gap * this.view.scale, many ? 2.5 : ARROW_PX[0]), ARROW_PX[1]);
     for (const [group, members] of this.byGroup(moment)) {
       pen.fillStyle = this.colour(group);
       pen.beginPath();

@@ -11,6 +11,10 @@ class Story {
     this.facts = null;
     this.samples = [];
     this.events = [];
+    // Least and greatest altitude of a drone, m, and whether a pilot showed something.
+    this.low = Infinity;
+    this.high = -Infinity;
+    this.shown = false;
   }
 
   get start() { return this.samples.length ? this.samples[0].state.t_s : 0; }
@@ -23,6 +27,8 @@ class Story {
       this.facts = line.facts;
     } else if (line.sample) {
       this.samples.push(line.sample);
+      this.shown ||= Boolean(line.sample.shown);
+      for (const z of line.sample.state.z_m) { if (z < this.low) this.low = z; if (z > this.high) this.high = z; }
       const limit = Math.max(600, MAX_VALUES / (16 * Math.max(1, line.sample.state.x_m.length)));
       if (this.samples.length > limit * 1.1) this.samples.splice(0, this.samples.length - limit);
     } else if (line.event) {
@@ -41,7 +47,7 @@ class Story {
   }
 
   // The swarm at t. Positions and velocities are interpolated between two samples; all else is from the earlier sample.
-  moment(t, trail) {
+  moment(t, trail, tracks) {
     if (!this.samples.length) return null;
     const place = Math.max(this.before(t), 0);
     const a = this.samples[place], b = this.samples[Math.min(place + 1, this.samples.length - 1)];
@@ -57,6 +63,7 @@ class Story {
       moment.trails = [];
       for (let k = first; k <= place; k += step) moment.trails.push(this.samples[k]);
     }
+    if (tracks) moment.tracks = this.samples;
     return moment;
   }
 
@@ -85,15 +92,23 @@ class Story {
     return new Map([...from].sort((a, b) => a[0] - b[0]));
   }
 
-  // The box around obstacles and tracks: [x0, y0, x1, y1], m.
-  box() {
+  // The box around obstacles and tracks, and around routes and discs if they are shown: [x0, y0, x1, y1], m. `radius` gives
+  // the radius of the disc around a drone at a speed, m.
+  box(shows, radius) {
     let box = [Infinity, Infinity, -Infinity, -Infinity];
     const add = (x, y) => { box = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)]; };
     if (this.facts) for (const outline of this.facts.outlines) for (const [x, y] of outline) add(x, y);
+    if (this.facts && shows.routes) for (const set of this.facts.scene.sets) {
+      for (const line of [...set.hulls_m, ...set.routes_m]) for (const [x, y] of line) add(x, y);
+    }
     const step = Math.max(1, Math.floor(this.samples.length / 100));
     for (let k = 0; k < this.samples.length; k += step) {
       const s = this.samples[k].state;
-      for (let i = 0; i < s.x_m.length; i++) add(s.x_m[i], s.y_m[i]);
+      for (let i = 0; i < s.x_m.length; i++) {
+        const r = shows.zones && s.alive[i] ? radius(Math.hypot(s.vx_mps[i], s.vy_mps[i])) : 0;
+        add(s.x_m[i] - r, s.y_m[i] - r);
+        add(s.x_m[i] + r, s.y_m[i] + r);
+      }
     }
     return box[0] > box[2] ? [-50, -50, 50, 50] : box;
   }

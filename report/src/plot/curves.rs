@@ -5,7 +5,7 @@ use crate::error::DrawError;
 use plotters::prelude::*;
 
 /// Height of the plotting area.
-const HEIGHT: u32 = px(400);
+const HEIGHT: u32 = px(300);
 
 /// Mean and standard deviation of a quantity at one time.
 #[derive(Clone, Debug)]
@@ -14,6 +14,13 @@ pub(super) struct Band {
     pub mean: f64,
     /// Standard deviation.
     pub deviation: f64,
+}
+
+impl Band {
+    /// The same in another unit.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self { mean: self.mean * factor, deviation: self.deviation * factor, ..*self }
+    }
 }
 
 /// A constant reference level.
@@ -60,7 +67,7 @@ impl Figure {
         let mut signs = vec![(Sign::Line(colour), self.line_label.to_owned())];
         signs.extend(ranged.then(|| (Sign::Range(colour), "± standard deviation".to_owned())));
         signs.extend(self.level.as_ref().map(|level| (Sign::Line(level.colour), level.label.clone())));
-        Heading::new(&self.title, signs)
+        Heading::narrow(&self.title, signs)
     }
 
     /// The shaded range as a polygon: along its upper edge, back along its lower edge.

@@ -1,10 +1,11 @@
 //! The flight as an animated SVG, for pages that show pictures but run no script.
 
-use super::samples::{Samples, Track};
-use super::style::{INK, hex, px};
+use super::samples::{Samples, Track, TrackPoint};
+use super::style::{hex, px};
 use super::tracks::{colours, frame};
 use crate::facts::RunFacts;
 use crate::geometry::outline;
+use crate::group_order::GroupOrder;
 use crate::markup::escaped;
 use crate::tuning::ANIMATION_DRONES_MAX;
 use skein_protocol::Vec2;
@@ -14,6 +15,8 @@ use std::fmt::Write;
 const WIDTH: f64 = 1100.0;
 /// Height of the title, px.
 const TITLE: f64 = 40.0;
+/// Greatest length of the scale bar, px.
+const BAR: f64 = 160.0;
 /// Number of samples per key frame.
 const SAMPLES_PER_KEY: usize = 5;
 /// Simulated time per time of the animation.
@@ -21,8 +24,9 @@ const SPEED: f64 = 8.0;
 /// The symbol of a drone, which points along the flight direction, px.
 const ARROW: &str = "M9 0L-7 6L-3 0L-7 -6Z";
 
-/// Draws the animation. `None` without drones, and for a swarm that is too large.
-pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
+/// Draws the animation. `None` without drones, and for a swarm that is too large. A viewer that does not animate shows the
+/// drones in the middle of the flight.
+pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts) -> Option<String> {
     if samples.tracks.is_empty() || samples.tracks.len() > ANIMATION_DRONES_MAX {
         return None;
     }
@@ -31,41 +35,123 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts) -> Option<String> {
     let height = height / units_per_pixel;
     let scale = WIDTH / (high.x - low.x);
     let place = |at: Vec2| [(at.x - low.x) * scale, TITLE + (high.y - at.y) * scale];
-    let size = format!("{WIDTH:.0} {:.0}", height + TITLE);
-    let (wide, tall) = size.split_once(' ')?;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {size}\" width=\"{wide}\" height=\"{tall}\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n\
-         <text x=\"12\" y=\"26\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"17\" fill=\"#333\">{}</text>\n",
-        escaped(&format!("{}: {} drones, {:.0} × real time", facts.scenario, facts.drones, SPEED))
-    );
+    let colours: Vec<String> = colours(samples, order).into_iter().map(hex).collect();
+    let mut svg = head(facts, height + TITLE);
+    legend(&mut svg, &samples.groups, &colours);
     // Writing to a string cannot fail.
     for shape in &facts.obstacles {
         let corners = outline(shape).into_iter().map(|(x, y)| place(Vec2::new(x, y)));
         let _ = writeln!(svg, "<polygon fill=\"#bebebe\" points=\"{}\"/>", points(corners));
     }
-    let colours = colours(samples);
+    scale_bar(&mut svg, scale, height + TITLE);
     let longest = samples.tracks.values().map(|track| track.points.len()).max().unwrap_or(0);
-    let seconds = samples.end_s / SPEED;
     for track in samples.tracks.values() {
-        let colour = hex(colours.get(track.group.as_str()).copied().unwrap_or(INK));
-        let keys: Vec<[f64; 2]> = key_frames(track, longest).into_iter().map(place).collect();
-        let _ = writeln!(
-            svg,
-            "<polyline fill=\"none\" stroke=\"{colour}\" stroke-opacity=\".3\" stroke-width=\"2\" points=\"{0}\"/>\n\
-             <path d=\"{ARROW}\" fill=\"{colour}\"><animateTransform attributeName=\"transform\" type=\"translate\" \
-             dur=\"{seconds:.2}s\" repeatCount=\"indefinite\" values=\"{1}\"/></path>",
-            points(keys.iter().copied()),
-            keys.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect::<Vec<_>>().join(";"),
-        );
+        for (group, places) in track.parts() {
+            let _ = writeln!(
+                svg,
+                "<polyline fill=\"none\" stroke=\"{}\" stroke-opacity=\".35\" stroke-width=\"2\" points=\"{}\"/>",
+                colours[group],
+                points(thinned(places).map(place))
+            );
+        }
+    }
+    for track in samples.tracks.values() {
+        drone(&mut svg, &key_frames(track, longest), place, &colours, samples.end_s / SPEED);
     }
     svg.push_str("</svg>\n");
     Some(svg)
 }
 
-/// The key frames of a drone, m. Each drone has the same number of them, so that all are shown at the same time. A dead
-/// drone stays at its last position.
-fn key_frames(track: &Track, longest: usize) -> Vec<Vec2> {
+/// The beginning of the drawing: its size, its background and its title.
+fn head(facts: &RunFacts, height: f64) -> String {
+    let title = escaped(&format!("{}: {} drones, {SPEED:.0} × real time", facts.scenario, facts.drones));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH:.0} {height:.0}\" width=\"{WIDTH:.0}\" height=\"{height:.0}\" \
+         font-family=\"Helvetica,Arial,sans-serif\" fill=\"#333\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n\
+         <text x=\"12\" y=\"26\" font-size=\"17\">{title}</text>\n"
+    )
+}
+
+/// The names of the groups in their colours, right of the title.
+fn legend(svg: &mut String, groups: &[String], colours: &[String]) {
+    let width = |group: &String| 34.0 + 9.0 * group.chars().count() as f64;
+    let mut x = WIDTH - groups.iter().map(width).sum::<f64>().min(WIDTH / 2.0);
+    for (group, colour) in groups.iter().zip(colours) {
+        if x + width(group) > WIDTH {
+            return;
+        }
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{x:.0}\" y=\"14\" width=\"14\" height=\"14\" rx=\"3\" fill=\"{colour}\"/>\
+             <text x=\"{:.0}\" y=\"26\" font-size=\"14\">{}</text>",
+            x + 19.0,
+            escaped(group)
+        );
+        x += width(group);
+    }
+}
+
+/// A bar of a round length, lower left. `scale`: pixels per metre.
+fn scale_bar(svg: &mut String, scale: f64, height: f64) {
+    let longest_m = BAR / scale;
+    let power = 10f64.powf(longest_m.log10().floor());
+    let length_m = [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&m| m <= longest_m).unwrap_or(power);
+    let (x, y, end) = (16.0, height - 14.0, 16.0 + length_m * scale);
+    let _ = writeln!(
+        svg,
+        "<path d=\"M{x} {0:.0}V{y:.0}H{end:.1}V{0:.0}\" fill=\"none\" stroke=\"#333\"/>\
+         <text x=\"{1:.1}\" y=\"{2:.0}\" font-size=\"13\" text-anchor=\"middle\">{length_m} m</text>",
+        y - 5.0,
+        f64::midpoint(x, end),
+        y - 6.0
+    );
+}
+
+/// The arrow of a drone at its key frames.
+fn drone(svg: &mut String, keys: &[TrackPoint], place: impl Fn(Vec2) -> [f64; 2], colours: &[String], seconds: f64) {
+    let Some(still) = keys.get(keys.len() / 2) else { return };
+    let at = |point: &TrackPoint| {
+        let [x, y] = place(point.at_m);
+        format!("{x:.1} {y:.1}")
+    };
+    let places: Vec<String> = keys.iter().map(at).collect();
+    let repeated = format!("dur=\"{seconds:.2}s\" repeatCount=\"indefinite\"");
+    let _ = write!(
+        svg,
+        "<path d=\"{ARROW}\" fill=\"{}\" transform=\"translate({})\"><animateTransform attributeName=\"transform\" \
+         type=\"translate\" {repeated} values=\"{}\"/>",
+        colours[still.group],
+        at(still),
+        places.join(";")
+    );
+    if keys.iter().any(|key| key.group != still.group) {
+        let (mut fills, mut times) = (Vec::new(), Vec::new());
+        let mut from = 0;
+        for part in keys.chunk_by(|a, b| a.group == b.group) {
+            fills.push(colours[part[0].group].as_str());
+            times.push(format!("{:.4}", from as f64 / (keys.len() - 1).max(1) as f64));
+            from += part.len();
+        }
+        let _ = write!(
+            svg,
+            "<animate attributeName=\"fill\" calcMode=\"discrete\" {repeated} keyTimes=\"{}\" values=\"{}\"/>",
+            times.join(";"),
+            fills.join(";")
+        );
+    }
+    svg.push_str("</path>\n");
+}
+
+/// Every fifth place, and the last one.
+fn thinned(places: impl Iterator<Item = Vec2> + Clone) -> impl Iterator<Item = Vec2> {
+    let last = places.clone().count().saturating_sub(1);
+    let kept = move |&(place, _): &(usize, Vec2)| place % SAMPLES_PER_KEY == 0 || place == last;
+    places.enumerate().filter(kept).map(|(_, at)| at)
+}
+
+/// The key frames of a drone. Each drone has the same number of them, so that all are shown at the same time. A dead drone
+/// stays at its last position.
+fn key_frames(track: &Track, longest: usize) -> Vec<TrackPoint> {
     let last = track.points.len().saturating_sub(1);
     let places = (0..longest).step_by(SAMPLES_PER_KEY).chain([longest.saturating_sub(1)]);
     places.filter_map(|place| track.points.get(place.min(last)).copied()).collect()
@@ -83,15 +169,24 @@ mod tests {
 
     #[test]
     fn every_drone_has_the_same_number_of_key_frames() {
-        let mut samples = Samples { end_s: 80.0, ..Samples::default() };
+        let groups = vec!["N".to_owned(), "N1".to_owned()];
+        let mut samples = Samples { end_s: 80.0, groups, ..Samples::default() };
         for (drone, count) in [(0, 101), (1, 40)] {
-            let points = (0..count).map(|i| Vec2::new(f64::from(i), drone as f64 * 30.0)).collect();
+            let at_m = |i: u32| Vec2::new(f64::from(i), drone as f64 * 30.0);
+            let points = (0..count).map(|i| TrackPoint { at_m: at_m(i), group: usize::from(i > 60) }).collect();
             samples.tracks.insert(drone, Track { points, ..Track::default() });
         }
-        let svg = draw(&samples, &facts(2)).unwrap();
-        let keys: Vec<usize> =
-            svg.split(" values=\"").skip(1).map(|rest| rest.split('"').next().unwrap().matches(';').count()).collect();
+        let svg = draw(&samples, &GroupOrder::default(), &facts(2)).unwrap();
+        let keys: Vec<usize> = svg
+            .split("translate\" dur")
+            .skip(1)
+            .map(|rest| rest.split_once("values=\"").unwrap().1)
+            .map(|rest| rest.split('"').next().unwrap().matches(';').count())
+            .collect();
         assert_eq!(keys, [21, 21]);
+        assert_eq!(svg.matches("attributeName=\"fill\"").count(), 1, "one drone changes its group: {svg}");
+        assert!(svg.contains(">N1</text>") && svg.contains(">10 m</text>"), "{svg}");
+        assert!(svg.contains("transform=\"translate("), "viewers that do not animate show no drones");
         assert!(svg.contains("dur=\"10.00s\"") && svg.contains("2 drones"), "{svg}");
     }
 }

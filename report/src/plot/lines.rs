@@ -5,7 +5,7 @@ use crate::error::DrawError;
 use plotters::prelude::*;
 
 /// Height of the plotting area.
-const HEIGHT: u32 = px(320);
+const HEIGHT: u32 = px(300);
 
 /// A line with its label. The points are times, s, and values.
 pub(super) struct Line {
@@ -17,7 +17,7 @@ pub(super) struct Line {
 pub(super) fn draw(title: &str, y_label: &str, lines: &[Line]) -> Result<String, DrawError> {
     let colours = || PALETTE.iter().cycle();
     let signs = lines.iter().zip(colours()).map(|(line, &colour)| (Sign::Line(colour), line.label.clone()));
-    let heading = Heading::new(title, signs.collect());
+    let heading = Heading::narrow(title, signs.collect());
     let all = || lines.iter().flat_map(|line| line.points.iter());
     let end = all().map(|point| point.0).fold(1e-3, f64::max);
     let top = all().map(|point| point.1).fold(1e-3, f64::max) * 1.08;

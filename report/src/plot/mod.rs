@@ -5,6 +5,7 @@ mod colour_scale;
 mod curves;
 mod flight;
 mod lines;
+mod own;
 mod recording;
 pub mod reproduce;
 mod samples;
@@ -100,9 +101,10 @@ const DRAWINGS: [fn(&Samples, &Recording, &RunFacts) -> Drawn; FILES.len()] = [
     |samples, _, facts| curve(slot_error(samples, facts)),
     draw_leaders,
     draw_messages,
-    |samples, _, facts| flight::draw(samples, facts).map(Ok),
+    |samples, recording, facts| flight::draw(samples, recording.groups(), facts).map(Ok),
     |samples, _, facts| curve(disturbance(samples, facts)),
     |samples, _, facts| curve(bending(samples, facts)),
+    |samples, _, facts| own::draw(samples, &run(facts)),
 ];
 
 fn curve(figure: Figure) -> Drawn {
@@ -114,14 +116,14 @@ fn run(facts: &RunFacts) -> String {
     format!("{}, {} drones, {}", facts.scenario, facts.drones, facts.strategy)
 }
 
-fn draw_tracks(samples: &Samples, _: &Recording, facts: &RunFacts) -> Drawn {
+fn draw_tracks(samples: &Samples, recording: &Recording, facts: &RunFacts) -> Drawn {
     let any = !samples.speed.samples().is_empty();
-    any.then(|| tracks::draw(samples, facts, &format!("Tracks: {}", run(facts))))
+    any.then(|| tracks::draw(samples, recording.groups(), facts, &format!("Tracks: {}", run(facts))))
 }
 
 fn draw_leaders(samples: &Samples, recording: &Recording, facts: &RunFacts) -> Drawn {
     let terms = timeline::terms(recording.events(), samples.end_s);
-    (!terms.is_empty()).then(|| timeline::draw(&terms, recording.events(), facts, samples.end_s))
+    (!terms.is_empty()).then(|| timeline::draw(&terms, recording.events(), recording.groups(), facts, samples.end_s))
 }
 
 fn draw_messages(_: &Samples, recording: &Recording, facts: &RunFacts) -> Drawn {
@@ -166,9 +168,9 @@ fn distance(samples: &Samples, facts: &RunFacts) -> Figure {
 fn energy(samples: &Samples, facts: &RunFacts) -> Figure {
     Figure {
         title: format!("Energy: {}", run(facts)),
-        y_label: "energy used by a drone (J)",
+        y_label: "energy used by a drone (kJ)",
         line_label: "mean over drones",
-        band: samples.energy.samples().to_vec(),
+        band: samples.energy.samples().iter().map(|band| band.scaled(1e-3)).collect(),
         level: None,
     }
 }
@@ -253,7 +255,7 @@ mod tests {
         let block = ConvexShape::rectangle(Vec2::new(60.0, 20.0), Vec2::new(5.0, 15.0), 0.3).unwrap();
         let written = write(&folder, &RunFacts { obstacles: vec![block], ..facts(3) }, &Interrupted::never()).unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
-        let drawn = |name: &&str| !["leaders.svg", "messages.svg"].contains(name);
+        let drawn = |name: &&str| !["leaders.svg", "messages.svg", "metrics.svg"].contains(name);
         assert_eq!(names, FILES.into_iter().filter(drawn).collect::<Vec<_>>());
         let text = |i: usize| std::fs::read_to_string(&written[i]).unwrap();
         for group in ["N1", "N2", "N3", "start", "end", "obstacle", "x (m)"] {

@@ -3,6 +3,7 @@
 use super::lines::Line;
 use crate::error::ReportError;
 use crate::folder::RunFolder;
+use crate::group_order::GroupOrder;
 use crate::interruption::Interrupted;
 use crate::mcap;
 use skein_protocol::record::RunEvent;
@@ -22,6 +23,7 @@ struct Count {
 #[derive(Default)]
 pub(super) struct Recording {
     events: Vec<RunEvent>,
+    groups: GroupOrder,
     counts: Vec<Count>,
     /// Time of the last sample, s.
     end_s: f64,
@@ -37,6 +39,7 @@ impl Recording {
             |sample| {
                 let sum = |counts: &mut dyn Iterator<Item = &u32>| counts.map(|&count| f64::from(count)).sum::<f64>();
                 let radio = &sample.radio;
+                recording.groups.note(&sample.state.group);
                 recording.count(
                     sample.state.t_s,
                     sum(&mut radio.sent.values()),
@@ -67,6 +70,11 @@ impl Recording {
     /// The events in order.
     pub(super) fn events(&self) -> &[RunEvent] {
         &self.events
+    }
+
+    /// The groups in the order of their colours.
+    pub(super) fn groups(&self) -> &GroupOrder {
+        &self.groups
     }
 
     /// Whether any message was sent.

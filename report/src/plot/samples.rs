@@ -28,6 +28,10 @@ pub(super) struct Samples {
     pub energy: Series<Band>,
     /// Time, s, and largest slot error, m.
     pub formation: Series<(f64, f64)>,
+    /// The figures that pilots report, by name.
+    pub own: Vec<(String, Series<OwnBand>)>,
+    /// The groups of the tracks.
+    pub groups: Vec<String>,
     /// Tracks by drone.
     pub tracks: BTreeMap<usize, Track>,
     /// Time of the last tick, s.
@@ -43,14 +47,65 @@ pub(super) struct Samples {
 /// The track of a drone.
 #[derive(Default)]
 pub(super) struct Track {
-    /// Positions, m. The first and the last one are exact.
-    pub points: Vec<Vec2>,
-    /// Its last group.
-    pub group: String,
+    /// Its places. The first and the last one are exact.
+    pub points: Vec<TrackPoint>,
     /// Time of its last position, s.
     pub last_s: f64,
-    /// Its last position, m.
-    pub last_m: Vec2,
+    /// Its last place.
+    pub last: TrackPoint,
+}
+
+/// A place of a track.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct TrackPoint {
+    /// Position, m.
+    pub at_m: Vec2,
+    /// The drone's group there, as an index of [`Samples::groups`].
+    pub group: usize,
+}
+
+impl Track {
+    /// The parts of the track in which the drone is in one group: the group, and the places up to the first one in the next
+    /// group.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (usize, impl Iterator<Item = Vec2> + Clone)> {
+        let mut from = 0;
+        self.points.chunk_by(|a, b| a.group == b.group).map(move |part| {
+            let until = (from + part.len() + 1).min(self.points.len());
+            let places = self.points[from..until].iter().map(|point| point.at_m);
+            from += part.len();
+            (part[0].group, places)
+        })
+    }
+}
+
+/// A figure that pilots report, over a short time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct OwnBand {
+    pub t_s: f64,
+    /// Number of values and their sum.
+    count: f64,
+    sum: f64,
+    /// Least value.
+    pub low: f64,
+    /// Greatest value.
+    pub high: f64,
+}
+
+impl OwnBand {
+    /// Of a single value.
+    pub(super) fn new(t_s: f64, value: f64) -> Self {
+        Self { t_s, count: 1.0, sum: value, low: value, high: value }
+    }
+
+    /// Mean over drones and time.
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    fn join(&mut self, other: Self) {
+        (self.count, self.sum) = (self.count + other.count, self.sum + other.sum);
+        (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
+    }
 }
 
 impl Default for Samples {
@@ -63,6 +118,8 @@ impl Default for Samples {
             deviations: Series::new(|_, _| {}),
             energy: Series::new(first),
             formation: Series::new(|(_, most), (_, other)| *most = most.max(other)),
+            own: Vec::new(),
+            groups: Vec::new(),
             tracks: BTreeMap::new(),
             end_s: 0.0,
             is_thinned: false,
@@ -86,7 +143,7 @@ impl Samples {
     ) -> Result<Self, ReportError> {
         let (mut samples, mut sweep, mut period) = (Self::default(), Sweep::default(), None);
         let mut sampler = DeviationSampler::default();
-        trace::read(folder, interrupted, |rows| {
+        let names = trace::read(folder, interrupted, |rows| {
             samples.is_thinned |= samples.end_s > 0.0 && rows[0].t_s - samples.end_s > 1.5 * facts.dt_s;
             let positions: Vec<Vec2> = rows.iter().map(|row| row.position_m).collect();
             if let Some(deviation) = sampler.take(facts, rows[0].t_s, &positions) {
@@ -97,8 +154,11 @@ impl Samples {
             samples.take(facts, rows, &positions, period.replace(now) != Some(now), &mut sweep);
             Ok(())
         })?;
+        for ((known, _), name) in samples.own.iter_mut().zip(names) {
+            *known = name;
+        }
         for track in samples.tracks.values_mut() {
-            track.points.push(track.last_m);
+            track.points.push(track.last);
         }
         samples.thin();
         Ok(samples)
@@ -116,15 +176,18 @@ impl Samples {
         let drawn = sampled && self.taken.is_multiple_of(self.stride);
         self.taken += usize::from(sampled);
         for row in rows {
+            let known = self.groups.iter().position(|group| *group == row.group);
+            let group = known.unwrap_or_else(|| {
+                self.groups.push(row.group.clone());
+                self.groups.len() - 1
+            });
             let track = self.tracks.entry(row.drone).or_default();
-            (track.last_s, track.last_m) = (t_s, row.position_m);
+            (track.last_s, track.last) = (t_s, TrackPoint { at_m: row.position_m, group });
             if drawn || track.points.is_empty() {
-                track.points.push(row.position_m);
-            }
-            if track.group != row.group {
-                track.group.clone_from(&row.group);
+                track.points.push(track.last);
             }
         }
+        self.take_own(rows, sampled);
         if sampled {
             band(t_s, rows.iter().map(|row| row.velocity_mps.norm()))
                 .into_iter()
@@ -140,6 +203,24 @@ impl Samples {
         }
         if self.points() > 2 * PLOT_POINTS_MAX {
             self.halve_tracks();
+        }
+    }
+
+    /// Takes the figures that pilots report. Between two samples all values count.
+    fn take_own(&mut self, rows: &[TraceRow], sampled: bool) {
+        let columns = rows[0].metrics.len();
+        self.own.resize_with(columns, || (String::new(), Series::new(OwnBand::join)));
+        for (column, (_, series)) in self.own.iter_mut().enumerate() {
+            let values = rows.iter().filter_map(|row| row.metrics.get(column).copied().flatten());
+            let joined = values.map(|value| OwnBand::new(rows[0].t_s, value)).reduce(|mut all, one| {
+                all.join(one);
+                all
+            });
+            match (joined, series.last_mut()) {
+                (Some(band), Some(last)) if !sampled && band.t_s - last.t_s < PLOT_PERIOD_S => last.join(band),
+                (Some(band), _) => series.push(band),
+                (None, _) => {}
+            }
         }
     }
 
@@ -218,7 +299,10 @@ mod tests {
         let (speed, distance) = (samples.speed.samples(), samples.distance.samples());
         assert_eq!((speed.len(), speed[0].mean, speed[0].deviation), (3, 4.0, 1.0));
         assert_eq!((distance.len(), distance[0].mean), (2, 40.0));
-        let tracks: Vec<_> = samples.tracks.iter().map(|(&id, t)| (id, t.group.as_str(), t.last_s)).collect();
+        let group = |track: &Track| samples.groups[track.last.group].as_str();
+        let tracks: Vec<_> = samples.tracks.iter().map(|(&id, t)| (id, group(t), t.last_s)).collect();
         assert_eq!(tracks, [(0, "N1", 0.26), (4, "N", 0.16)]);
+        let parts: Vec<_> = samples.tracks[&0].parts().map(|(group, places)| (group, places.count())).collect();
+        assert_eq!(parts, [(0, 3), (1, 2)], "each part reaches to the next one");
     }
 }

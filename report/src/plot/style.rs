@@ -27,8 +27,10 @@ pub(super) const GRID: RGBColor = RGBColor(232, 232, 232);
 const FONT: &str = "Helvetica, Arial, sans-serif";
 /// Units of a drawing per pixel. The backend rounds to whole units, and tracks rounded to whole pixels would have steps.
 const UNITS_PER_PIXEL: u32 = 4;
-/// Width of every plot.
+/// Width of a plot that shows a place, or many labels.
 pub(super) const WIDTH: u32 = px(1100);
+/// Width of a plot of a quantity over time: two of them fit beside each other.
+const NARROW: u32 = px(740);
 /// Width of the labels left of the plotting area.
 pub(super) const LEFT: u32 = px(66);
 /// Margin left of the labels and right of the plotting area.
@@ -37,6 +39,8 @@ pub(super) const EDGE: u32 = px(14);
 pub(super) const BOTTOM: u32 = px(48);
 /// Height of the title.
 const TITLE: u32 = px(44);
+/// Height of the second line of the title.
+const SUBTITLE: u32 = px(20);
 /// Height of a line of the legend.
 const LINE: u32 = px(24);
 
@@ -66,7 +70,7 @@ pub(super) fn plot(
     axes: Axes<'_>,
     content: impl FnOnce(&Canvas, &mut Chart) -> Result<(), DrawError>,
 ) -> Result<String, DrawError> {
-    let size = (WIDTH, heading.height + axes.height + BOTTOM);
+    let size = (heading.width, heading.height + axes.height + BOTTOM);
     let mut svg = String::new();
     {
         let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -82,7 +86,7 @@ pub(super) fn plot(
             .map_err(DrawError::new)?;
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(axes.x.0).y_desc(axes.y.0).label_style(text(13)).axis_desc_style(text(14));
-        mesh.x_labels(12).y_labels((axes.height / px(50)).max(4) as usize);
+        mesh.x_labels((heading.width / px(90)) as usize).y_labels((axes.height / px(50)).max(4) as usize);
         if axes.y.0.is_empty() {
             mesh.y_labels(0).disable_y_mesh();
         }
@@ -92,15 +96,24 @@ pub(super) fn plot(
         content(&canvas, &mut chart)?;
         canvas.present().map_err(DrawError::new)?;
     }
-    // The view box keeps the units of the drawing; width and height are in pixels.
+    Ok(pixels(svg, size))
+}
+
+/// The drawing with its width and its height in pixels. The view box keeps the units of the drawing.
+pub(super) fn pixels(svg: String, size: (u32, u32)) -> String {
     let sized = |by: u32| format!("width=\"{}\" height=\"{}\"", size.0 / by, size.1 / by);
-    Ok(svg.replacen(&sized(1), &sized(UNITS_PER_PIXEL), 1))
+    svg.replacen(&sized(1), &sized(UNITS_PER_PIXEL), 1)
 }
 
 /// A label of an axis: the number without trailing zeros and rounding errors.
-fn number(value: &f64) -> String {
+pub(super) fn number(value: &f64) -> String {
     // Adding zero turns -0 into 0.
     ((value * 1e6).round() / 1e6 + 0.0).to_string()
+}
+
+/// A colour of the palette.
+pub(super) const fn rgb((r, g, b): (u8, u8, u8)) -> RGBColor {
+    RGBColor(r, g, b)
 }
 
 /// The colour in the notation of SVG.
@@ -135,7 +148,10 @@ pub(super) fn text(size: u32) -> TextStyle<'static> {
 /// Title and legend. They are above the plotting area, so that they hide no data.
 pub(super) struct Heading {
     title: String,
+    /// A second line in smaller letters; may be empty.
+    subtitle: String,
     entries: Vec<Entry>,
+    width: u32,
     height: u32,
 }
 
@@ -150,24 +166,40 @@ struct Entry {
 impl Heading {
     /// A heading with this title and legend. Entries that do not fit into a line start a new one.
     pub(super) fn new(title: &str, signs: Vec<(Sign, String)>) -> Self {
+        Self::of_width(WIDTH, title, "", signs)
+    }
+
+    /// The heading of a plot that needs half the width of a page. What follows the first colon of the title is a second line.
+    pub(super) fn narrow(title: &str, signs: Vec<(Sign, String)>) -> Self {
+        let (title, subtitle) = title.split_once(": ").unwrap_or((title, ""));
+        Self::of_width(NARROW, title, subtitle, signs)
+    }
+
+    fn of_width(width: u32, title: &str, subtitle: &str, signs: Vec<(Sign, String)>) -> Self {
         let first = LEFT + EDGE;
-        let (mut x, mut y) = (first, TITLE + px(10));
+        let below = if subtitle.is_empty() { 0 } else { SUBTITLE };
+        let (mut x, mut y) = (first, TITLE + below + px(10));
         let mut entries = Vec::new();
         for (sign, label) in signs {
             // Symbol, label with seven pixels per letter, and a gap.
-            let width = px(30 + 7 * label.chars().count() as u32 + 22);
-            if x + width > WIDTH - EDGE && x > first {
+            let entry = px(30 + 7 * label.chars().count() as u32 + 22);
+            if x + entry > width - EDGE && x > first {
                 (x, y) = (first, y + LINE);
             }
             entries.push(Entry { x: x as i32, y: y as i32, sign, label });
-            x += width;
+            x += entry;
         }
-        Self { title: title.to_owned(), entries, height: y + LINE }
+        let (title, subtitle) = (title.to_owned(), subtitle.to_owned());
+        Self { title, subtitle, entries, width, height: y + LINE }
     }
 
     fn draw(&self, canvas: &Canvas) -> Result<(), DrawError> {
         let at = ((LEFT + EDGE) as i32, px(26) as i32);
         canvas.draw(&Text::new(self.title.as_str(), at, text(18))).map_err(DrawError::new)?;
+        if !self.subtitle.is_empty() {
+            let below = (at.0, at.1 + SUBTITLE as i32);
+            canvas.draw(&Text::new(self.subtitle.as_str(), below, text(13))).map_err(DrawError::new)?;
+        }
         for Entry { x, y, sign, label } in &self.entries {
             draw_sign(canvas, *sign, (*x, *y))?;
             canvas.draw(&Text::new(label.as_str(), (x + px(30) as i32, *y), text(14))).map_err(DrawError::new)?;

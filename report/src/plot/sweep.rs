@@ -141,6 +141,8 @@ const LETTER: usize = 7;
 const TOP: usize = 60;
 /// Space below the cells, px.
 const BELOW: usize = 70;
+/// Space for the colour bar right of the cells, px.
+const BAR: usize = 110;
 /// Height of a row, px.
 const ROW: usize = 54;
 
@@ -152,7 +154,7 @@ impl HeatMap {
         let longest = |values: &[String]| values.iter().map(|value| value.chars().count()).max().unwrap_or(0);
         let column = (960 / columns).clamp(56, 120).max(LETTER * longest(&self.x.1) + 8);
         let left = LEFT.max(LETTER * longest(&self.y.1) + 30);
-        let (width, height) = (left + column * columns + 20, TOP + ROW * rows + BELOW);
+        let (width, height) = (left + column * columns + BAR, TOP + ROW * rows + BELOW);
         let shown = width.max(40 + 9 * self.title.chars().count());
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{shown}\" height=\"{height}\" viewBox=\"0 0 {shown} \
@@ -167,6 +169,9 @@ impl HeatMap {
             draw_cell(&mut svg, at, column, *cell, (low, high));
         }
         self.draw_axes(&mut svg, left, column);
+        if high > low {
+            draw_bar(&mut svg, left + column * columns + 16, ROW * rows, (low, high));
+        }
         svg.push_str("</svg>\n");
         svg
     }
@@ -185,6 +190,25 @@ impl HeatMap {
         }
         label(left + column * self.x.1.len() / 2, bottom + 48, "middle", &format!("{} →", self.x.0));
         label(20, TOP - 8, "start", &format!("{} ↑", self.y.0));
+    }
+}
+
+/// Draws the colour bar: the colours from `low` at the bottom to `high` at the top.
+fn draw_bar(svg: &mut String, x: usize, height: usize, (low, high): (f64, f64)) {
+    const STEPS: usize = 50;
+    for step in 0..STEPS {
+        let [r, g, b] = interpolated(&SCALE, step as f64 / (STEPS - 1) as f64);
+        let (from, to) = (height * (STEPS - 1 - step) / STEPS, height * (STEPS - step) / STEPS);
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{x}\" y=\"{}\" width=\"16\" height=\"{}\" fill=\"rgb({r:.0},{g:.0},{b:.0})\"/>",
+            TOP + from,
+            to - from
+        );
+    }
+    for (share, value) in [(0.0, high), (0.5, f64::midpoint(low, high)), (1.0, low)] {
+        let y = TOP as f64 + 5.0 + (height as f64 - 6.0) * share;
+        let _ = writeln!(svg, "<text x=\"{}\" y=\"{y:.0}\" font-size=\"12\">{}</text>", x + 22, brief(value));
     }
 }
 

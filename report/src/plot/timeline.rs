@@ -1,8 +1,9 @@
 //! Leadership over time: a row per group, a bar per term.
 
-use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, text};
+use super::style::{Axes, Heading, PALETTE, RED, Sign, plot, px, rgb, text};
 use crate::error::DrawError;
 use crate::facts::RunFacts;
+use crate::group_order::GroupOrder;
 use plotters::prelude::*;
 use skein_protocol::record::{EventKind, RunEvent};
 use std::collections::BTreeMap;
@@ -57,7 +58,14 @@ pub(super) fn terms(events: &[RunEvent], end_s: f64) -> Vec<Term> {
 }
 
 /// Draws the timeline. There must be at least one term. Returns the SVG.
-pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s: f64) -> Result<String, DrawError> {
+pub(super) fn draw(
+    terms: &[Term],
+    events: &[RunEvent],
+    order: &GroupOrder,
+    facts: &RunFacts,
+    end_s: f64,
+) -> Result<String, DrawError> {
+    let mut order = order.clone();
     let mut groups: Vec<&str> = terms.iter().map(|term| term.group.as_str()).collect();
     groups.sort_unstable();
     groups.dedup();
@@ -68,7 +76,7 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
     let rows = groups.len() as f64;
     let axes =
         Axes { x: ("time (s)", 0.0..end_s.max(1e-3)), y: ("", 0.0..rows), height: ROW * groups.len().max(2) as u32 };
-    plot(&Heading::new(&title, signs), axes, |canvas, chart| {
+    plot(&Heading::narrow(&title, signs), axes, |canvas, chart| {
         for at in &faults {
             let line = [(*at, 0.0), (*at, rows)];
             chart.draw_series([PathElement::new(line, RED.stroke_width(px(2)))]).map_err(DrawError::new)?;
@@ -76,9 +84,10 @@ pub(super) fn draw(terms: &[Term], events: &[RunEvent], facts: &RunFacts, end_s:
         for term in terms {
             let row = rows - 1.0 - groups.iter().position(|group| *group == term.group).unwrap_or(0) as f64;
             let (low, high) = (row + (1.0 - BAR) / 2.0, row + (1.0 + BAR) / 2.0);
-            let colour = PALETTE[term.leader as usize % PALETTE.len()];
-            let bar = Rectangle::new([(term.from_s, low), (term.to_s, high)], colour.filled());
-            chart.draw_series([bar]).map_err(DrawError::new)?;
+            let (corners, colour) = ([(term.from_s, low), (term.to_s, high)], rgb(order.colour(&term.group)));
+            // A white edge separates terms that follow each other.
+            let bars = [Rectangle::new(corners, colour.filled()), Rectangle::new(corners, WHITE.stroke_width(px(1)))];
+            chart.draw_series(bars).map_err(DrawError::new)?;
             let (x, y) = chart.backend_coord(&(term.from_s, row + 0.5));
             let label = Text::new(term.leader.to_string(), (x + px(4) as i32, y), text(13).color(&WHITE));
             canvas.draw(&label).map_err(DrawError::new)?;

@@ -1,16 +1,16 @@
 //! The tracks of the drones past the obstacles, seen from above, at true aspect ratio.
 
-use super::samples::{Samples, Track};
+use super::samples::Samples;
 use super::style::{
-    Axes, Canvas, Chart, EDGE, GREY, Heading, INK, LEFT, PALETTE, Sign, WIDTH, end, goal, lost, plot, px, start,
+    Axes, Canvas, Chart, EDGE, GREY, Heading, LEFT, Sign, WIDTH, end, goal, lost, plot, px, rgb, start,
 };
 use crate::error::DrawError;
 use crate::facts::{MissionEnd, RunFacts};
 use crate::geometry::outline;
+use crate::group_order::GroupOrder;
 use plotters::prelude::*;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
-use std::collections::BTreeMap;
 
 /// Least height of the plotting area.
 const HEIGHT_MIN: u32 = px(260);
@@ -22,8 +22,8 @@ const MARGIN: f64 = 0.04;
 const OBSTACLE: RGBColor = RGBColor(190, 190, 190);
 
 /// Draws the tracks. Returns the SVG.
-pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<String, DrawError> {
-    let colours = colours(samples);
+pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts, title: &str) -> Result<String, DrawError> {
+    let colours = colours(samples, order);
     let heading = Heading::new(title, signs(samples, facts, &colours));
     let (low, high, height) = frame(samples, facts, f64::from(WIDTH - LEFT - 2 * EDGE));
     let axes = Axes {
@@ -48,20 +48,16 @@ pub(super) fn draw(samples: &Samples, facts: &RunFacts, title: &str) -> Result<S
     })
 }
 
-/// A colour for each group that is the last group of a drone.
-pub(super) fn colours(samples: &Samples) -> BTreeMap<&str, RGBColor> {
-    let mut colours: BTreeMap<&str, RGBColor> =
-        samples.tracks.values().map(|track| (track.group.as_str(), INK)).collect();
-    for (colour, &next) in colours.values_mut().zip(PALETTE.iter().cycle()) {
-        *colour = next;
-    }
-    colours
+/// The colour of each of [`Samples::groups`].
+pub(super) fn colours(samples: &Samples, order: &GroupOrder) -> Vec<RGBColor> {
+    let mut order = order.clone();
+    samples.groups.iter().map(|group| rgb(order.colour(group))).collect()
 }
 
 /// The legend.
-fn signs(samples: &Samples, facts: &RunFacts, colours: &BTreeMap<&str, RGBColor>) -> Vec<(Sign, String)> {
+fn signs(samples: &Samples, facts: &RunFacts, colours: &[RGBColor]) -> Vec<(Sign, String)> {
     let mut signs: Vec<(Sign, String)> =
-        colours.iter().map(|(group, &colour)| (Sign::Line(colour), (*group).to_owned())).collect();
+        samples.groups.iter().zip(colours).map(|(group, &colour)| (Sign::Line(colour), group.clone())).collect();
     let lost = samples.tracks.values().any(|track| samples.is_lost(track));
     let goal = matches!(facts.end, MissionEnd::Goal { .. });
     let marks = [
@@ -78,7 +74,7 @@ fn signs(samples: &Samples, facts: &RunFacts, colours: &BTreeMap<&str, RGBColor>
 /// The part of the world that a drawing of this width shows: its least and its greatest corner, m, and the height of the
 /// drawing. A metre is equally long on both axes.
 pub(super) fn frame(samples: &Samples, facts: &RunFacts, width: f64) -> (Vec2, Vec2, f64) {
-    let tracks = samples.tracks.values().flat_map(|track| track.points.iter().copied());
+    let tracks = samples.tracks.values().flat_map(|track| track.points.iter().map(|point| point.at_m));
     let corners = facts.obstacles.iter().map(ConvexShape::bounds).flat_map(|(low, high)| [low, high]);
     let empty = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
     let points = tracks.chain(corners).chain(goal_slots(samples, facts));
@@ -99,29 +95,22 @@ fn goal_slots(samples: &Samples, facts: &RunFacts) -> Vec<Vec2> {
     facts.shape.slots(living, facts.spacing_m).into_iter().map(|slot| slot + Vec2::from(front_m)).collect()
 }
 
-fn draw_tracks(
-    chart: &mut Chart,
-    canvas: &Canvas,
-    samples: &Samples,
-    colours: &BTreeMap<&str, RGBColor>,
-) -> Result<(), DrawError> {
-    let colour = |track: &Track| colours.get(track.group.as_str()).copied().unwrap_or(INK);
+fn draw_tracks(chart: &mut Chart, canvas: &Canvas, samples: &Samples, colours: &[RGBColor]) -> Result<(), DrawError> {
     for track in samples.tracks.values() {
-        let line = track.points.iter().map(|point| (point.x, point.y));
-        chart.draw_series(LineSeries::new(line, colour(track).stroke_width(px(2)))).map_err(DrawError::new)?;
+        for (group, places) in track.parts() {
+            let line = places.map(|at| (at.x, at.y));
+            chart.draw_series(LineSeries::new(line, colours[group].stroke_width(px(2)))).map_err(DrawError::new)?;
+        }
     }
     for track in samples.tracks.values() {
         let ends = track.points.first().zip(track.points.last());
-        let Some((first, last)) =
-            ends.map(|(a, b)| (chart.backend_coord(&(a.x, a.y)), chart.backend_coord(&(b.x, b.y))))
-        else {
-            continue;
-        };
-        canvas.draw(&start(first, colour(track))).map_err(DrawError::new)?;
+        let Some((a, b)) = ends else { continue };
+        let (first, last) = (chart.backend_coord(&(a.at_m.x, a.at_m.y)), chart.backend_coord(&(b.at_m.x, b.at_m.y)));
+        canvas.draw(&start(first, colours[a.group])).map_err(DrawError::new)?;
         if samples.is_lost(track) {
-            canvas.draw(&lost(last, colour(track))).map_err(DrawError::new)?;
+            canvas.draw(&lost(last, colours[b.group])).map_err(DrawError::new)?;
         } else {
-            canvas.draw(&end(last, colour(track))).map_err(DrawError::new)?;
+            canvas.draw(&end(last, colours[b.group])).map_err(DrawError::new)?;
         }
     }
     Ok(())
@@ -130,17 +119,23 @@ fn draw_tracks(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plot::samples::{Track, TrackPoint};
     use crate::testing::facts;
 
     #[test]
     fn a_metre_is_equally_long_on_both_axes() {
         for points in [[(0.0, 0.0), (500.0, 20.0)], [(0.0, 0.0), (20.0, 900.0)], [(0.0, 0.0), (300.0, 200.0)]] {
-            let points = points.map(|(x, y)| Vec2::new(x, y)).to_vec();
+            let points = points.map(|(x, y)| TrackPoint { at_m: Vec2::new(x, y), group: 0 }).to_vec();
             let mut samples = Samples::default();
             samples.tracks.insert(0, Track { points: points.clone(), ..Track::default() });
             let (low, high, height) = frame(&samples, &facts(1), 4000.0);
             assert!((4000.0 / (high.x - low.x) - height / (high.y - low.y)).abs() < 1e-9);
-            assert!(points.iter().all(|p| p.x > low.x && p.y > low.y && p.x < high.x && p.y < high.y));
+            assert!(
+                points
+                    .iter()
+                    .map(|point| point.at_m)
+                    .all(|p| p.x > low.x && p.y > low.y && p.x < high.x && p.y < high.y)
+            );
         }
     }
 }

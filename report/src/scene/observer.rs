@@ -2,7 +2,9 @@
 
 use crate::facts::RunFacts;
 use crate::scene::frames;
-use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State, rounded};
+use crate::scene::rounding::rounded;
+use crate::scene::sample::{EnergySample, RadioSample, Sample, SentFrame, State};
+use crate::scene::shown::ShownSince;
 use crate::scene::slots::Slots;
 use crate::tuning::SAMPLE_FRAMES_MAX;
 use skein_protocol::frame::AirFrame;
@@ -23,6 +25,8 @@ pub struct Observer {
     slots: Slots,
     /// Radio traffic since the previous sample.
     radio: RadioSample,
+    /// What pilots show since the previous sample.
+    shown: ShownSince,
     /// The receiver selected in a large swarm.
     receiver: Option<DroneId>,
     last_tick: Option<u64>,
@@ -33,7 +37,8 @@ impl Observer {
     #[must_use]
     pub fn new(facts: RunFacts) -> Self {
         let dt_ns = (facts.dt_s * 1e9).round() as i64;
-        Self { facts, dt_ns, slots: Slots::default(), radio: RadioSample::default(), receiver: None, last_tick: None }
+        let (slots, radio, shown) = (Slots::default(), RadioSample::default(), ShownSince::default());
+        Self { facts, dt_ns, slots, radio, shown, receiver: None, last_tick: None }
     }
 
     /// In a swarm of more than [`MAX_LISTED_DRONES`] drones, samples list from now on the frames to this receiver, or none.
@@ -53,6 +58,7 @@ impl Observer {
         self.last_tick = Some(head.tick);
         self.slots.take_frames(record.frames, record.rows);
         self.count(record);
+        self.shown.take(head.tick, record.telemetry);
         wanted.then(|| Sample {
             state: self.state(record),
             energy: energy(record.rows),
@@ -60,6 +66,7 @@ impl Observer {
                 receiver: self.receiver.map(|receiver| receiver.0),
                 ..std::mem::take(&mut self.radio)
             },
+            shown: self.shown.finish(),
         })
     }
 

@@ -1,6 +1,7 @@
 //! A sample of the swarm, as it is written in JSON to the recording, the page and the live view. Lists without another
 //! description have one entry per drone, in the order of the drones' numbers.
 
+use crate::scene::shown::Shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -15,6 +16,9 @@ pub struct Sample {
     pub energy: EnergySample,
     /// Radio traffic since the previous sample.
     pub radio: RadioSample,
+    /// What pilots show: marks and lines.
+    #[serde(default, skip_serializing_if = "Shown::is_empty")]
+    pub shown: Shown,
 }
 
 /// Positions of the drones, and the plans they obey. World frame.
@@ -104,10 +108,4 @@ pub struct SentFrame {
     /// dropped: `l`oss, `b`urst, `r`ange, `p`artition, `d`eaf, `m`alformed, `q`ueue, `?` for any other.
     #[serde(rename = "fate")]
     pub deliveries: String,
-}
-
-/// The value rounded to thousandths: a picture needs no more, and the JSON text stays short.
-pub(crate) fn rounded(value: f64) -> f64 {
-    // Adding zero turns -0 into 0.
-    (value * 1e3).round() / 1e3 + 0.0
 }
