@@ -21,6 +21,7 @@ mod altitude;
 pub mod braking_filter;
 pub mod braking_path;
 pub mod detection;
+mod distant_peers;
 pub mod emergency_route;
 pub mod escape;
 pub mod guidance;

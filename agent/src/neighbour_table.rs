@@ -1,5 +1,6 @@
 //! The neighbours that a drone keeps its distance from, and its share of each evasion.
 
+use crate::distant_peers::DistantPeers;
 use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::peers::{Peers, extrapolated};
@@ -38,12 +39,13 @@ pub(crate) struct NeighbourView<'a> {
 pub(crate) struct NeighbourTable {
     params: NeighbourParams,
     neighbours: Vec<Neighbour>,
+    distant: DistantPeers,
 }
 
 impl NeighbourTable {
     /// An empty table.
     pub(crate) fn new(params: NeighbourParams) -> Self {
-        Self { params, neighbours: Vec::new() }
+        Self { params, neighbours: Vec::new(), distant: DistantPeers::default() }
     }
 
     /// Fills the table: first the neighbours that are ranged, then those known by beacon alone.
@@ -63,9 +65,18 @@ impl NeighbourTable {
         }
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
-        for (id, pose) in view.peers.living(view.now) {
+        self.distant.advance(senses.now, senses.position());
+        for index in 0..self.distant.follow(view.peers.stamps()) {
+            if self.distant.is_out_of_reach(index) || !view.peers.is_living_at(index, view.now) {
+                continue;
+            }
+            let (id, pose) = view.peers.at(index);
             let position_m = extrapolated(pose, senses.now) - senses.position();
-            if position_m.norm_squared() > reach_m * reach_m || senses.neighbours.iter().any(|n| n.drone == id) {
+            if position_m.norm_squared() > reach_m * reach_m {
+                self.distant.note(index, position_m.norm() - reach_m, pose.velocity().norm());
+                continue;
+            }
+            if senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
             }
             let velocity_mps = pose.velocity() - senses.velocity();

@@ -13,7 +13,7 @@ use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
 use crate::queue::QueuePacer;
 use crate::reaction::ReactionDelay;
-use crate::rollout::{MAX_MEMBERS, Rollout, RolloutDrone, RolloutInput, RolloutPilot};
+use crate::rollout::{Rollout, RolloutDrone, RolloutInput, RolloutPilot};
 use crate::route_follower::RouteFollower;
 use crate::safety::{NearObstacle, Safety};
 use crate::silent_drones::SilentDrones;
@@ -21,6 +21,7 @@ use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::{OwnPlan, Straggler};
 use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S, SILENT_DRONE_RADIUS};
+use skein_leader::candidates::MAX_ROLLOUT_DRONES;
 use skein_leader::cost::Flight;
 use skein_leader::leading::Leading;
 use skein_leader::ledger::Ledger;
@@ -115,7 +116,9 @@ impl SwarmPilot {
         }
         let alternatives = self.leading.decide(now, self.silent.positions(), say);
         match self.params.planner.strategy {
-            Strategy::LookAhead(objective) if alternatives.len() > 1 && self.leading.living().len() <= MAX_MEMBERS => {
+            Strategy::LookAhead(objective)
+                if alternatives.len() > 1 && self.leading.living().len() <= MAX_ROLLOUT_DRONES =>
+            {
                 self.begin_rollout(now, own.tick, objective, alternatives);
             }
             // Without a look-ahead the leader takes the plan of the paper's rule, which is the second, or the only one.
@@ -442,7 +445,7 @@ impl Pilot for SwarmPilot {
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
-        ages.extend(self.leading.peers().living(now).map(|(_, pose)| now.since(pose.stamp)));
+        ages.extend(self.leading.peers().ages_s(now));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which drone flies which route past an obstacle set, if no other group has the set ahead (paper, Algorithm 3). Has no
 //! state: the groupings follow from the situation alone.
 
-use crate::candidates::candidates;
+use crate::candidates::{candidates, shortest_and_rule};
 use crate::grouping::{Grouping, arrival_table, ranks};
 use crate::params::Strategy;
 use crate::plan_bundle::PlanBundle;
@@ -47,6 +47,7 @@ fn splits(
 ) -> Option<Vec<RouteAssignment>> {
     let routes = survey.routes().count();
     Some(match s.params.strategy {
+        Strategy::LookAhead(_) if !s.is_within_rollout() => shortest_and_rule(table),
         Strategy::LookAhead(_) => {
             let lateral_m: Vec<f64> = free.iter().map(|&i| s.members[i].position.y).collect();
             candidates(table, &lateral_m, routes)

@@ -3,6 +3,8 @@
 use crate::split::{ArrivalTable, RouteAssignment};
 use crate::tuning::MAX_CANDIDATES;
 
+pub use crate::tuning::MAX_ROLLOUT_DRONES;
+
 /// The candidates, no two alike, at most 16: the shortest paths first, the paper's rule second. Then, by makespan, the best
 /// groupings with other numbers of drones on the routes. For each of these numbers there is the exact optimum, and the one
 /// in lateral order, in which no paths cross. `lateral_m`: ordinate of each drone, m, in the order of the table's rows.
@@ -18,8 +20,19 @@ pub fn candidates(table: &ArrivalTable, lateral_m: &[f64], routes: usize) -> Vec
     let mut others: Vec<RouteAssignment> = numbers.iter().chain([&counts]).filter_map(in_order).collect();
     others.extend(numbers.iter().filter_map(|counts| table.fixed(counts).ok()));
     others.sort_by(|a, b| a.makespan_s.total_cmp(&b.makespan_s).then(a.total_s.total_cmp(&b.total_s)));
+    distinct([table.shortest(), rule].into_iter().chain(others))
+}
+
+/// The first two of the [`candidates`]: what a leader chooses from if the swarm is too large for a rollout. The others take
+/// as many exact splits as there are drones.
+#[must_use]
+pub fn shortest_and_rule(table: &ArrivalTable) -> Vec<RouteAssignment> {
+    distinct([table.shortest(), table.split()].into_iter())
+}
+
+fn distinct(splits: impl Iterator<Item = RouteAssignment>) -> Vec<RouteAssignment> {
     let mut kept: Vec<RouteAssignment> = Vec::new();
-    for split in [table.shortest(), rule].into_iter().chain(others) {
+    for split in splits {
         if kept.len() < MAX_CANDIDATES && !kept.iter().any(|other| other.routes == split.routes) {
             kept.push(split);
         }
@@ -72,6 +85,7 @@ mod tests {
         assert_eq!(found[0].routes, vec![0; 6]);
         assert_eq!(found[1].routes, table.split().routes);
         assert!(found.len() > 6 && found.len() <= MAX_CANDIDATES);
+        assert_eq!(shortest_and_rule(&table), found[..2]);
         assert!(found.iter().enumerate().all(|(i, a)| found[..i].iter().all(|b| a.routes != b.routes)));
         assert!(found[2..].is_sorted_by_key(|split| split.makespan_s));
         // Three on the left: the leftmost drones, so that no paths cross.

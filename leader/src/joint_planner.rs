@@ -4,7 +4,7 @@
 //! Only one leader simulates: the holder of the oldest term is the coordinator and plans for all groups. The other
 //! leaders fly on and wait for its choice. A leader that does not hear the choice keeps its members on their routes.
 
-use crate::candidates::candidates;
+use crate::candidates::{candidates, shortest_and_rule};
 use crate::grouping::{Grouping, arrival_table, ranks};
 use crate::obstacles::set_ids;
 use crate::params::Strategy;
@@ -183,6 +183,7 @@ fn splits(
     let saves = rule.makespan_s - start_s <= (1.0 - INTERIM_RULE_SAVING) * (shortest.makespan_s - start_s);
     let splits = match s.params.strategy {
         Strategy::ShortestPath => vec![shortest],
+        Strategy::LookAhead(_) if coordinates && !s.is_within_rollout() => shortest_and_rule(union),
         Strategy::LookAhead(_) if coordinates => {
             let all = || s.members.iter().chain(s.others);
             let lateral_m = |row: &Arrivals| all().find(|m| m.id == row.drone).map_or(0.0, |m| m.position.y);

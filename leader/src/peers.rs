@@ -8,6 +8,12 @@ use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
 
+/// Time between two looks at all peers for silent ones, in time-outs. Each look costs as much as a few beacons per peer.
+const LOOK_TIMEOUTS: f64 = 0.25;
+
+/// More than times in nanoseconds lose by rounding, s.
+const ROUNDING_S: f64 = 1e-6;
+
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
@@ -22,6 +28,11 @@ impl Peer {
     fn lives(&self, now: SimTime) -> bool {
         now.since(self.timeout.last()) <= self.silence_s
     }
+
+    /// A moment until which it certainly lives.
+    fn lives_until(&self) -> SimTime {
+        self.timeout.last() + ((self.silence_s - ROUNDING_S) * 1e9) as i64
+    }
 }
 
 /// The last beacon heard of each peer.
@@ -31,8 +42,14 @@ pub struct Peers {
     timeout_s: f64,
     /// Running mean of the beacons' delay, s.
     delay_s: f64,
+    /// No peer is silent for too long until then.
+    quiet_until: SimTime,
+    /// When all peers are looked at again.
+    next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
+    /// The time stamp of the last beacon of each of them, in the same order. Each tick reads all of them.
+    stamps: Vec<SimTime>,
     /// What is known of each of them, in the same order.
     last: Vec<Peer>,
 }
@@ -42,7 +59,16 @@ impl Peers {
     /// longer than usual, counts as gone.
     #[must_use]
     pub fn new(drones: u32, timeout_s: f64) -> Self {
-        Self { drones, timeout_s, delay_s: 0.0, ids: Vec::new(), last: Vec::new() }
+        Self {
+            drones,
+            timeout_s,
+            delay_s: 0.0,
+            quiet_until: SimTime::MAX,
+            next_look: SimTime::ZERO,
+            ids: Vec::new(),
+            stamps: Vec::new(),
+            last: Vec::new(),
+        }
     }
 
     /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
@@ -55,23 +81,45 @@ impl Peers {
         match self.place(source) {
             Err(place) => {
                 let timeout = AdaptiveTimeout::new(now);
-                let silence_s = timeout.timeout_s(self.timeout_s);
+                let peer = Peer { silence_s: timeout.timeout_s(self.timeout_s), timeout, pose };
+                self.quiet_until = self.quiet_until.min(peer.lives_until());
                 self.ids.insert(place, source);
-                self.last.insert(place, Peer { silence_s, timeout, pose });
+                self.stamps.insert(place, pose.stamp);
+                self.last.insert(place, peer);
             }
-            Ok(place) if pose.stamp > self.last[place].pose.stamp => {
+            Ok(place) if pose.stamp > self.stamps[place] => {
                 let peer = &mut self.last[place];
                 peer.pose = pose;
                 peer.timeout.hear(now, 0.0, peer.silence_s);
                 peer.silence_s = peer.timeout.timeout_s(self.timeout_s);
+                self.stamps[place] = pose.stamp;
+                self.quiet_until = self.quiet_until.min(peer.lives_until());
                 self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
             }
             Ok(_) => {}
         }
+        if now >= self.next_look {
+            self.look_for_silence(now);
+        }
     }
 
+    /// Finds out anew until when no peer is silent for too long.
+    fn look_for_silence(&mut self, now: SimTime) {
+        self.next_look = now.after(LOOK_TIMEOUTS * self.timeout_s);
+        self.quiet_until = self.last.iter().map(Peer::lives_until).min().unwrap_or(SimTime::MAX);
+    }
+
+    /// Whether no peer is silent for too long, which needs no look at each.
+    fn all_live(&self, now: SimTime) -> bool {
+        now <= self.quiet_until
+    }
+
+    /// The index of a peer, or where it belongs. Once all drones have been heard, no search is needed: the index is the id,
+    /// less one for the ids above this drone's own.
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
-        self.ids.binary_search(&peer)
+        let guess = |index: usize| (self.ids.get(index) == Some(&peer)).then_some(index);
+        let found = guess(peer.index()).or_else(|| guess(peer.index().checked_sub(1)?));
+        found.map_or_else(|| self.ids.binary_search(&peer), Ok)
     }
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
@@ -88,6 +136,7 @@ impl Peers {
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.ids.remove(place);
+            self.stamps.remove(place);
             self.last.remove(place);
         }
     }
@@ -102,7 +151,7 @@ impl Peers {
     /// Whether the peer is not silent for too long.
     #[must_use]
     pub fn is_living(&self, peer: DroneId, now: SimTime) -> bool {
-        self.get(peer).is_some_and(|known| known.lives(now))
+        self.place(peer).is_ok_and(|place| self.is_living_at(place, now))
     }
 
     /// The last beacon of a peer, however old.
@@ -114,17 +163,57 @@ impl Peers {
     /// The last beacon of a peer that is not silent for too long.
     #[must_use]
     pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {
-        self.get(peer).filter(|known| known.lives(now)).map(|known| &known.pose)
+        let all = self.all_live(now);
+        self.get(peer).filter(|known| all || known.lives(now)).map(|known| &known.pose)
     }
 
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
-        self.known().filter(move |(_, known)| known.lives(now)).map(|(id, known)| (id, &known.pose))
+        let all = self.all_live(now);
+        self.known().filter(move |(_, known)| all || known.lives(now)).map(|(id, known)| (id, &known.pose))
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
-        self.known().filter(move |(_, known)| !known.lives(now)).map(|(id, known)| (id, &known.pose))
+        let some = if self.all_live(now) { 0 } else { self.ids.len() };
+        let silent = self.known().take(some).filter(move |(_, known)| !known.lives(now));
+        silent.map(|(id, known)| (id, &known.pose))
+    }
+
+    /// The time stamps of the last beacons of all peers ever heard, by id, without the beacons themselves.
+    #[must_use]
+    pub fn stamps(&self) -> &[SimTime] {
+        &self.stamps
+    }
+
+    /// All peers ever heard, by id, with their last beacons.
+    pub fn all(&self) -> impl Iterator<Item = (DroneId, &Pose)> {
+        self.known().map(|(id, known)| (id, &known.pose))
+    }
+
+    /// The id and the last beacon of the peer at this index of [`Self::stamps`].
+    ///
+    /// # Panics
+    /// If there is no such peer.
+    #[must_use]
+    pub fn at(&self, index: usize) -> (DroneId, &Pose) {
+        (self.ids[index], &self.last[index].pose)
+    }
+
+    /// Whether the peer at this index of [`Self::stamps`] is not silent for too long.
+    ///
+    /// # Panics
+    /// If there is no such peer.
+    #[must_use]
+    pub fn is_living_at(&self, index: usize, now: SimTime) -> bool {
+        self.all_live(now) || self.last[index].lives(now)
+    }
+
+    /// How old the last beacons of the living peers are, s, by id.
+    pub fn ages_s(&self, now: SimTime) -> impl Iterator<Item = f64> {
+        let all = self.all_live(now);
+        let living = self.stamps.iter().enumerate().filter(move |(index, _)| all || self.last[*index].lives(now));
+        living.map(move |(_, stamp)| now.since(*stamp))
     }
 
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
@@ -173,6 +262,30 @@ mod tests {
         assert_eq!(peers.living(SimTime::from_secs(1.0)).count(), 1);
         assert_eq!(peers.living(SimTime::from_secs(1.1)).count(), 0);
         assert_eq!(peers.silent(SimTime::from_secs(1.1)).count(), 1);
+    }
+
+    #[test]
+    fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
+        let mut peers = Peers::new(9, 1.0);
+        for tick in 0..600u32 {
+            let now = SimTime::from_secs(0.1 * f64::from(tick));
+            for id in (0..9).filter(|id| tick.wrapping_mul(0x9e37_79b9).rotate_left(5 * id) % 16 < 2 + id) {
+                // Drone 5 falls silent.
+                if id != 5 || tick < 300 {
+                    peers.hear(now, DroneId(id), pose(0.1 * f64::from(tick), 0.0));
+                }
+            }
+            let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
+            let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
+            let lives = |id: &u32| peers.known().any(|(known, peer)| known.0 == *id && peer.lives(now));
+            assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
+            let ages: Vec<f64> = peers.living(now).map(|(_, pose)| now.since(pose.stamp)).collect();
+            assert_eq!(peers.ages_s(now).collect::<Vec<_>>(), ages);
+            assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
+        }
+        assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));
+        peers.forget(DroneId(5));
+        assert!(peers.last(DroneId(5)).is_none() && peers.last(DroneId(6)).is_some());
     }
 
     #[test]

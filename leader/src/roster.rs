@@ -9,9 +9,11 @@ use skein_protocol::payload::Assignment;
 pub struct Roster(Vec<Assignment>);
 
 impl Roster {
+    /// The index of a drone's assignment, or where it belongs. If all drones have assignments, that is the drone's id.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        match self.0.last() {
-            Some(last) if last.drone >= drone => self.0.binary_search_by_key(&drone, |part| part.drone),
+        match (self.0.get(drone.index()), self.0.last()) {
+            (Some(part), _) if part.drone == drone => Ok(drone.index()),
+            (_, Some(last)) if last.drone >= drone => self.0.binary_search_by_key(&drone, |part| part.drone),
             _ => Err(self.0.len()),
         }
     }

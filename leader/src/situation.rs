@@ -4,6 +4,7 @@ use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::obstacles::Obstacles;
 use crate::params::PlannerParams;
+use crate::tuning::MAX_ROLLOUT_DRONES;
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
 /// What a leader knows when it decides: a read-only view, made anew for each decision.
@@ -48,6 +49,11 @@ impl Situation<'_> {
         let exit_x_m = self.exit_x_m(set);
         let before = |m: &&Member| !self.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
         self.others.iter().filter(before).map(|m| m.id).collect()
+    }
+
+    /// Whether the living drones are few enough to be simulated.
+    pub(crate) fn is_within_rollout(&self) -> bool {
+        self.members.len() + self.others.len() <= MAX_ROLLOUT_DRONES
     }
 
     /// Whether one of these obstacles was planned for before.

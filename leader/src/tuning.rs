@@ -63,6 +63,9 @@ pub(crate) const ASSIGNMENTS_DUE_S: f64 = 1.0;
 /// share of the last drone's time. No unit. 0.2. Groups that meet before one set are close to it, and a second on the
 /// wrong path cannot be made up for. By hand; `skein reproduce`.
 pub(crate) const INTERIM_RULE_SAVING: f64 = 0.2;
+/// Largest swarm that is simulated. 32. The neighbours of all drones are searched for pair by pair. By hand: what a second of
+/// rollouts suffices for.
+pub const MAX_ROLLOUT_DRONES: usize = 32;
 /// Most groupings that are handed to a rollout, the shortest paths and the rule's among them. 16. By hand: what a second
 /// of rollouts suffices for.
 pub(crate) const MAX_CANDIDATES: usize = 16;

@@ -101,6 +101,35 @@ pub struct Fault {
     pub gust_s: Option<f64>,
 }
 
+impl Fault {
+    /// A fault of one drone that begins at `at_s`, s from the start of the mission, and lasts `for_s`, s; to the end of the
+    /// mission without it.
+    #[must_use]
+    pub fn of_drone(kind: FaultKind, drone: u32, at_s: f64, for_s: Option<f64>) -> Self {
+        Self {
+            kind,
+            at_s: Some(at_s),
+            on: None,
+            after_s: 0.0,
+            stage: 0,
+            drone: Some(drone),
+            drones: None,
+            target: None,
+            for_s,
+            reaction_time_s: None,
+            sides: None,
+            sensor: None,
+            position_bias_m: None,
+            position_std_m: None,
+            velocity_bias_mps: None,
+            velocity_std_mps: None,
+            wind_mps2: None,
+            gust_mps2: None,
+            gust_s: None,
+        }
+    }
+}
+
 /// What happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

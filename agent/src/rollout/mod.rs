@@ -26,9 +26,6 @@ use skein_leader::plan_bundle::PlanBundle;
 use skein_protocol::downlink::SensedShape;
 use skein_protocol::{DroneId, SimTime};
 
-/// Largest swarm that is simulated. The neighbours of all drones are searched for pair by pair.
-pub const MAX_MEMBERS: usize = 32;
-
 /// What a leader simulates, and from when on.
 #[derive(Clone, Debug)]
 pub struct RolloutInput<P> {

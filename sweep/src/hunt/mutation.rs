@@ -1,7 +1,7 @@
 //! Small changes of a mission.
 
 use crate::splitmix::SplitMix64;
-use skein_scenario::{Obstacle, Scenario, ScenarioSource};
+use skein_scenario::{Fault, FaultKind, Obstacle, Scenario, ScenarioSource};
 
 /// Attempts to find a change that leaves the scenario valid.
 const ATTEMPTS: u64 = 20;
@@ -9,6 +9,10 @@ const ATTEMPTS: u64 = 20;
 const MOST_CHANGES: u32 = 3;
 /// Longest shift of an obstacle or of the goal, in safe distances.
 const SHIFT: f64 = 1.0;
+/// Most faults of a neighbour.
+const MOST_FAULTS: usize = 3;
+/// A fault that is added begins within this time, s. Most flights are under way then.
+const FAULT_WITHIN_S: f64 = 60.0;
 
 /// A valid scenario that differs a little from `parent`. It depends on the two keys only. `None` if no attempt is valid.
 pub(super) fn neighbour(parent: &Scenario, seed: u64, number: u64) -> Option<Scenario> {
@@ -31,7 +35,7 @@ fn checked(scenario: &Scenario) -> Option<Scenario> {
 fn change(scenario: &mut Scenario, rng: &mut SplitMix64) {
     let shift_m = SHIFT * scenario.drone.safe_distance_m;
     let obstacles = scenario.obstacles.len() as u32;
-    match rng.integer(0, 11) {
+    match rng.integer(0, 12) {
         0 => scenario.seed = u64::from(rng.integer(1, 1_000_000)),
         1 => scenario.formation.drones = (scenario.formation.drones + rng.integer(0, 4)).saturating_sub(2).max(1),
         2 => scale(&mut scenario.formation.spacing_m, rng),
@@ -45,6 +49,7 @@ fn change(scenario: &mut Scenario, rng: &mut SplitMix64) {
         7 => scenario.radio.loss = rng.between(0.0, 0.6),
         8 => shift_goal(scenario, rng, shift_m),
         9 => shift_fault(scenario, rng),
+        10 => add_fault(scenario, rng),
         _ if obstacles > 0 => {
             let obstacle = &mut scenario.obstacles[rng.integer(0, obstacles - 1) as usize];
             if rng.integer(0, 1) == 0 { shift(obstacle, rng, shift_m) } else { resize(obstacle, rng) }
@@ -71,6 +76,23 @@ fn shift_fault(scenario: &mut Scenario, rng: &mut SplitMix64) {
             *time_s = (*time_s + rng.between(-2.0, 2.0)).max(0.1);
         }
     }
+}
+
+/// Adds a fault that the safety of the other drones must not depend on.
+fn add_fault(scenario: &mut Scenario, rng: &mut SplitMix64) {
+    if scenario.fault_plan.len() >= MOST_FAULTS || scenario.formation.drones < 2 {
+        return;
+    }
+    let drone = rng.integer(0, scenario.formation.drones - 1);
+    let (at_s, for_s) = (rng.between(0.1, FAULT_WITHIN_S), rng.between(0.5, 20.0));
+    let (kind, for_s) = match rng.integer(0, 4) {
+        0 => (FaultKind::Kill, None),
+        1 => (FaultKind::Freeze, Some(for_s)),
+        2 => (FaultKind::Restart, Some(for_s)),
+        3 => (FaultKind::Deaf, Some(for_s)),
+        _ => (FaultKind::Mute, Some(for_s)),
+    };
+    scenario.fault_plan.push(Fault::of_drone(kind, drone, at_s, for_s));
 }
 
 fn shift(obstacle: &mut Obstacle, rng: &mut SplitMix64, by_m: f64) {

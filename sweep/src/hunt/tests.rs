@@ -43,6 +43,7 @@ fn the_number_of_workers_does_not_change_what_is_found() {
 fn neighbours_are_valid_and_differ() {
     let experiment = Experiment::parse("scenario = \"wide\"\nseeds = 1", "test", Path::new("")).unwrap();
     let parent = Grid::new(&experiment, &[]).scenario(0).unwrap();
-    let near: Vec<Scenario> = (0..20).filter_map(|number| mutation::neighbour(&parent, 1, number)).collect();
-    assert!(near.len() >= 15 && near.iter().filter(|one| **one != parent).count() >= 12, "{}", near.len());
+    let near: Vec<Scenario> = (0..60).filter_map(|number| mutation::neighbour(&parent, 1, number)).collect();
+    assert!(near.iter().any(|one| !one.fault_plan.is_empty()), "faults are added");
+    assert!(near.len() >= 45 && near.iter().filter(|one| **one != parent).count() >= 36, "{}", near.len());
 }
