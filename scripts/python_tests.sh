@@ -18,6 +18,9 @@ pip=("$scratch/venv/bin/python" -m pip --quiet --disable-pip-version-check)
 # A thinner build than a release: its tests need no speed to the last tenth.
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target/python}
 export CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_PROFILE_RELEASE_DEBUG=0
+# Lints first. In the same profile, they share what the build makes for the compiler itself.
+cargo fmt --check --manifest-path python/Cargo.toml
+cargo clippy --quiet --release --locked --all-targets --manifest-path python/Cargo.toml -- -D warnings
 PATH="$scratch/venv/bin:$PATH" maturin build --quiet --release --locked --manifest-path python/Cargo.toml --out "$scratch" \
     --interpreter "$scratch/venv/bin/python"
 "${pip[@]}" install "$(echo "$scratch"/skein-*.whl)[test]"

@@ -11,8 +11,18 @@ use std::process::{Command, ExitCode, Output};
 /// Set in the processes of the application.
 const APP: &str = "SKEIN_TEST_APP";
 
+/// Set in the processes of a program that is built with another version: the word that stands for that version, see
+/// `skein_bus::Version`.
+const OTHER_VERSION: &str = "SKEIN_TEST_VERSION";
+
+/// Where a program of another version says which it is, in the control segment. This is the same in all versions.
+const REFUSED: u64 = 64;
+
 fn main() -> ExitCode {
     if std::env::var_os(APP).is_some() {
+        if let Some(word) = std::env::var_os(OTHER_VERSION) {
+            join_as_another_version(&word.to_string_lossy());
+        }
         return own_pilots::app().main();
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
@@ -26,6 +36,17 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
+/// Does what a drone's process of another version does: says which it is, and ends.
+fn join_as_another_version(word: &str) {
+    let args: Vec<String> = std::env::args().collect();
+    let Some(control) = args.iter().position(|arg| arg == "--control").filter(|_| args[1] == "drone") else { return };
+    let path = format!("/proc/self/fd/{}", args[control + 1]);
+    let segment = std::fs::OpenOptions::new().write(true).open(path).unwrap();
+    let word: u64 = word.parse().unwrap();
+    std::os::unix::fs::FileExt::write_all_at(&segment, &word.to_ne_bytes(), REFUSED).unwrap();
+    std::process::exit(3);
+}
+
 type Test = fn(&Bench);
 
 const TESTS: &[(&str, Test)] = &[
@@ -36,6 +57,8 @@ const TESTS: &[(&str, Test)] = &[
     ("sweep_and_replay_know_the_pilots", sweep_and_replay_know_the_pilots),
     ("a_failing_pilot_is_named_and_the_others_fly_on", a_failing_pilot_is_named_and_the_others_fly_on),
     ("a_process_that_ends_or_hangs_is_a_failure", a_process_that_ends_or_hangs_is_a_failure),
+    ("a_program_of_another_version_is_refused_with_words", a_program_of_another_version_is_refused_with_words),
+    ("a_forked_process_never_flies", a_forked_process_never_flies),
     ("drones_of_a_shared_process_fail_alone", drones_of_a_shared_process_fail_alone),
     ("a_program_without_its_pilot_in_the_air_says_so", a_program_without_its_pilot_in_the_air_says_so),
 ];
@@ -219,11 +242,30 @@ fn sweep_and_replay_know_the_pilots(bench: &Bench) {
     let csv = std::fs::read_to_string(bench.path("sweeps/e/runs.csv")).unwrap();
     assert!(csv.lines().next().unwrap().contains(",metric.gain,"), "{csv}");
     assert!(bench.path("sweeps/e/plots/metric.gain.svg").exists());
+    // What is wrong is named with its place: in the experiment, in the scenario, in the manifest.
+    let refused = |words: &[&str], wanted: &str| {
+        let output = bench.output(words);
+        let errors = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && errors.contains(wanted), "expected {wanted:?} in:\n{errors}");
+    };
     std::fs::write(bench.path("f.toml"), experiment.replace("0.4", "-0.4")).unwrap();
-    let wrong = bench.output(&["sweep", "f.toml"]);
-    assert!(
-        wrong.status.code() == Some(2) && text(&wrong.stderr).contains("pilot.0.params.gain_per_s: expected"),
-        "{wrong:?}"
+    refused(
+        &["sweep", "f.toml"],
+        "skein: f.toml:5:37: pilot.0.params.gain_per_s: expected a number from 0, found -0.4",
+    );
+    refused(&["hunt", "f.toml"], "skein: f.toml:5:37: pilot.0.params.gain_per_s: expected a number from 0, found -0.4");
+    bench.scenario("[[pilot]]\nname = \"drift\"\nparams = { gain_per_s = -1 }\n");
+    let plain = experiment.split_once("[grid]").unwrap().0;
+    std::fs::write(bench.path("g.toml"), plain).unwrap();
+    refused(&["sweep", "g.toml"], "skein: g.toml: own.toml:11:25: pilot.0.params.gain_per_s: expected a number from 0");
+    let changed = std::fs::read_to_string(&manifest).unwrap();
+    let empty = "\"name\": \"drift\",";
+    assert!(changed.contains(empty), "{changed}");
+    std::fs::write(&manifest, changed.replacen(empty, &format!("{empty} \"params\": {{ \"gain_per_s\": -1 }},"), 1))
+        .unwrap();
+    refused(
+        &["replay", "run"],
+        "skein: run/manifest.json: scenario.pilot.0.params.gain_per_s: expected a number from 0",
     );
 }
 
@@ -273,6 +315,40 @@ fn a_process_that_ends_or_hangs_is_a_failure(bench: &Bench) {
     for (how, expected) in wrong {
         let summary = bench.fly(&bench.scenario(&clumsy(how)), &["--no-record", "--patience", "0.5"]);
         assert_eq!(reason(&summary), expected);
+    }
+}
+
+fn a_program_of_another_version_is_refused_with_words(bench: &Bench) {
+    let program = std::env::current_exe().unwrap().display().to_string();
+    let table = format!("[[pilot]]\nname = \"drift\"\ncommand = [{program:?}]\ndrones = [1]\n");
+    let path = bench.scenario(&table);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_skein"));
+    command.env(APP, "1").current_dir(&bench.folder).args(["run", path.to_str().unwrap(), "--no-record"]);
+    let other = skein_bus::Version { minor: skein_bus::Version::OWN.minor + 7, ..skein_bus::Version::OWN };
+    let word =
+        [other.major, other.minor, other.wire, other.layout].iter().fold(0, |word, &n| word << 16 | u64::from(n));
+    let output = command.env(OTHER_VERSION, word.to_string()).output().unwrap();
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{errors}");
+    let wanted =
+        format!("drone 1, pilot \"drift\": {program} is built with {other}, expected {}", skein_bus::Version::OWN);
+    assert!(errors.contains(&wanted) && errors.contains("build it again with this version"), "{errors}");
+    assert!(wanted.contains(&format!("Skein 0.{} (messages of version", other.minor)), "{wanted}");
+}
+
+fn a_forked_process_never_flies(bench: &Bench) {
+    let alone = bench.fly_both(&bench.scenario(&clumsy("nothing")), &[]);
+    for how in ["fork", "fork at birth"] {
+        let path = bench.scenario(&clumsy(how));
+        for runtime in ["inline", "processes"] {
+            let words = ["run", path.to_str().unwrap(), "--json", "--no-record", "--force", "--out", "run"];
+            let output = bench.command(&words).args(["--runtime", runtime]).output().unwrap();
+            let errors = text(&output.stderr);
+            assert!(errors.contains("which the pilot of drone 2 forked, is ended: only the process"), "{errors}");
+            let summary: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{errors}"));
+            assert_eq!(summary["digest"], alone["digest"], "{how}, {runtime}: the drone flies on");
+            assert_eq!(summary["failures"], serde_json::json!([]));
+        }
     }
 }
 

@@ -77,7 +77,11 @@ impl BenchError {
     /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Scenario(_) | Self::NoCase { .. } | Self::NoTransport)
+        use RuntimeError::{OtherVersion, Pilot};
+        matches!(
+            self,
+            Self::Scenario(_) | Self::NoCase { .. } | Self::NoTransport | Self::Runtime(Pilot(_) | OtherVersion { .. })
+        )
     }
 
     /// For `map_err`: an error of the system while doing `what`.

@@ -5,6 +5,7 @@
 //!   round, because absolute figures belong to the machine.
 //! - [`failover::FailoverBench`] kills leaders again and again, and measures the time until all drones follow another one.
 //! - [`clock::ClockBench`] flies by the wall clock, and measures how late ticks open.
+//! - [`pilots::PilotBench`] flies one mission with several pilots, and compares what they cost.
 //! - [`parts::PartBench`] measures single parts of a tick: radio, grouping, sensing, recording.
 //!
 //! Each benchmark is a plain struct of settings with a method `run`, which gives rows that serialise to JSON. The structs
@@ -32,6 +33,7 @@ pub mod failover;
 mod flown_by;
 mod median;
 pub mod parts;
+pub mod pilots;
 pub mod runtime;
 mod scratch;
 

@@ -10,10 +10,11 @@ use crate::drone_block::{DroneBlock, DroneBlocks};
 use crate::error::BusError;
 use crate::mission::{MissionState, MissionWords, WorldState};
 use crate::process_request::{ProcessRequest, RequestChannel, RequestWords};
-use crate::segment::{Segment, open_inherited};
+use crate::segment::{Segment, SharedArray, open_inherited};
 use crate::spec::{ControlSpec, WaitMode};
 use crate::stopwatch::{CounterSpeed, Stopwatch};
 use crate::tick_word::PaddedWord;
+use crate::version::Version;
 use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
 use std::mem::offset_of;
@@ -21,19 +22,23 @@ use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
 use std::os::unix::process::ExitStatusExt;
 use std::process::ExitStatus;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 const MAGIC: u32 = u32::from_le_bytes(*b"SKN1");
-/// Raised with every change of the layout, of `Slot` or of `LinkStats`.
-const LAYOUT: u32 = 6;
+/// The first layout whose header has versions.
+const LAYOUT_WITH_VERSIONS: u32 = 7;
 /// Looks at a word before sleeping, if every process has a core of its own.
 const SPIN: u32 = 300;
 
-#[repr(C, align(128))]
+/// The first 16 bytes stay what they are in all versions, and so does the word at [`REFUSED`]: programs of different versions tell
+/// each other by these.
+#[repr(C, align(64))]
 struct Header {
     magic: u32,
     layout: u32,
+    /// Version of the launcher, see [`Version::word`].
+    version: u64,
     drones: u32,
     cores: u32,
     wait: u32,
@@ -51,7 +56,9 @@ struct SharedWords {
     ns_per_count: AtomicU64,
 }
 
-const SHARED: usize = size_of::<Header>();
+/// Where a program of another version says which it is: the word of its [`Version`].
+const REFUSED: usize = size_of::<Header>();
+const SHARED: usize = 128;
 const HINT: usize = SHARED + size_of::<SharedWords>();
 const REQUESTS: usize = HINT + size_of::<PaddedWord>();
 const ARRAYS: usize = REQUESTS + size_of::<RequestWords>();
@@ -74,6 +81,7 @@ pub struct Control {
     mission: MissionState,
     requests: RequestChannel,
     counter: CounterSpeed,
+    refused: SharedArray<AtomicU64>,
     /// The memfd, in the process that made it.
     memfd: Option<OwnedFd>,
 }
@@ -88,7 +96,8 @@ impl Control {
         let (segment, memfd) = Segment::create("skein-control", segment_len(&spec))?;
         let header = Header {
             magic: MAGIC,
-            layout: LAYOUT,
+            layout: Version::OWN.layout.into(),
+            version: Version::OWN.word(),
             drones: spec.drones as u32,
             cores: spec.cores as u32,
             wait: spec.wait as u32,
@@ -105,8 +114,8 @@ impl Control {
     /// Maps the segment whose descriptor was inherited under this number. For every process but the launcher.
     ///
     /// # Errors
-    /// [`BusError::Io`] if there is no such descriptor, [`BusError::Control`] if it is not a control segment of this
-    /// layout.
+    /// [`BusError::Io`] if there is no such descriptor, [`BusError::Control`] if it is not a control segment,
+    /// [`BusError::Version`] if its launcher is of another version, which is then told so: see [`Control::refused`].
     pub fn attach(fd: RawFd) -> Result<Self, BusError> {
         let (file, size) = open_inherited(fd)?;
         let wrong = |why: String| Err(BusError::Control(format!("descriptor {fd} {why}")));
@@ -117,10 +126,20 @@ impl Control {
         // SAFETY: the pointer is aligned and into the mapping, which `head` keeps. The fields are integers, for which every
         // bit pattern is valid, and no process changes them after `create`.
         let header = unsafe { head.array::<Header>(0, 1).pointer(0).read() };
-        if (header.magic, header.layout) != (MAGIC, LAYOUT) {
+        if header.magic != MAGIC {
+            return wrong("is not a control segment".to_owned());
+        }
+        if header.layout < LAYOUT_WITH_VERSIONS {
+            let layout = header.layout;
             return wrong(format!(
-                "is not a control segment of layout {LAYOUT}; run launcher and children of one build"
+                "has the layout {layout} of an early Skein, expected {}: use one version",
+                Version::OWN.layout
             ));
+        }
+        let launcher = Version::of_word(header.version);
+        if launcher != Version::OWN {
+            refused(&head).get(0).store(Version::OWN.word(), Ordering::Release);
+            return Err(BusError::Version { own: Version::OWN, launcher });
         }
         let spec = ControlSpec {
             drones: header.drones as usize,
@@ -150,6 +169,7 @@ impl Control {
             mission: MissionState::new(segment.array(SHARED + offset_of!(SharedWords, mission), 1)),
             requests: RequestChannel::new(segment.array(REQUESTS, 1)),
             counter: counter(segment),
+            refused: refused(segment),
             memfd: None,
         }
     }
@@ -164,6 +184,12 @@ impl Control {
     #[must_use]
     pub fn spec(&self) -> ControlSpec {
         self.spec
+    }
+
+    /// The version of a program that tried to attach and could not because of it. For the launcher.
+    #[must_use]
+    pub fn refused(&self) -> Option<Version> {
+        Some(self.refused.get(0).load(Ordering::Acquire)).filter(|&word| word != 0).map(Version::of_word)
     }
 
     /// Number of the tick word that a drone waits on. The drone should be pinned to the core of this number.
@@ -325,6 +351,10 @@ impl Control {
     }
 }
 
+fn refused(segment: &Arc<Segment>) -> SharedArray<AtomicU64> {
+    segment.array(REFUSED, 1)
+}
+
 fn counter(segment: &Arc<Segment>) -> CounterSpeed {
     CounterSpeed::new(segment.array(SHARED + offset_of!(SharedWords, ns_per_count), 1))
 }
@@ -341,6 +371,7 @@ mod tests {
     use super::*;
     use crate::process_request::RequestKind;
     use skein_protocol::DroneId;
+    use std::os::unix::fs::FileExt;
 
     fn control() -> Control {
         Control::create(ControlSpec { drones: 2, cores: 1, per_process: 1, wait: WaitMode::Block }).unwrap()
@@ -376,7 +407,25 @@ mod tests {
     }
 
     #[test]
+    fn a_launcher_of_another_version_is_refused_and_told() {
+        let launcher = control();
+        let fd = launcher.fd().unwrap();
+        assert!(Control::attach(fd).is_ok() && launcher.refused().is_none());
+        let (file, _) = open_inherited(fd).unwrap();
+        let other = Version { minor: Version::OWN.minor + 1, ..Version::OWN };
+        file.write_all_at(&other.word().to_ne_bytes(), offset_of!(Header, version) as u64).unwrap();
+        let error = Control::attach(fd).unwrap_err();
+        assert!(matches!(error, BusError::Version { own: Version::OWN, launcher } if launcher == other), "{error}");
+        assert_eq!(launcher.refused(), Some(Version::OWN));
+        file.write_all_at(&6_u32.to_ne_bytes(), offset_of!(Header, layout) as u64).unwrap();
+        assert!(Control::attach(fd).unwrap_err().to_string().contains("has the layout 6 of an early Skein"));
+    }
+
+    #[test]
     fn the_layout_is_that_of_its_number() {
+        // Programs of all versions find these here.
+        let head = [offset_of!(Header, magic), offset_of!(Header, layout), offset_of!(Header, version)];
+        assert_eq!((head, REFUSED), ([0, 4, 8], 64));
         assert_eq!((SHARED, HINT, REQUESTS, ARRAYS), (128, 256, 384, 512));
         assert_eq!(offset_of!(SharedWords, calls), 16);
         assert_eq!(offset_of!(SharedWords, ns_per_count), 24);

@@ -1,5 +1,6 @@
 //! Errors of the bus.
 
+use crate::version::Version;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -28,6 +29,16 @@ pub enum BusError {
     /// The control segment is not what it must be.
     #[error("control segment: {0}")]
     Control(String),
+    /// The run is that of a launcher of another version.
+    #[error(
+        "this program is built with {own}, but the launcher that started it with {launcher}; build both with the same version"
+    )]
+    Version {
+        /// The version of this program.
+        own: Version,
+        /// The version of the launcher.
+        launcher: Version,
+    },
     /// The operating system refused a call that has no path.
     #[error("cannot {what}: {source}")]
     System {

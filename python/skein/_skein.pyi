@@ -103,6 +103,12 @@ class Obstacle:
     @property
     def radius_m(self) -> float:
         """How far it reaches beyond its outline, m: the radius of a circle, whose outline is its centre."""
+    @property
+    def floor_m(self) -> float:
+        """Altitude of its lower face, m; minus infinity if it has none."""
+    @property
+    def top_m(self) -> float:
+        """Altitude of its upper face, m; infinity if it has none."""
 
 @final
 class Inbox:

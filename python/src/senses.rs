@@ -86,6 +86,8 @@ impl PySenses {
                         sensed.shape.vertices().map(|point| (point.x, point.y)).collect()
                     }),
                     radius_m: shape.map_or(0.0, |sensed| sensed.shape.radius_m),
+                    floor_m: shape.map_or(f64::NEG_INFINITY, |sensed| sensed.shape.floor_m),
+                    top_m: shape.map_or(f64::INFINITY, |sensed| sensed.shape.top_m),
                 }
             });
             list(py, obstacles)
@@ -175,6 +177,12 @@ pub(crate) struct PyObstacle {
     /// How far the obstacle reaches beyond its outline, m: the radius of a circle, whose outline is its centre.
     #[pyo3(get)]
     radius_m: f64,
+    /// Altitude of its lower face, m; minus infinity if it has none.
+    #[pyo3(get)]
+    floor_m: f64,
+    /// Altitude of its upper face, m; infinity if it has none.
+    #[pyo3(get)]
+    top_m: f64,
 }
 
 #[pymethods]
@@ -192,7 +200,10 @@ impl PyObstacle {
     }
 
     fn __repr__(&self) -> String {
-        let Self { obstacle, nearest_m, distance_m, .. } = self;
-        format!("Obstacle(obstacle={obstacle}, nearest_m={nearest_m:?}, distance_m={distance_m})")
+        let Self { obstacle, nearest_m, distance_m, floor_m, top_m, .. } = self;
+        format!(
+            "Obstacle(obstacle={obstacle}, nearest_m={nearest_m:?}, distance_m={distance_m}, floor_m={floor_m}, \
+             top_m={top_m})"
+        )
     }
 }

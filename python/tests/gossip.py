@@ -44,6 +44,9 @@ class Fails(Gossip):
                 return skein.Acceleration(float("nan"), 0.0)
             if self.how == "none":
                 return None
+            if self.how == "fork":
+                self.how = "forked"
+                os.fork()
             if self.how == "exit":
                 os._exit(7)
         print("on stdout")

@@ -102,6 +102,23 @@ def test_messages_take_as_long_as_the_radio_says_and_can_be_lost():
     assert not deaf.observations[:, -16:].any()
 
 
+def test_the_actions_of_a_slow_drone_take_effect_later():
+    fault = {"fault": [{"kind": "slow", "drone": 1, "at_s": 0.0, "for_s": 1.0, "extra_s": 0.1}]}
+    swarm = skein.Swarm(SCENE, set=fault)
+    before = swarm.velocity_mps.copy()
+    late = round(0.1 / swarm.dt_s)
+    for tick in range(late + 1):
+        assert np.all(swarm.velocity_mps[1] == before[1]), f"nothing has happened before tick {tick}"
+        swarm.step([[0, 0, 0], [0, 0, 1], [0, 0, 1], [0, 0, 0]])
+        assert swarm.velocity_mps[2, 2] == pytest.approx(before[2, 2] + (tick + 1) * swarm.dt_s)
+    assert swarm.velocity_mps[1, 2] == pytest.approx(before[1, 2] + swarm.dt_s)
+    while swarm.now_s < 1.5:
+        swarm.step([[0, 0, 0]] * 4)
+    gained = swarm.velocity_mps - before
+    assert gained[2, 2] == pytest.approx((late + 1) * swarm.dt_s), "what was commanded is done, and no more"
+    assert gained[1, 2] <= gained[2, 2] + 1e-9
+
+
 def test_a_killed_drone_leaves():
     fault = {"fault": [{"kind": "kill", "drone": 2, "at_s": 0.1}]}
     env = skein.parallel_env(SCENE, set=fault)

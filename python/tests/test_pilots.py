@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -83,6 +84,55 @@ def test_functions_fly_what_the_application_flies(tmp_path, scenario):
     assert loaded.outcome == "timeout" and loaded.manifest["seed"] == 5
     assert len(loaded.trace["x_m"]) > 4 and any(event["event"] == "end" for event in loaded.events)
     assert loaded.summary["metrics_own"]["heard"]["max"] == 3
+
+
+def test_a_run_has_the_messages_of_its_pilots():
+    said = []
+
+    class Talks(skein.Pilot):
+        def __init__(self, birth):
+            self.drone = birth.drone
+
+        def step(self, senses, inbox, out):
+            if senses.tick % 10 == self.drone:
+                data = bytes([self.drone]) * (self.drone + 1)
+                out.say(f"talk/{self.drone % 2}", data)
+                said.append((self.drone, f"talk/{self.drone % 2}", data))
+            return skein.Acceleration(0.0, 0.0)
+
+    run = skein.run(HEAD, pilots={"talks": Talks}, set={"time.timeout_s": 0.5})
+    messages = run.messages
+    heard = sorted(zip(messages["source"], messages["topic"], messages["data"], strict=True))
+    assert len(said) >= 8 and heard == sorted(said)
+    times = list(messages["t_s"])
+    assert times == sorted(times) and 0 <= times[0] and times[-1] <= 0.5
+
+
+def test_an_obstacle_has_a_floor_and_a_top():
+    seen = []
+
+    class Looks(skein.Pilot):
+        def step(self, senses, inbox, out):
+            seen.extend((near.obstacle, near.floor_m, near.top_m) for near in senses.obstacles)
+            return skein.Acceleration(0.0, 0.0)
+
+    obstacles = [
+        {"shape": "circle", "centre_m": [80, 30], "radius_m": 5, "floor_m": 2.5, "top_m": 120.0},
+        {"shape": "circle", "centre_m": [80, -60], "radius_m": 5},
+    ]
+    near = {"obstacle": obstacles, "sensors.detection_range_m": 1000.0, "time.timeout_s": 0.1}
+    skein.run(HEAD, pilots={"looks": Looks}, set=near, record=False)
+    assert set(seen) == {(0, 2.5, 120.0), (1, -math.inf, math.inf)}
+
+
+def test_a_forked_process_never_flies(tmp_path, scenario):
+    path = tmp_path / "fails.toml"
+    path.write_text(GOSSIP + '[[pilot]]\nname = "fails"\ndrones = [2]\nparams = { how = "fork" }\n')
+    for runtime in ("inline", "processes"):
+        done = app(tmp_path, "run", path, "--json", "--no-record", "--runtime", runtime, "--out", runtime)
+        assert "which the pilot of drone 2 forked, is ended" in done.stderr
+        summary = json.loads(done.stdout)
+        assert summary["failures"] == [] and summary["sim_s"] == pytest.approx(2.0, abs=0.05)
 
 
 def test_a_single_pilot_flies_a_scenario_without_pilots_and_keys_can_be_set():

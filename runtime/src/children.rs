@@ -119,7 +119,7 @@ impl<'l> Children<'l> {
     }
 
     /// The program of a process.
-    fn program(&self, role: ChildRole) -> &Program {
+    pub(crate) fn program(&self, role: ChildRole) -> &Program {
         match role {
             ChildRole::World => self.programs.launcher(),
             ChildRole::Drones(range) => self.programs.of(range.first),

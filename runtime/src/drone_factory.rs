@@ -4,6 +4,7 @@ use crate::error::RuntimeError;
 use crate::pilot_host::{HostParams, PilotHost};
 use crate::pilot_registry::PilotRegistry;
 use serde_json::Value;
+use skein_bus::ForkGuard;
 use skein_protocol::radio::Radio;
 use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
@@ -32,7 +33,7 @@ impl<'s> DroneFactory<'s> {
     /// One drone, ready for the tick that begins at `start`. A restarted drone has a higher incarnation, from 1.
     ///
     /// # Errors
-    /// [`RuntimeError::Pilot`] if its pilot cannot be made.
+    /// [`RuntimeError::Pilot`] if its pilot cannot be made, [`RuntimeError::Bus`].
     pub fn pilot_host(&self, id: DroneId, incarnation: u32, start: SimTime) -> Result<PilotHost, RuntimeError> {
         let table = self.tables.get(id.index()).copied().flatten();
         let pilot = self.pilots.make(self.scenario, &self.json, table, (id, incarnation, start))?;
@@ -41,6 +42,6 @@ impl<'s> DroneFactory<'s> {
             dt_s: self.scenario.time.dt_s,
             velocity_gain_per_s: self.scenario.guidance.velocity_gain_per_s,
         };
-        Ok(PilotHost::new(params, Arc::clone(&self.radio), pilot))
+        Ok(PilotHost::new(params, Arc::clone(&self.radio), pilot).guarded(ForkGuard::new()?))
     }
 }

@@ -1,7 +1,7 @@
 //! What keeps a run from being started or carried through.
 
 use crate::pilot_problem::PilotProblem;
-use skein_bus::BusError;
+use skein_bus::{BusError, Version};
 use skein_protocol::DroneId;
 use skein_protocol::shape::ShapeError;
 use skein_world::WorldError;
@@ -38,6 +38,20 @@ pub enum RuntimeError {
         path: PathBuf,
         /// Where it differs.
         source: serde_json::Error,
+    },
+    /// A program is built with another version of Skein.
+    #[error(
+        "{process}: {program} is built with {found}, expected {}, which this program is built with; build it again with this \
+         version (a program in Python: install this version of the module skein)",
+        Version::OWN
+    )]
+    OtherVersion {
+        /// Which process, and which pilot it should fly, in words.
+        process: String,
+        /// The program.
+        program: String,
+        /// The version that it is built with.
+        found: Version,
     },
     /// A process ended before the first tick.
     #[error("{process} ended before the first tick: {status}")]

@@ -75,6 +75,7 @@ pub mod drone_process;
 mod drone_range;
 mod error;
 mod fault_plan;
+mod forked;
 pub mod inline;
 mod launch;
 pub mod mission;
@@ -93,6 +94,7 @@ mod said;
 pub mod scenario_file;
 mod steered_swarm;
 pub mod supervisor;
+mod talker;
 mod tuning;
 pub mod world_process;
 

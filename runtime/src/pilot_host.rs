@@ -1,9 +1,11 @@
 //! A pilot with its radio receiver, as both runtimes step it.
 
+use crate::forked::copy_came_back;
 use crate::radio_receiver::{Pending, RadioReceiver};
 use crate::reported_panic::catch;
 use crate::said::Said;
 use crate::tuning::{MAX_MESSAGES, MAX_OWN_MESSAGES, MAX_TELEMETRY};
+use skein_bus::ForkGuard;
 use skein_pilot::{Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
@@ -41,6 +43,7 @@ pub struct PilotHost {
     pilot: Box<dyn Pilot>,
     frames_total: u64,
     failed: bool,
+    guard: Option<ForkGuard>,
 }
 
 impl PilotHost {
@@ -48,7 +51,13 @@ impl PilotHost {
     #[must_use]
     pub fn new(params: HostParams, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
         let radio_receiver = RadioReceiver::new(params.me, (params.dt_s * 1e9).round() as i64, radio.into());
-        Self { params, radio_receiver, pilot, frames_total: 0, failed: false }
+        Self { params, radio_receiver, pilot, frames_total: 0, failed: false, guard: None }
+    }
+
+    /// Ends a process that the pilot forks and that comes back from the pilot's step: it must not answer for the drone, too.
+    #[must_use]
+    pub fn guarded(self, guard: ForkGuard) -> Self {
+        Self { guard: Some(guard), ..self }
     }
 
     /// Receives the frames of a downlink that came too late to be answered. The pilot hears them in its next step.
@@ -74,6 +83,9 @@ impl PilotHost {
         self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
         let gain_per_s = self.params.velocity_gain_per_s;
         let stepped = step_pilot(&mut *self.pilot, gain_per_s, &senses, &Inbox::new(&heard), scratch);
+        if let Some(guard) = self.guard {
+            guard.end_copy(|| copy_came_back(self.params.me.0));
+        }
         scratch.heard = emptied(heard);
         if let Err(reason) = &stepped {
             self.fail(reason.clone(), &mut scratch.out);

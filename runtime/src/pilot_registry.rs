@@ -3,13 +3,16 @@
 use crate::beacon::BeaconPilot;
 use crate::cruise::CruisePilot;
 use crate::error::RuntimeError;
+use crate::forked::copy_came_back;
 use crate::mission;
 use crate::pilot_problem::PilotProblem;
 use crate::program::Program;
 use crate::reported_panic::catch;
 use crate::run_facts::pilot_groups;
+use crate::talker::TalkerPilot;
 use serde_json::Value;
 use skein_agent::SwarmPilot;
+use skein_bus::ForkGuard;
 use skein_pilot::{Birth, Params, Pilot, PilotError};
 use skein_protocol::{DroneId, SimTime};
 use skein_report::PilotEntry;
@@ -38,14 +41,16 @@ impl fmt::Debug for PilotRegistry {
 }
 
 impl PilotRegistry {
-    /// The built-in pilots: `paper` and `cruise`, and `beacon`, with which the runtime is measured.
+    /// The built-in pilots: `paper` and `cruise`, and those with which the runtime is measured: `beacon` and `talker`.
     #[must_use]
     pub fn new(program: Program) -> Self {
         let mut registry = Self { pilots: BTreeMap::new(), program };
         registry.insert(DEFAULT_PILOT, false, |scenario, birth| {
             without_params(birth)?;
-            let (id, start) = (DroneId(birth.drone), SimTime::from_secs(birth.start_s));
-            Ok(Box::new(SwarmPilot::new(mission::pilot_params(scenario, id, birth.incarnation, start))))
+            Ok(Box::new(swarm_pilot(scenario, birth)))
+        });
+        registry.insert("talker", false, |scenario, birth| {
+            Ok(Box::new(TalkerPilot::new(swarm_pilot(scenario, birth), &birth.params)?))
         });
         registry.insert("cruise", false, |_, birth| Ok(Box::new(CruisePilot::new(&birth.params)?)));
         registry.insert("beacon", false, |scenario, birth| {
@@ -153,7 +158,9 @@ impl PilotRegistry {
             params: keys.map(|keys| Params::from(keys.params.clone())).unwrap_or_default(),
             scenario: Arc::clone(json),
         };
+        let guard = ForkGuard::new().map_err(|error| PilotProblem::new(path.clone(), error.to_string()))?;
         let made = catch(|| (registered.make)(scenario, &birth));
+        guard.end_copy(|| copy_came_back(birth.drone));
         let made = made.unwrap_or_else(|panic| Err(PilotError::new(format!("the pilot {name:?} {panic}"))));
         made.map_err(|error| refused(name, &path, &error))
     }
@@ -174,7 +181,7 @@ impl PilotRegistry {
     }
 
     fn unknown(&self, name: &str, path: &str) -> PilotProblem {
-        let known: Vec<&str> = self.names().into_iter().filter(|name| *name != "beacon").collect();
+        let known: Vec<&str> = self.names().into_iter().filter(|name| !["beacon", "talker"].contains(name)).collect();
         let scored = known.iter().map(|known| (strsim::jaro_winkler(name, known), known));
         let best = scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
         let hint = best.map(|(_, known)| format!("; did you mean `{known}`?")).unwrap_or_default();
@@ -201,6 +208,11 @@ impl PilotRegistry {
         }
         Ok(entries)
     }
+}
+
+fn swarm_pilot(scenario: &Scenario, birth: &Birth) -> SwarmPilot {
+    let (id, start) = (DroneId(birth.drone), SimTime::from_secs(birth.start_s));
+    SwarmPilot::new(mission::pilot_params(scenario, id, birth.incarnation, start))
 }
 
 fn without_params(birth: &Birth) -> Result<(), PilotError> {

@@ -12,11 +12,12 @@ use skein_protocol::{DroneId, MessageRef, UserMessage};
 use skein_scenario::Scenario;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The world and all drones of a mission. The pilots are the caller's: it reads what the drones sense and hear, steers them, and
 /// advances the world by a tick. Radio and faults are those of the scenario: a drone that is killed or frozen ignores what it is
-/// told, and what drones say comes as late, as seldom and as far as the radio lets it.
+/// told, a slow one does it later, and what drones say comes as late, as seldom and as far as the radio lets it.
 ///
 /// ```
 /// use skein_pilot::Command;
@@ -118,6 +119,10 @@ impl SteeredSwarm {
         if self.world.ended().is_some() {
             return;
         }
+        let sensed = &self.world.sensed().drones;
+        for (drone, sensed) in self.drones.iter_mut().zip(sensed).filter(|(drone, _)| drone.flies()) {
+            drone.react_after((sensed.extra_reaction_s / self.dt_s).round() as usize);
+        }
         for (drone, id) in self.drones.iter_mut().zip(0..).filter(|(drone, _)| drone.flies()) {
             drone.frames_total += drone.frames.len() as u64;
             drone.slot.frames_total = drone.frames_total;
@@ -178,9 +183,27 @@ struct SteeredDrone {
     slot: Slot,
     frames: Vec<Frame>,
     frames_total: u64,
+    /// Commands that a fault holds back, the oldest first, m/s².
+    held_mps2: VecDeque<[f64; 3]>,
+    /// The command that took effect last, m/s².
+    last_mps2: [f64; 3],
 }
 
 impl SteeredDrone {
+    /// Holds the command of this tick back for so many ticks. When that becomes longer, the last command is repeated; when it
+    /// becomes shorter, the oldest are skipped: as the paper's pilot reacts.
+    fn react_after(&mut self, ticks: usize) {
+        while self.held_mps2.len() > ticks {
+            self.held_mps2.pop_front();
+        }
+        while self.held_mps2.len() < ticks {
+            self.held_mps2.push_front(self.last_mps2);
+        }
+        self.held_mps2.push_back(self.slot.acceleration_mps2);
+        self.last_mps2 = self.held_mps2.pop_front().unwrap_or_default();
+        self.slot.acceleration_mps2 = self.last_mps2;
+    }
+
     fn flies(&self) -> bool {
         !self.killed && !self.frozen
     }

@@ -139,7 +139,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         let mut ready = 0;
         while ready < drones || self.control.world_state() == WorldState::Starting {
             if let Some((role, status)) = self.children.wait_any(SUPERVISOR_POLL).into_iter().next() {
-                return Err(RuntimeError::EndedEarly { process: role.to_string(), status });
+                return Err(self.ended_early(role, status));
             }
             if let Some(signal) = (self.launch.interrupted)() {
                 self.end.signal = Some(signal);
@@ -154,6 +154,22 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             }
         }
         Ok(true)
+    }
+
+    /// Why a process ended before the first tick.
+    fn ended_early(&self, role: ChildRole, status: ExitStatus) -> RuntimeError {
+        let Some(found) = self.control.refused() else {
+            return RuntimeError::EndedEarly { process: role.to_string(), status };
+        };
+        let pilot = match role {
+            ChildRole::World => String::new(),
+            ChildRole::Drones(range) => {
+                let names = self.launch.scenario.pilot_names();
+                names.get(range.first.index()).map(|name| format!(", pilot {name:?}")).unwrap_or_default()
+            }
+        };
+        let program = self.children.program(role).to_string();
+        RuntimeError::OtherVersion { process: format!("{role}{pilot}"), program, found }
     }
 
     /// Records and serves the world's requests until the world has ended, or does not end although it was asked to.

@@ -58,6 +58,17 @@ impl ScenarioErrors {
         Self { source: NamedSource::new(name, shown.collect()), issues }
     }
 
+    /// Names places otherwise: `place` gives another text for a place, or `None`.
+    #[must_use]
+    pub fn with_places(mut self, place: impl Fn(&str) -> Option<String>) -> Self {
+        for issue in &mut self.issues {
+            if let Some(other) = place(&issue.place) {
+                issue.place = other;
+            }
+        }
+        self
+    }
+
     /// The errors. There is at least one.
     #[must_use]
     pub fn issues(&self) -> &[Issue] {

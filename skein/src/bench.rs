@@ -1,13 +1,16 @@
 //! `skein bench`.
 
 use crate::exit::{Exit, Failure};
+use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{print, print_line};
+use crate::scenario_args::ScenarioArgs;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use skein_bench::clock::{self, ClockBench};
 use skein_bench::failover::FailoverBench;
 use skein_bench::parts::{self, Part, PartBench};
+use skein_bench::pilots::{self, PilotBench};
 use skein_bench::runtime::{BaselinePeer, RuntimeBench};
 use skein_bench::{BenchError, Context};
 use skein_runtime::PilotRegistry;
@@ -23,6 +26,8 @@ pub(crate) enum BenchCommand {
     Failover(FailoverArgs),
     /// Benchmark real-time operation: late ticks and late answers
     Clock(ClockArgs),
+    /// Benchmark pilots, built-in and own: fly one mission with each and compare the drone-steps per second
+    Pilots(PilotsArgs),
     /// Benchmark the radio model
     Radio(PartArgs),
     /// Benchmark the exact assignment of drones to routes
@@ -87,6 +92,23 @@ pub(crate) struct ClockArgs {
     pub(crate) json: bool,
 }
 
+/// Arguments of `bench pilots`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  skein bench pilots cruise,paper
+  skein bench pilots paper,talker --scenario scenarios/paper/s2-right.toml --processes")]
+pub(crate) struct PilotsArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: PilotBench,
+    /// Mission to fly, a scenario file; a table [[pilot]] in it that names the pilot gives it its parameters
+    #[arg(long, value_name = "FILE", conflicts_with = "drones")]
+    pub(crate) scenario: Option<PathBuf>,
+    /// Print one JSON array
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Arguments of the benchmarks of parts.
 #[derive(Debug, Args)]
 pub(crate) struct PartArgs {
@@ -99,15 +121,16 @@ pub(crate) struct PartArgs {
 }
 
 /// Runs one benchmark.
-pub(crate) fn bench(command: Option<&BenchCommand>, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+pub(crate) fn bench(command: Option<&BenchCommand>, registry: &PilotRegistry) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
-    let context = Context { pilots, interrupted: &interrupted };
+    let context = Context { pilots: registry, interrupted: &interrupted };
     let exit = match command {
         None => runtime(&RuntimeArgs::default(), &context),
         Some(BenchCommand::Runtime(args)) => runtime(args, &context),
         Some(BenchCommand::Failover(args)) => failover(args, &context),
         Some(BenchCommand::Clock(args)) => clock(args, &context),
+        Some(BenchCommand::Pilots(args)) => own_pilots(args, &context),
         Some(BenchCommand::Radio(args)) => part(Part::Radio, args, &context),
         Some(BenchCommand::Grouping(args)) => part(Part::Grouping, args, &context),
         Some(BenchCommand::Sense(args)) => part(Part::Sense, args, &context),
@@ -157,6 +180,14 @@ fn failover(args: &FailoverArgs, context: &Context<'_>) -> Result<Option<Exit>, 
 fn clock(args: &ClockArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
     let Some(rows) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
     print_rows(args.json, &rows, clock::table)
+}
+
+fn own_pilots(args: &PilotsArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let inline = !args.bench.processes;
+    let read = |path: &PathBuf| input::scenario(&ScenarioArgs::of_file(path), context.pilots, inline);
+    let mission = args.scenario.as_ref().map(read).transpose()?;
+    let Some(rows) = args.bench.run(mission.as_ref(), context).map_err(failure)? else { return Ok(None) };
+    print_rows(args.json, &rows, pilots::table)
 }
 
 fn part(part: Part, args: &PartArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {

@@ -1,7 +1,8 @@
 //! The command line.
 
 use crate::missing::nearest;
-use crate::options::{PinChoice, RuntimeChoice, WaitChoice, key_value, seconds};
+use crate::options::{PinChoice, RuntimeChoice, WaitChoice, seconds};
+use crate::scenario_args::ScenarioArgs;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use skein_runtime::Clock;
@@ -109,27 +110,6 @@ pub(crate) enum SchemaOf {
     Summary,
     /// Scenario files
     Scenario,
-}
-
-/// A scenario and its changes.
-#[derive(Debug, Args)]
-pub(crate) struct ScenarioArgs {
-    /// Scenario file (TOML)
-    pub(crate) scenario: PathBuf,
-    /// How drones choose routes: congestion-aware, congestion-aware-paper, shortest-path or
-    /// fixed:L/R (number of drones to the left and to the right)
-    #[arg(long, value_name = "STRATEGY")]
-    pub(crate) strategy: Option<String>,
-    /// Seed of everything random
-    #[arg(long, value_name = "N")]
-    pub(crate) seed: Option<String>,
-    /// Pilot of the drones that no table of the scenario names: paper, cruise or one of the program's own; the same as
-    /// --set pilot.0.name=NAME
-    #[arg(long, value_name = "NAME")]
-    pub(crate) pilot: Option<String>,
-    /// Override a scenario key, such as radio.delay_s=0.1; repeatable
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
-    pub(crate) overrides: Vec<(String, String)>,
 }
 
 /// Arguments of `check`.

@@ -6,7 +6,7 @@ use crate::missing::missing;
 use crate::options::key_value;
 use crate::output::print as print_text;
 use crate::progress::RunsBar;
-use crate::sweep::jobs;
+use crate::sweep::{in_experiment, jobs};
 use clap::Args;
 use serde_json::json;
 use skein_runtime::PilotRegistry;
@@ -67,7 +67,7 @@ pub(crate) fn hunt(args: &HuntArgs, pilots: &PilotRegistry) -> Result<Exit, Fail
     let runs = args.flights as usize;
     let report = search.interrupted(&interrupted).run(|done, _| bar.show(Progress { done, runs }));
     bar.finish();
-    let report = report.map_err(|error| Failure::usage(format!("{}: {error}", args.source.display())))?;
+    let report = report.map_err(|error| Failure::usage(in_experiment(&args.source, &error.to_string())))?;
     let files = write(args, &experiment.name, &report)?;
     print(args, &report, &files);
     let found = |kind| report.findings.iter().any(|finding| finding.failure.kind == kind);

@@ -1,9 +1,9 @@
 //! Reads the scenario that the command line names.
 
-use crate::cli::ScenarioArgs;
 use crate::exit::Failure;
 use crate::experiment_file::MAX_FILE;
 use crate::missing::missing;
+use crate::scenario_args::ScenarioArgs;
 use skein_runtime::{PilotRegistry, resolve_commands};
 use skein_scenario::{Scenario, ScenarioSource};
 use skein_sweep::FileKind;

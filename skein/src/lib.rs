@@ -65,6 +65,7 @@ mod reproduce;
 mod roles;
 mod run;
 mod run_folder;
+mod scenario_args;
 mod schema;
 mod sweep;
 mod tap;

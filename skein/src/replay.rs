@@ -37,15 +37,18 @@ pub(crate) fn replay(args: &ReplayArgs, pilots: &PilotRegistry) -> Result<Exit, 
     let folder = run_folder::open(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let recorded = folder.read_summary().map_err(Failure::report)?;
+    let path = args.run_dir.join("manifest.json");
     let scenario: Scenario = serde_json::from_value(manifest.scenario).map_err(|error| {
-        let path = args.run_dir.join("manifest.json");
         Failure::usage(format!("{}: expected the scenario of a run by this version of Skein: {error}", path.display()))
     })?;
     let runtime = args.runtime.unwrap_or(match manifest.facts.runtime.as_str() {
         "inline" => RuntimeChoice::Inline,
         _ => RuntimeChoice::Processes,
     });
-    check_pilots(pilots, &scenario, &manifest.pilots, runtime == RuntimeChoice::Inline)?;
+    pilots
+        .check(&scenario, runtime == RuntimeChoice::Inline)
+        .map_err(|problem| Failure::usage(format!("{}: scenario.{problem}", path.display())))?;
+    check_programs(pilots, &scenario, &manifest.pilots)?;
     let interrupt = Interrupt::watch()?;
     let name = if runtime == RuntimeChoice::Inline { "inline" } else { "processes" };
     let mut recorder = Recorder::in_memory(run_facts(&scenario, name, "lockstep").map_err(Failure::usage)?);
@@ -63,14 +66,8 @@ pub(crate) fn replay(args: &ReplayArgs, pilots: &PilotRegistry) -> Result<Exit, 
     Ok(if equal { Exit::Reached } else { Exit::NotReached })
 }
 
-/// Refuses pilots that are not those of the recorded run.
-fn check_pilots(
-    pilots: &PilotRegistry,
-    scenario: &Scenario,
-    recorded: &[PilotEntry],
-    inline: bool,
-) -> Result<(), Failure> {
-    pilots.check(scenario, inline).map_err(Failure::usage)?;
+/// Refuses programs that are not those of the recorded run.
+fn check_programs(pilots: &PilotRegistry, scenario: &Scenario, recorded: &[PilotEntry]) -> Result<(), Failure> {
     for (now, then) in pilots.entries(scenario).map_err(Failure::usage)?.iter().zip(recorded) {
         if now.program != then.program {
             let hash = |entry: &PilotEntry| entry.program.clone().unwrap_or_else(|| "a built-in pilot".to_owned());

@@ -145,7 +145,7 @@ fn failure(error: RuntimeError) -> Failure {
     match error {
         // The process has said on stderr what its pilot refuses.
         RuntimeError::EndedEarly { status, .. } if status.code() == Some(2) => Failure::usage(error),
-        RuntimeError::Pilot(_) => Failure::usage(error),
+        RuntimeError::Pilot(_) | RuntimeError::OtherVersion { .. } => Failure::usage(error),
         error => Failure::environment(error),
     }
 }

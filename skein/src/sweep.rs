@@ -91,6 +91,12 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
     Ok(Exit::Reached)
 }
 
+/// An error of a run, with the experiment's file in front unless it begins with that.
+pub(crate) fn in_experiment(file: &Path, error: &str) -> String {
+    let file = format!("{}:", file.display());
+    if error.starts_with(&file) { error.to_owned() } else { format!("{file} {error}") }
+}
+
 /// Flies the runs of an experiment that are not done yet, and prints the results once all are done.
 pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     check_experiment(&args.experiment)?;
@@ -109,7 +115,7 @@ pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         sweep = sweep.workers(jobs);
     }
     let end = sweep.run_in_folder(&folder).map_err(|error| match error {
-        SweepError::Scenario(error) => Failure::usage(format!("{}: {error}", args.experiment.display())),
+        SweepError::Scenario(error) => Failure::usage(in_experiment(&args.experiment, &error.to_string())),
         error if error.is_usage() => Failure::usage(error),
         error => Failure::environment(error),
     });

@@ -121,7 +121,11 @@ mod tests {
             scenarios: vec![Mission::Random],
             strategies: vec![],
             seeds: vec![1, 2, 3],
-            grid: vec![Axis { key: "radio.loss".to_owned(), values: vec!["0".to_owned(), "0.5".to_owned()] }],
+            grid: vec![Axis {
+                key: "radio.loss".to_owned(),
+                values: vec!["0".to_owned(), "0.5".to_owned()],
+                places: vec![],
+            }],
             processes: false,
             metrics: None,
             bounds: SceneBounds::default(),

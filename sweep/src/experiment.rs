@@ -6,7 +6,7 @@ use crate::random_scene::SceneBounds;
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// The missions of a sweep: every scenario with every strategy, every value of the grid and every seed.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +53,8 @@ pub struct Axis {
     pub key: String,
     /// Values, as TOML.
     pub values: Vec<String>,
+    /// Where each value stands, as `file:line:column`. Empty if it stands in no file.
+    pub places: Vec<String>,
 }
 
 /// The experiment as it stands in the file.
@@ -125,7 +127,7 @@ impl Experiment {
         let text = read.map_err(|source| ExperimentError::Read { path: path.to_owned(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        Self::checked(&text, &stem, folder).map_err(|fault| fault.at(&path.display().to_string(), &text))
+        Self::placed(&text, &path.display().to_string(), &stem, folder)
     }
 
     /// Parses an experiment from text. `name` is its name unless the text gives another one. Paths of scenario files in
@@ -134,7 +136,21 @@ impl Experiment {
     /// # Errors
     /// [`ExperimentError::Invalid`], which names `name`, the line and the column.
     pub fn parse(text: &str, name: &str, folder: &Path) -> Result<Self, ExperimentError> {
-        Self::checked(text, name, folder).map_err(|fault| fault.at(name, text))
+        Self::placed(text, name, name, folder)
+    }
+
+    /// `file`: what messages call the text.
+    fn placed(text: &str, file: &str, stem: &str, folder: &Path) -> Result<Self, ExperimentError> {
+        let mut experiment = Self::checked(text, stem, folder).map_err(|fault| fault.at(file, text))?;
+        let table = DeTable::parse(text).map_err(|error| Fault::toml(error).at(file, text))?;
+        if let Some(DeValue::Table(grid)) = table.get_ref().get("grid").map(|grid| grid.get_ref()) {
+            for axis in &mut experiment.grid {
+                let place =
+                    |number| format!("{file}{}", colons(line_column(text, place_in(grid, "", &axis.key, number))));
+                axis.places = (0..axis.values.len()).map(place).collect();
+            }
+        }
+        Ok(experiment)
     }
 
     fn checked(text: &str, stem: &str, folder: &Path) -> Result<Self, Fault> {
@@ -173,13 +189,33 @@ impl Fault {
     }
 
     fn at(self, name: &str, text: &str) -> ExperimentError {
-        let place = self.span.map(|span| {
-            let before = text.get(..span.start).unwrap_or(text);
-            let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
-            (before.matches('\n').count() + 1, column)
-        });
+        let place = line_column(text, self.span);
         ExperimentError::Invalid { name: name.to_owned(), place, problem: self.problem }
     }
+}
+
+/// Line and column, from 1, of the beginning of a span.
+fn line_column(text: &str, span: Option<Range<usize>>) -> Option<(usize, usize)> {
+    let before = text.get(..span?.start).unwrap_or(text);
+    let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
+    Some((before.matches('\n').count() + 1, column))
+}
+
+fn colons(place: Option<(usize, usize)>) -> String {
+    place.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default()
+}
+
+/// Where value `number` of the key with this path stands. `above`: the path of `table` itself.
+fn place_in(table: &DeTable<'_>, above: &str, key: &str, number: usize) -> Option<Range<usize>> {
+    table.iter().find_map(|(name, value)| {
+        let path = format!("{above}{}", name.get_ref());
+        match value.get_ref() {
+            DeValue::Array(values) if path == key => values.get(number).map(|value| value.span()),
+            _ if path == key => Some(value.span()),
+            DeValue::Table(inner) => place_in(inner, &format!("{path}."), key, number),
+            _ => None,
+        }
+    })
 }
 
 fn known_keys(table: &DeTable<'_>) -> Result<(), Fault> {
@@ -308,7 +344,7 @@ fn collect(table: &toml::Table, path: &str, axes: &mut Vec<Axis>) -> Result<(), 
         let key = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         match value {
             toml::Value::Table(range) if range.contains_key("steps") || range.contains_key("from") => {
-                axes.push(Axis { values: steps(&key, range)?, key });
+                axes.push(Axis { values: steps(&key, range)?, key, places: Vec::new() });
             }
             toml::Value::Table(inner) => collect(inner, &key, axes)?,
             toml::Value::Array(values) if values.is_empty() => {
@@ -317,9 +353,9 @@ fn collect(table: &toml::Table, path: &str, axes: &mut Vec<Axis>) -> Result<(), 
             toml::Value::Array(values) => {
                 let values: Vec<String> = values.iter().map(ToString::to_string).collect();
                 unique(&format!("grid: {key}"), &values)?;
-                axes.push(Axis { key, values });
+                axes.push(Axis { key, values, places: Vec::new() });
             }
-            one => axes.push(Axis { key, values: vec![one.to_string()] }),
+            one => axes.push(Axis { key, values: vec![one.to_string()], places: Vec::new() }),
         }
     }
     Ok(())

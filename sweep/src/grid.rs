@@ -4,7 +4,7 @@ use crate::error::JobError;
 use crate::experiment::{Experiment, Mission};
 use crate::random_scene::{SceneBounds, random_scene};
 use crate::wide_scene::wide_scene;
-use skein_runtime::{PilotRegistry, resolve_commands};
+use skein_runtime::{PilotProblem, PilotRegistry, resolve_commands};
 use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
 use std::path::Path;
 
@@ -98,17 +98,36 @@ impl<'a> Grid<'a> {
     /// [`JobError`] if the scenario is not valid.
     pub fn scenario(&self, number: usize) -> Result<Scenario, JobError> {
         let (combination, seed) = self.job(number);
-        let mut overrides = self.changes(combination);
-        overrides.push(("seed".to_owned(), seed.to_string()));
+        let overrides = self.overrides_of(number);
         match &self.experiment.scenarios[combination.scenario] {
             Mission::Random => Ok(random_scene(seed, self.experiment.bounds, &overrides)?),
             Mission::Wide => Ok(wide_scene(seed, &overrides)?),
             Mission::File { path, text } => {
-                let mut scenario = parse(path, text, &overrides)?;
+                let parsed = named(path, |source| Scenario::parse(text, source, &overrides));
+                let mut scenario = parsed.map_err(|errors| self.placed(combination, errors))?;
                 resolve_commands(&mut scenario, path.parent().unwrap_or(Path::new("")));
                 Ok(scenario)
             }
         }
+    }
+
+    /// Everything that a run changes of its scenario.
+    fn overrides_of(&self, number: usize) -> Vec<(String, String)> {
+        let (combination, seed) = self.job(number);
+        let mut overrides = self.changes(combination);
+        overrides.push(("seed".to_owned(), seed.to_string()));
+        overrides
+    }
+
+    /// Gives an error in a value of the grid its place in the experiment file.
+    fn placed(&self, combination: &Combination, errors: ScenarioErrors) -> ScenarioErrors {
+        errors.with_places(|place| {
+            let axes = self.experiment.grid.iter().zip(&combination.values);
+            let (axis, value) =
+                axes.into_iter().find(|(axis, value)| place == format!("--set {}={value}", axis.key))?;
+            let number = axis.values.iter().position(|known| known == value)?;
+            axis.places.get(number).cloned()
+        })
     }
 
     /// Checks each combination, and that these pilots can fly it, with its first seed. `inline`: in this process. Another seed can only change the start's jitter; if that makes the
@@ -119,9 +138,22 @@ impl<'a> Grid<'a> {
     pub fn check(&self, pilots: &PilotRegistry, inline: bool) -> Result<(), JobError> {
         let seeds = self.experiment.seeds.len();
         for number in 0..self.combinations.len() {
-            pilots.check(&self.scenario(number * seeds)?, inline)?;
+            let number = number * seeds;
+            pilots.check(&self.scenario(number)?, inline).map_err(|problem| self.blamed(number, problem))?;
         }
         Ok(())
+    }
+
+    /// Gives a problem of the pilots its place in the scenario or in the experiment.
+    fn blamed(&self, number: usize, problem: PilotProblem) -> JobError {
+        let (combination, _) = self.job(number);
+        let Mission::File { path, text } = &self.experiment.scenarios[combination.scenario] else {
+            return problem.into();
+        };
+        let overrides = self.overrides_of(number);
+        let blame =
+            |source: ScenarioSource<'_>| Scenario::blame(text, source, &overrides, problem.keys(), problem.message());
+        self.placed(combination, named(path, blame)).into()
     }
 
     /// What a combination changes of its scenario, besides the seed.
@@ -178,9 +210,10 @@ fn flags(bounds: SceneBounds) -> String {
     flag("drones", bounds.drones, default.drones) + &flag("obstacles", bounds.obstacles, default.obstacles)
 }
 
-fn parse(path: &Path, text: &str, overrides: &[(String, String)]) -> Result<Scenario, ScenarioErrors> {
+/// Calls `read` with the names of a scenario file.
+fn named<R>(path: &Path, read: impl FnOnce(ScenarioSource<'_>) -> R) -> R {
     let (name, stem) = (path.display().to_string(), stem(path));
-    Scenario::parse(text, ScenarioSource { name: &name, stem: &stem }, overrides)
+    read(ScenarioSource { name: &name, stem: &stem })
 }
 
 fn stem(path: &Path) -> String {
@@ -214,6 +247,7 @@ mod tests {
         let axis = |key: &str, values: &[&str]| Axis {
             key: key.to_owned(),
             values: values.iter().map(|&value| value.to_owned()).collect(),
+            places: Vec::new(),
         };
         let text = "[formation]\ndrones = 3\nspacing_m = 60\n".to_owned();
         Experiment {

@@ -211,6 +211,7 @@ mod tests {
         let axis = |&(key, values): &(&str, &[&str])| Axis {
             key: key.to_owned(),
             values: values.iter().map(|&value| value.to_owned()).collect(),
+            places: Vec::new(),
         };
         Experiment {
             name: "e".to_owned(),

@@ -7,7 +7,7 @@ pub(crate) fn app() -> App {
     App::new()
         .try_pilot("drift", |birth| Ok(Box::new(Drift::new(birth)?)))
         .pilot("loud", |_| Box::new(Loud))
-        .try_pilot("clumsy", |birth| Ok(Box::new(Clumsy { how: birth.params.get_str("how", "")?.to_owned() })))
+        .try_pilot("clumsy", |birth| Ok(Box::new(Clumsy::new(birth)?)))
 }
 
 /// Flies towards the middle of its neighbours.
@@ -52,6 +52,24 @@ impl Pilot for Loud {
 /// Makes a mistake after half a second.
 struct Clumsy {
     how: String,
+    forked: bool,
+}
+
+impl Clumsy {
+    fn new(birth: &Birth) -> Result<Self, PilotError> {
+        let how = birth.params.get_str("how", "")?.to_owned();
+        if how == "fork at birth" {
+            fork();
+        }
+        Ok(Self { how, forked: false })
+    }
+}
+
+/// Forks this process and does not care which of both it is.
+#[allow(unsafe_code, reason = "the system's call is unsafe")]
+fn fork() {
+    // SAFETY: what the forked process does until it is ended is what the test is about.
+    assert!(unsafe { libc::fork() } >= 0);
 }
 
 impl Pilot for Clumsy {
@@ -65,6 +83,7 @@ impl Pilot for Clumsy {
             "flood" => (0..65).for_each(|_| out.say("gossip", b"hello")),
             "oversize" => out.say("gossip", [0; 273]),
             "say" => out.fail("it gives up"),
+            "fork" if !std::mem::replace(&mut self.forked, true) => fork(),
             "exit" => std::process::exit(7),
             "abort" => std::process::abort(),
             "hang" => loop {

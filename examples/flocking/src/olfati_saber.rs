@@ -1,7 +1,7 @@
 //! The flocking law of Olfati-Saber: "Flocking for multi-agent dynamic systems: algorithms and theory", IEEE Transactions on
 //! Automatic Control 51 (2006), pages 401 to 420. The forms and the parameters are those of SwarmLab.
 
-use crate::surroundings::{Vec3, neighbours};
+use crate::surroundings::{Company, Vec3};
 use serde::Deserialize;
 use skein::{Command, Inbox, Out, Pilot, Senses};
 use std::f64::consts::PI;
@@ -14,6 +14,8 @@ pub(crate) struct Gains {
     migration_mps: [f64; 3],
     /// d: distance between neighbours at which they neither attract nor repel, m.
     distance_m: f64,
+    /// Whether drones say where they are and hear each other by radio, instead of ranging each other.
+    by_radio: bool,
     /// r: drones farther away are no neighbours, m.
     range_m: f64,
     /// Greatest number of neighbours; the nearest count.
@@ -37,6 +39,7 @@ impl Default for Gains {
         Self {
             migration_mps: [6.0, 0.0, 0.0],
             distance_m: 25.0,
+            by_radio: false,
             range_m: 150.0,
             neighbours_max: 10,
             velocity_per_s: 3.0,
@@ -104,24 +107,25 @@ impl Gains {
     }
 }
 
-/// A drone that flies by this law. It needs no messages: it ranges its neighbours.
+/// A drone that flies by this law.
 pub(crate) struct OlfatiSaber {
     gains: Gains,
+    company: Company,
 }
 
 impl OlfatiSaber {
     /// A drone with these parameters.
     pub(crate) fn new(gains: Gains) -> Self {
-        Self { gains }
+        Self { company: Company::new(gains.by_radio), gains }
     }
 }
 
 impl Pilot for OlfatiSaber {
-    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
         let g = &self.gains;
         let (position, velocity) = (Vec3::from(senses.position_m), Vec3::from(senses.velocity_mps));
         let mut acceleration = (Vec3::from(g.migration_mps) - velocity) * g.velocity_per_s;
-        for neighbour in neighbours(senses, g.range_m, g.neighbours_max) {
+        for neighbour in self.company.neighbours((senses, inbox, out), g.range_m, g.neighbours_max) {
             acceleration += neighbour.direction * g.pull(neighbour.distance_m);
         }
         for obstacle in senses.obstacles.iter().filter(|o| o.distance_m < g.obstacle_range_m) {

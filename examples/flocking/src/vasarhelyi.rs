@@ -1,7 +1,7 @@
 //! The flocking law of Vásárhelyi and others: "Optimized flocking of autonomous drones in confined environments", Science
 //! Robotics 3 (2018), eaat3536. As SwarmLab does, it adds an attraction beyond the range of the repulsion, and a migration.
 
-use crate::surroundings::{Neighbour, Vec3, limited, neighbours};
+use crate::surroundings::{Company, Neighbour, Vec3, limited};
 use serde::Deserialize;
 use skein::{Command, Inbox, Out, Pilot, Senses};
 
@@ -13,6 +13,8 @@ pub(crate) struct Gains {
     migration_mps: [f64; 3],
     /// Greatest speed, m/s.
     speed_max_mps: f64,
+    /// Whether drones say where they are and hear each other by radio, instead of ranging each other.
+    by_radio: bool,
     /// Drones farther away are no neighbours, m.
     range_m: f64,
     /// Greatest number of neighbours; the nearest count.
@@ -46,6 +48,7 @@ impl Default for Gains {
         Self {
             migration_mps: [6.0, 0.0, 0.0],
             speed_max_mps: 7.0,
+            by_radio: false,
             range_m: 150.0,
             neighbours_max: 10,
             repulsion_range_m: 25.0,
@@ -63,15 +66,16 @@ impl Default for Gains {
     }
 }
 
-/// A drone that flies by this law. It needs no messages: it ranges its neighbours.
+/// A drone that flies by this law.
 pub(crate) struct Vasarhelyi {
     gains: Gains,
+    company: Company,
 }
 
 impl Vasarhelyi {
     /// A drone with these parameters.
     pub(crate) fn new(gains: Gains) -> Self {
-        Self { gains }
+        Self { company: Company::new(gains.by_radio), gains }
     }
 
     /// Repulsion from near neighbours and attraction to far ones, m/s.
@@ -94,10 +98,10 @@ impl Vasarhelyi {
 }
 
 impl Pilot for Vasarhelyi {
-    fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, _: &mut Out) -> Command {
+    fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
         let (position, velocity) = (Vec3::from(senses.position_m), Vec3::from(senses.velocity_mps));
         let mut wanted = Vec3::from(self.gains.migration_mps);
-        for neighbour in neighbours(senses, self.gains.range_m, self.gains.neighbours_max) {
+        for neighbour in self.company.neighbours((senses, inbox, out), self.gains.range_m, self.gains.neighbours_max) {
             wanted += self.spacing(&neighbour) + self.friction(&neighbour);
         }
         for obstacle in senses.obstacles {
