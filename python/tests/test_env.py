@@ -103,7 +103,7 @@ def test_messages_take_as_long_as_the_radio_says_and_can_be_lost():
 
 
 def test_the_actions_of_a_slow_drone_take_effect_later():
-    fault = {"fault": [{"kind": "slow", "drone": 1, "at_s": 0.0, "for_s": 1.0, "extra_s": 0.1}]}
+    fault = {"fault": [{"kind": "slow", "drone": 1, "at_s": 0.0, "for_s": 1.0, "reaction_time_s": 0.1}]}
     swarm = skein.Swarm(SCENE, set=fault)
     before = swarm.velocity_mps.copy()
     late = round(0.1 / swarm.dt_s)
