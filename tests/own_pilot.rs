@@ -216,6 +216,8 @@ fn sweep_and_replay_know_the_pilots(bench: &Bench) {
     let scenario = bench.scenario("[[pilot]]\nname = \"drift\"\n");
     let run = bench.fly(&scenario, &[]);
     assert_eq!(run["metrics_own"]["gain"]["max"], 0.1);
+    let manifest: Value = serde_json::from_slice(&std::fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["facts"]["topics"][0]["topic"], "drift", "the recording has its schema");
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("<figure id=\"metrics\">") && bench.path("run/plots/metrics.svg").exists());
     let replayed = |runtime: &str| bench.output(&["replay", "run", "--runtime", runtime]);

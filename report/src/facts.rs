@@ -2,6 +2,7 @@
 
 use crate::pilot_entry::PilotEntry;
 use crate::scene_facts::SceneFacts;
+use crate::topic_schema::TopicSchema;
 use serde::{Deserialize, Serialize};
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -48,6 +49,9 @@ pub struct RunFacts {
     /// The pilots, and the drones that they fly.
     #[serde(default)]
     pub pilots: Vec<PilotEntry>,
+    /// The schemas of topics that pilots define.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<TopicSchema>,
     /// What the recording and the page draw beside the drones.
     #[serde(default)]
     pub scene: SceneFacts,

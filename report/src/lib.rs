@@ -42,6 +42,7 @@
 //!     radio_range_m: None,
 //!     pilots: Vec::new(),
 //!     obstacles: Vec::new(),
+//!     topics: vec![],
 //!     scene: Default::default(),
 //! };
 //! let mut recorder = Recorder::in_memory(facts);
@@ -96,6 +97,7 @@ pub mod table;
 #[cfg(test)]
 mod testing;
 pub mod text;
+mod topic_schema;
 mod trace;
 mod tuning;
 mod vicinity;
@@ -112,4 +114,5 @@ pub use pilot_entry::PilotEntry;
 pub use recorder::Recorder;
 pub use reserved_summary::ReservedSummary;
 pub use summary::*;
+pub use topic_schema::TopicSchema;
 pub use work_folder::WorkFolder;

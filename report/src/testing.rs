@@ -25,6 +25,7 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
         radio_range_m: None,
         pilots: Vec::new(),
         obstacles: Vec::new(),
+        topics: vec![],
         scene: Default::default(),
     }
 }

@@ -38,6 +38,7 @@ fn facts() -> RunFacts {
         radio_range_m: None,
         pilots: Vec::new(),
         obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
+        topics: vec![],
         scene: Default::default(),
     }
 }

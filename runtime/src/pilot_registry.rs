@@ -15,7 +15,7 @@ use skein_agent::SwarmPilot;
 use skein_bus::ForkGuard;
 use skein_pilot::{Birth, Params, Pilot, PilotError};
 use skein_protocol::{DroneId, SimTime};
-use skein_report::PilotEntry;
+use skein_report::{PilotEntry, TopicSchema};
 use skein_scenario::{DEFAULT_PILOT, PilotKeys, Scenario};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -26,6 +26,7 @@ type Make = dyn Fn(&Scenario, &Birth) -> Result<Box<dyn Pilot>, PilotError> + Se
 /// The pilots that a program knows by name, and the program itself, from which processes are started.
 pub struct PilotRegistry {
     pilots: BTreeMap<String, Registered>,
+    topics: Vec<TopicSchema>,
     program: Program,
 }
 
@@ -44,7 +45,7 @@ impl PilotRegistry {
     /// The built-in pilots: `paper` and `cruise`, and those with which the runtime is measured: `beacon` and `talker`.
     #[must_use]
     pub fn new(program: Program) -> Self {
-        let mut registry = Self { pilots: BTreeMap::new(), program };
+        let mut registry = Self { pilots: BTreeMap::new(), topics: Vec::new(), program };
         registry.insert(DEFAULT_PILOT, false, |scenario, birth| {
             without_params(birth)?;
             Ok(Box::new(swarm_pilot(scenario, birth)))
@@ -85,6 +86,17 @@ impl PilotRegistry {
         make: impl Fn(&Scenario, &Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync + 'static,
     ) {
         self.pilots.insert(name.to_owned(), Registered { make: Box::new(make), own });
+    }
+
+    /// Says what the pilots' messages on a topic look like. It goes into the recordings of runs.
+    pub fn describe_topic(&mut self, topic: TopicSchema) {
+        self.topics.push(topic);
+    }
+
+    /// The schemas of the pilots' topics.
+    #[must_use]
+    pub fn topics(&self) -> &[TopicSchema] {
+        &self.topics
     }
 
     /// The program from which processes are started.

@@ -65,6 +65,7 @@ pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunF
         radio_range_m: scenario.radio.range_m,
         obstacles: scenario.shapes()?,
         pilots: pilot_groups(scenario).into_iter().map(|(_, entry)| entry).collect(),
+        topics: Vec::new(),
         scene: scene(scenario)?,
     })
 }

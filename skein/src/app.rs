@@ -9,6 +9,8 @@ use crate::{
 };
 use clap::Parser;
 use skein_pilot::{Birth, Pilot, PilotError};
+use skein_protocol::TopicName;
+use skein_report::TopicSchema;
 use skein_runtime::{PilotRegistry, Program};
 use std::ffi::OsString;
 use std::path::Path;
@@ -23,6 +25,7 @@ use std::process::ExitCode;
 #[derive(Default)]
 pub struct App {
     pilots: Vec<(String, Box<Make>)>,
+    topics: Vec<(String, String)>,
     program: Option<Vec<OsString>>,
     on_folder: Option<Box<OnFolder>>,
 }
@@ -50,6 +53,15 @@ impl App {
         make: impl Fn(&Birth) -> Result<Box<dyn Pilot>, PilotError> + Send + Sync + 'static,
     ) -> Self {
         self.pilots.push((name.to_owned(), Box::new(make)));
+        self
+    }
+
+    /// Says that pilots say JSON objects under this topic, and gives their JSON schema as text. `run.mcap` then has a channel
+    /// `/pilots/TOPIC/DRONE` for each drone, with the schema, which Foxglove can plot. If the topic is no name of a topic, or the
+    /// text is no JSON, every command ends with exit code 2.
+    #[must_use]
+    pub fn json_topic(mut self, topic: &str, schema: &str) -> Self {
+        self.topics.push((topic.to_owned(), schema.to_owned()));
         self
     }
 
@@ -111,6 +123,12 @@ impl App {
         let mut registry = PilotRegistry::new(program);
         for (name, make) in self.pilots {
             registry.register(&name, make);
+        }
+        for (topic, text) in self.topics {
+            TopicName::new(&topic).map_err(Failure::usage)?;
+            let wrong = |error| Failure::usage(format!("topic {topic}: the schema is no JSON: {error}"));
+            let schema = serde_json::from_str(&text).map_err(wrong)?;
+            registry.describe_topic(TopicSchema { topic, schema });
         }
         Ok(registry)
     }

@@ -44,6 +44,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     };
     let mut facts = run_facts(&scenario, runtime, &args.clock.to_string()).map_err(Failure::usage)?;
     facts.pilots = pilots.entries(&scenario).map_err(Failure::usage)?;
+    facts.topics = pilots.topics().to_vec();
     data_files(args).check(&facts).map_err(Failure::report)?;
     if !args.quiet {
         for warning in advice::warnings(&scenario).map_err(Failure::usage)? {

@@ -5,6 +5,7 @@ use skein::{App, Birth, Command, Inbox, Out, Pilot, PilotError, Senses};
 /// The application.
 pub(crate) fn app() -> App {
     App::new()
+        .json_topic("drift", r#"{"type": "object", "properties": {"gain": {"type": "number"}}}"#)
         .try_pilot("drift", |birth| Ok(Box::new(Drift::new(birth)?)))
         .pilot("loud", |_| Box::new(Loud))
         .try_pilot("clumsy", |birth| Ok(Box::new(Clumsy::new(birth)?)))
@@ -28,6 +29,7 @@ impl Drift {
 impl Pilot for Drift {
     fn step(&mut self, senses: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) -> Command {
         out.metric("gain", self.gain_per_s);
+        out.say("drift", format!("{{\"gain\": {}}}", self.gain_per_s));
         out.mark("here", senses.position_m);
         out.line("home", senses.position_m, [0.0; 3]);
         let share = self.gain_per_s / senses.neighbours.len().max(1) as f64;

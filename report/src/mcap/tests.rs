@@ -10,6 +10,7 @@ use crate::folder::RunFolder;
 use crate::interruption::Interrupted;
 use crate::scene::{Sample, State};
 use crate::testing::{facts, row};
+use crate::topic_schema::TopicSchema;
 use skein_protocol::DroneId;
 use skein_protocol::SimTime;
 use skein_protocol::frame::AirFrame;
@@ -128,6 +129,43 @@ fn what_pilots_say_is_recorded_as_bytes_and_their_figures_by_drone() {
     assert_eq!(found["/pilots/gossip"], b"\0\0\0\0hello");
     let metrics: serde_json::Value = serde_json::from_slice(&found["/skein/metrics"]).unwrap();
     assert_eq!(metrics, serde_json::json!({"t_s": 0.02, "metrics": {"order": {"0": 0.5}}}));
+}
+
+#[test]
+fn messages_of_a_topic_with_a_schema_have_a_channel_for_each_drone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(RECORDING);
+    let file = std::fs::File::create(&path).unwrap();
+    let topics = vec![TopicSchema { topic: "state".to_owned(), schema: serde_json::json!({"type": "object"}) }];
+    let facts = RunFacts { topics, ..facts(2) };
+    let mut writer = McapWriter::new(file, path.clone(), &facts, &serde_json::Value::Null).unwrap();
+    let said = |source, bytes: &[u8]| AirFrame {
+        tick: 0,
+        source: DroneId(source),
+        sequence: 3,
+        position_m: [0.0; 3],
+        queue_ns: 0,
+        link_faults: Default::default(),
+        frame: Message::User(UserMessage::new(TopicName::new("state").unwrap(), bytes).unwrap()).encode(),
+    };
+    let frames = [said(0, b"{\"mode\": 1}"), said(1, b"{\"mode\": 2}"), said(1, b"no object")];
+    let (head, rows) = (RecordHeader { now: SimTime(20_000_000), ..RecordHeader::default() }, [row(0.0, 0.0); 2]);
+    let record = RecordView { head: &head, rows: &rows, frames: &frames, telemetry: &[], events: &[] };
+    writer.take(record, &[]).unwrap();
+    writer.finish().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let messages = ::mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let of_pilots: BTreeMap<String, (Option<String>, Vec<u8>)> = messages
+        .filter(|message| message.channel.topic.starts_with("/pilots/"))
+        .map(|message| {
+            let schema = message.channel.schema.as_ref().map(|schema| schema.name.clone());
+            (message.channel.topic.clone(), (schema, message.data.to_vec()))
+        })
+        .collect();
+    let schema = Some("pilots.state".to_owned());
+    assert_eq!(of_pilots["/pilots/state/0"], (schema.clone(), b"{\"mode\": 1}".to_vec()));
+    assert_eq!(of_pilots["/pilots/state/1"], (schema, b"{\"mode\": 2}".to_vec()));
+    assert_eq!(of_pilots["/pilots/state"], (None, b"\x01\0\0\0no object".to_vec()));
 }
 
 #[test]

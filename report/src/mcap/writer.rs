@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use skein_protocol::record::{EventKind, RecordView, RunEvent};
-use skein_protocol::{OWN_TOPIC, SimTime, TopicName, UserMessage};
+use skein_protocol::{DroneId, OWN_TOPIC, SimTime, TopicName, UserMessage};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -68,6 +68,8 @@ pub(crate) struct McapWriter<W: Write + Seek> {
     sequences: Vec<u32>,
     /// The channel of each topic that pilots define.
     own: BTreeMap<TopicName, u16>,
+    /// The channel of each drone on each of these topics that has a schema.
+    typed: BTreeMap<(TopicName, DroneId), u16>,
     facts: RunFacts,
     observer: Observer,
     /// Ticks from one sample to the next.
@@ -117,6 +119,7 @@ impl<W: Write + Seek> McapWriter<W> {
             samples: 0,
             drones: Drones::default(),
             own: BTreeMap::new(),
+            typed: BTreeMap::new(),
             json: Vec::new(),
             observer: Observer::new(facts.clone()),
             facts: facts.clone(),
@@ -202,12 +205,15 @@ impl<W: Write + Seek> McapWriter<W> {
     fn of_pilots(&mut self, record: RecordView<'_>) -> McapResult<()> {
         for frame in record.frames.iter().filter(|frame| frame.frame.kind & OWN_TOPIC != 0) {
             let Ok(message) = UserMessage::read(&frame.frame) else { continue };
-            let channel_id = self.own_channel(*message.topic())?;
+            let typed = self.typed_channel(message, frame.source)?;
+            let channel_id = typed.map_or_else(|| self.own_channel(*message.topic()), Ok)?;
             let sequence = frame.sequence;
             let time = record.head.now.0.max(0).unsigned_abs();
             let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
             self.json.clear();
-            self.json.extend_from_slice(&frame.source.0.to_le_bytes());
+            if typed.is_none() {
+                self.json.extend_from_slice(&frame.source.0.to_le_bytes());
+            }
             self.json.extend_from_slice(message.bytes());
             self.out.write_to_known_channel(&header, &self.json)?;
         }
@@ -217,6 +223,25 @@ impl<W: Write + Seek> McapWriter<W> {
             sample.metrics.entry(name.as_str().to_owned()).or_default().insert(row.drone.0.to_string(), value);
         }
         if sample.metrics.is_empty() { Ok(()) } else { self.put(Topic::Metrics, record.head.now, &sample) }
+    }
+
+    /// The channel of a drone's messages on a topic that has a schema; `None` if there is no schema, or the message is no JSON
+    /// object.
+    fn typed_channel(&mut self, message: &UserMessage, source: DroneId) -> McapResult<Option<u16>> {
+        let topic = *message.topic();
+        let Some(known) = self.facts.topics.iter().find(|known| known.topic == topic.as_str()) else { return Ok(None) };
+        if serde_json::from_slice::<serde_json::Map<String, serde_json::Value>>(message.bytes()).is_err() {
+            return Ok(None);
+        }
+        if let Some(&channel) = self.typed.get(&(topic, source)) {
+            return Ok(Some(channel));
+        }
+        let schema =
+            self.out.add_schema(&format!("pilots.{topic}"), "jsonschema", known.schema.to_string().as_bytes())?;
+        let channel =
+            self.out.add_channel(schema, &format!("/pilots/{topic}/{}", source.0), "json", &BTreeMap::new())?;
+        self.typed.insert((topic, source), channel);
+        Ok(Some(channel))
     }
 
     /// The channel of a topic that pilots define. The messages on it have no schema.
