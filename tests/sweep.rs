@@ -95,6 +95,67 @@ fn a_resumed_sweep_gives_the_same_files_as_an_undisturbed_one() {
 }
 
 #[test]
+fn merged_shards_give_the_same_files_as_one_machine() {
+    let place = Place::new();
+    let file = experiment(&place, "e.toml", "seeds = 4");
+    let whole = place.run(&["sweep", &file, "--out", "whole"]);
+    assert_eq!(whole.code, Some(0), "{whole:?}");
+    let shard =
+        |part: &'static str, out: &'static str| ["sweep", "e.toml", "--shard", part, "--out", out, "--jobs", "1"];
+    let merge = |folders: &[&str]| place.run(&[&["sweep", "merge"], folders, &["--out", "merged"]].concat());
+
+    let mut flight = place.start(&shard("1/3", "a"));
+    eventually("a run is done", || rows(&place.join("a")) >= 1);
+    signal("KILL", flight.pid());
+    flight.end();
+    for (part, out, runs) in [("2/3", "b", 5), ("3/3", "c", 5)] {
+        let done = place.run(&shard(part, out));
+        assert_eq!((done.code, rows(&place.join(out))), (Some(0), runs), "{done:?}");
+        assert!(done.stdout.contains("skein sweep merge") && !place.join(out).join("runs.csv").exists(), "{done:?}");
+    }
+    let early = merge(&["a", "b", "c"]);
+    assert!(early.code == Some(2) && early.stderr.contains("of 16 runs are missing"), "{early:?}");
+    let resumed = place.run(&shard("1/3", "a"));
+    assert_eq!((resumed.code, rows(&place.join("a"))), (Some(0), 6), "{resumed:?}");
+
+    // The experiment is not needed any more.
+    fs::remove_file(place.join("e.toml")).unwrap();
+    let merged = merge(&["c", "a", "b"]);
+    assert_eq!(merged.code, Some(0), "{merged:?}");
+    for file in ["runs.csv", "summary.json", "ratios.csv"] {
+        assert_eq!(read(&place, &format!("whole/{file}")), read(&place, &format!("merged/{file}")), "{file}");
+    }
+    assert_eq!(names(place.join("merged/plots")), names(place.join("whole/plots")));
+}
+
+#[test]
+fn shards_that_do_not_belong_together_are_refused() {
+    let place = Place::new();
+    for (name, seeds) in [("e.toml", 1), ("other.toml", 2)] {
+        fs::write(place.join(name), format!("name = \"e\"\nscenario = {:?}\nseeds = {seeds}\n", paper("s2-right")))
+            .unwrap();
+    }
+    let fly = |args: &[&str]| place.run(&[&["sweep"], args, &["--quiet"]].concat());
+    for (file, part, out) in [("e.toml", "1/2", "a"), ("e.toml", "1/2", "again"), ("other.toml", "2/2", "other")] {
+        let done = fly(&[file, "--shard", part, "--out", out]);
+        assert_eq!(done.code, Some(0), "{done:?}");
+    }
+    fs::create_dir(place.join("empty")).unwrap();
+    let refused: [(&[&str], &str); 6] = [
+        (&["merge", "a", "again"], "run 0 is in a and in again"),
+        (&["merge", "a", "other"], "hold shards of different sweeps"),
+        (&["merge", "a", "empty"], "empty: is not the folder of a shard"),
+        (&["e.toml", "--shard", "2/2", "--out", "a"], "a: holds shard 1/2; expected shard 2/2"),
+        (&["e.toml", "--out", "a"], "a: holds shard 1/2; expected all runs"),
+        (&["e.toml", "--shard", "3/2"], "expected I/N, such as 2/7"),
+    ];
+    for (args, words) in refused {
+        let done = fly(args);
+        assert!(done.code == Some(2) && done.stderr.contains(words), "{args:?}: {done:?}");
+    }
+}
+
+#[test]
 fn rows_are_tidy_and_their_commands_repeat_them_by_processes() {
     let place = Place::new();
     let text = "scenario = [SCENARIO, \"random\"]\nseeds = [3, 8]\n[random]\ndrones = [5, 6]\nobstacles = [1, 1]\n\

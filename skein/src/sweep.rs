@@ -7,33 +7,76 @@ use crate::interrupt::Interrupt;
 use crate::options::{ArgumentError, key_value};
 use crate::output;
 use crate::progress::RunsBar;
-use clap::Args;
+use clap::{Args, Subcommand};
+use serde_json::json;
 use skein_report::table::check_parquet;
 use skein_runtime::PilotRegistry;
-use skein_sweep::{Experiment, Grid, SceneBounds, Sweep, SweepEnd, SweepError, scene_toml, wide_scene_toml};
+use skein_sweep::{
+    Experiment, Grid, SceneBounds, Shard, Shards, Sweep, SweepEnd, SweepError, SweepReport, scene_toml, wide_scene_toml,
+};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
-#[command(after_help = "If a sweep is interrupted or killed, the same command resumes it: no finished run is lost or \
-flown twice.
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "If a sweep is interrupted or killed, the same command resumes it: no finished run is lost or \
+flown twice. With --shard, several machines or jobs of a scheduler share the runs; each has a folder of its own.
 
 Examples:
   skein sweep experiments/delay-loss.toml
   skein sweep experiments/random-scenes.toml --jobs 2 --out /tmp/scenes --json
-  skein sweep experiments/reaction.toml --set sensors.ranging=false")]
+  skein sweep experiments/reaction.toml --set sensors.ranging=false
+  skein sweep experiments/faults.toml --shard 2/7 --out /shared/faults/2
+  skein sweep merge /shared/faults/* --out sweeps/faults"
+)]
 pub(crate) struct SweepArgs {
+    #[command(subcommand)]
+    pub(crate) action: Option<SweepAction>,
     /// Experiment file (TOML)
-    pub(crate) experiment: PathBuf,
-    /// Folder of the sweep; a sweep of the same experiment is resumed, any other folder is refused [default: sweeps/<name>]
+    #[arg(required = true)]
+    pub(crate) experiment: Option<PathBuf>,
+    /// Folder of the sweep; a sweep of the same experiment is resumed, any other folder is refused [default: sweeps/<name>,
+    /// or sweeps/<name>-I-of-N for a shard]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Runs to fly side by side [default: number of cores]
     #[arg(long, value_name = "N", value_parser = jobs)]
     pub(crate) jobs: Option<usize>,
+    /// Fly one of N parts of the runs, such as 2/7; `skein sweep merge` puts the parts together
+    #[arg(long, value_name = "I/N", conflicts_with = "parquet")]
+    pub(crate) shard: Option<Shard>,
     /// Override a scenario key in every run, such as radio.range_m=200; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
+    /// Write the table of runs as Parquet as well: runs.parquet
+    #[arg(long)]
+    pub(crate) parquet: bool,
+    /// Print summary.json as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// What can be done with sweeps besides flying them.
+#[derive(Debug, Subcommand)]
+pub(crate) enum SweepAction {
+    /// Merge the shards of a sweep: the result is what one machine would have written
+    Merge(MergeArgs),
+}
+
+/// Arguments of `sweep merge`.
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// Folders of all shards
+    #[arg(required = true)]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Folder of the whole sweep [default: sweeps/<name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
     /// Write the table of runs as Parquet as well: runs.parquet
     #[arg(long)]
     pub(crate) parquet: bool,
@@ -97,25 +140,36 @@ pub(crate) fn in_experiment(file: &Path, error: &str) -> String {
     if error.starts_with(&file) { error.to_owned() } else { format!("{file} {error}") }
 }
 
-/// Flies the runs of an experiment that are not done yet, and prints the results once all are done.
+/// Flies the runs of an experiment that are not done yet, and prints the results once all are done. Or merges shards.
 pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
-    check_experiment(&args.experiment)?;
+    match (&args.action, &args.experiment) {
+        (Some(SweepAction::Merge(args)), _) => merge(args),
+        (None, Some(experiment)) => fly(args, experiment, pilots),
+        (None, None) => Err(Failure::usage("expected an experiment file")),
+    }
+}
+
+fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Failure> {
+    check_experiment(file)?;
     if args.parquet {
         check_parquet().map_err(Failure::usage)?;
     }
-    let experiment = Experiment::read(&args.experiment).map_err(Failure::usage)?;
+    let experiment = Experiment::read(file).map_err(Failure::usage)?;
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
-    let folder = args.out.clone().unwrap_or_else(|| Path::new("sweeps").join(&experiment.name));
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(&experiment.name, args.shard));
     let mut bar = RunsBar::new(args.quiet || args.json);
     let mut sweep = Sweep::new(&grid, pilots).interrupted(&interrupted).progress(|progress| bar.show(progress));
     sweep = sweep.parquet(args.parquet);
     if let Some(jobs) = args.jobs {
         sweep = sweep.workers(jobs);
     }
+    if let Some(shard) = args.shard {
+        sweep = sweep.shard(shard);
+    }
     let end = sweep.run_in_folder(&folder).map_err(|error| match error {
-        SweepError::Scenario(error) => Failure::usage(in_experiment(&args.experiment, &error.to_string())),
+        SweepError::Scenario(error) => Failure::usage(in_experiment(file, &error.to_string())),
         error if error.is_usage() => Failure::usage(error),
         error => Failure::environment(error),
     });
@@ -126,13 +180,46 @@ pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
             complain(format!("{done} of {runs} runs are done; the same command resumes the sweep"));
             Ok(Exit::Interrupted(interrupt.signal().unwrap_or_default()))
         }
-        SweepEnd::Complete(report) => {
+        SweepEnd::Shard(progress) => {
+            let (done, shard) = (progress.done, args.shard.map(|shard| shard.to_string()).unwrap_or_default());
+            let path = folder.join("");
             if args.json {
-                output::print_line(report.summary())?;
+                output::print_line(json!({ "shard": shard, "runs": done, "folder": path }))?;
             } else if !args.quiet {
-                output::print_line(format!("{}folder  {}", report.table(), folder.join("").display()))?;
+                let next = "merge all shards with `skein sweep merge`";
+                output::print_line(format!("shard {shard}: {done} runs are done; {next}\nfolder  {}", path.display()))?;
             }
             Ok(Exit::Reached)
         }
+        SweepEnd::Complete(report) => show(&report, &folder, args.json, args.quiet),
     }
+}
+
+/// Merges the shards of a sweep, and prints its results.
+fn merge(args: &MergeArgs) -> Result<Exit, Failure> {
+    if args.parquet {
+        check_parquet().map_err(Failure::usage)?;
+    }
+    let failure =
+        |error: SweepError| if error.is_usage() { Failure::usage(error) } else { Failure::environment(error) };
+    let shards = Shards::read(&args.folders).map_err(failure)?;
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(shards.name(), None));
+    let grid = shards.grid();
+    let report = shards.write(&grid, &folder, args.parquet).map_err(failure)?;
+    show(&report, &folder, args.json, args.quiet)
+}
+
+fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
+    let part = shard.map(|shard| format!("-{}", shard.folder_name())).unwrap_or_default();
+    Path::new("sweeps").join(format!("{name}{part}"))
+}
+
+/// Prints the results of a complete sweep.
+fn show(report: &SweepReport<'_>, folder: &Path, json: bool, quiet: bool) -> Result<Exit, Failure> {
+    if json {
+        output::print_line(report.summary())?;
+    } else if !quiet {
+        output::print_line(format!("{}folder  {}", report.table(), folder.join("").display()))?;
+    }
+    Ok(Exit::Reached)
 }

@@ -1,5 +1,6 @@
 //! What can go wrong in a sweep.
 
+use crate::shard::Shard;
 use skein_report::table::TableError;
 use skein_report::{DrawError, ReportError};
 use skein_runtime::{PilotProblem, RuntimeError};
@@ -34,6 +35,61 @@ pub enum SweepError {
         folder: PathBuf,
         /// Name of the experiment in it.
         name: String,
+    },
+    /// The folder holds another shard of the experiment, or all of it.
+    #[error(
+        "{}: holds {}; expected {}; name another --out", folder.display(), shard_words(*found), shard_words(*expected)
+    )]
+    OtherShard {
+        /// The sweep's folder.
+        folder: PathBuf,
+        /// The shard in it; `None`: all runs.
+        found: Option<Shard>,
+        /// The shard to be flown; `None`: all runs.
+        expected: Option<Shard>,
+    },
+    /// There is nothing to merge.
+    #[error("expected at least one folder of a shard")]
+    NoShards,
+    /// The folder to merge is not a shard's.
+    #[error("{}: is not the folder of a shard, which `skein sweep --shard` makes", .0.display())]
+    NotAShard(PathBuf),
+    /// Two folders hold shards of different sweeps.
+    #[error(
+        "{} and {}: hold shards of different sweeps: the experiments, the overrides or the programs differ",
+        first.display(), second.display()
+    )]
+    OtherSweep {
+        /// A folder.
+        first: PathBuf,
+        /// Another folder.
+        second: PathBuf,
+    },
+    /// The shards were flown by another version of the program.
+    #[error("{}: was flown by another version of this program; merge with the version that flew it", .0.display())]
+    OtherProgram(PathBuf),
+    /// A run is in two folders.
+    #[error("run {run} is in {} and in {}; expected each run in one folder", first.display(), second.display())]
+    Overlap {
+        /// Number of the run, from 0.
+        run: usize,
+        /// A folder.
+        first: PathBuf,
+        /// Another folder.
+        second: PathBuf,
+    },
+    /// The folders do not hold all runs.
+    #[error(
+        "{missing} of {runs} runs are missing, the first is run {first}; name the folders of all shards, and finish \
+         shards that were interrupted"
+    )]
+    MissingRuns {
+        /// Number of missing runs.
+        missing: usize,
+        /// Runs of the experiment.
+        runs: usize,
+        /// Number of the first missing run, from 0.
+        first: usize,
     },
     /// The folder exists and is not a sweep's.
     #[error("{}: exists and is not the folder of a sweep; name another --out", .0.display())]
@@ -84,10 +140,15 @@ impl SweepError {
     /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        use SweepError::{Changed, Folder, NotASweep, OtherExperiment, Scenario};
+        use SweepError as E;
         match self {
-            Folder(error) => error.is_usage(),
-            _ => matches!(self, Scenario(_) | Changed { .. } | OtherExperiment { .. } | NotASweep(_)),
+            E::Folder(error) => error.is_usage(),
+            E::Scenario(_) | E::Changed { .. } | E::OtherExperiment { .. } | E::OtherShard { .. } | E::NotASweep(_) => {
+                true
+            }
+            E::NoShards | E::NotAShard(_) | E::OtherSweep { .. } | E::OtherProgram(_) => true,
+            E::Overlap { .. } | E::MissingRuns { .. } => true,
+            _ => false,
         }
     }
 
@@ -95,6 +156,11 @@ impl SweepError {
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }
     }
+}
+
+/// What a folder holds.
+fn shard_words(shard: Option<Shard>) -> String {
+    shard.map_or_else(|| "all runs".to_owned(), |shard| format!("shard {shard}"))
 }
 
 /// Why a run of a grid has no valid scenario.

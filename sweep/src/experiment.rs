@@ -3,13 +3,13 @@
 use crate::error::{ExperimentError, Problem};
 use crate::metrics::{METRICS, SUCCESS, metric, own_name};
 use crate::random_scene::SceneBounds;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
 /// The missions of a sweep: every scenario with every strategy, every value of the grid and every seed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Experiment {
     /// Name of the experiment. The default folder has the same name.
     pub name: String,
@@ -31,7 +31,7 @@ pub struct Experiment {
 }
 
 /// A mission to fly.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mission {
     /// A scenario file and its text.
     File {
@@ -47,7 +47,7 @@ pub enum Mission {
 }
 
 /// A scenario key and the values that it takes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// Path of the key, such as `radio.loss`.
     pub key: String,

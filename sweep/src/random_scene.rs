@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
 /// How many drones and obstacles a scene may have, each as least and greatest number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SceneBounds {
     /// Number of drones, from 1 to 64.
     pub drones: [u32; 2],

@@ -1,7 +1,9 @@
 //! A sweep's folder: which experiment it belongs to, and the rows of the runs that are done.
 
 use crate::error::SweepError;
+use crate::missions::Missions;
 use crate::row::Row;
+use crate::shard::Shard;
 use serde::{Deserialize, Serialize};
 use skein_report::WorkFolder;
 use std::fs::File;
@@ -11,8 +13,11 @@ use std::path::Path;
 const IDENTITY: &str = "experiment.json";
 const PART: &str = ".experiment.json.part";
 const ROWS: &str = "rows.jsonl";
+const MISSIONS: &str = "missions.json";
 /// Greatest size of the file with the identity, bytes.
 const IDENTITY_BYTES_MAX: u64 = 1 << 20;
+/// Greatest size of the file with the missions, bytes.
+const MISSIONS_BYTES_MAX: u64 = 1 << 30;
 
 /// Which experiment a folder belongs to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,8 +28,41 @@ pub(crate) struct Identity {
     pub(crate) name: String,
     /// Hash of everything that decides what is flown: experiment, scenarios, overrides and program version.
     pub(crate) hash: String,
-    /// Number of runs.
+    /// Number of runs, those of other shards included.
     pub(crate) runs: usize,
+    /// The shard that the folder holds; `None`: all runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) shard: Option<Shard>,
+}
+
+impl Identity {
+    /// Whether both are about the same runs of the same program, in whichever shards.
+    pub(crate) fn is_same_sweep(&self, other: &Self) -> bool {
+        *self == Self { shard: self.shard, ..other.clone() }
+    }
+}
+
+/// The folder of a shard, as it is read to be merged.
+#[derive(Debug)]
+pub(crate) struct ShardFolder {
+    pub(crate) identity: Identity,
+    pub(crate) missions: Missions,
+    pub(crate) rows: Vec<Row>,
+}
+
+impl ShardFolder {
+    /// Reads a folder. It is refused while a sweep writes to it.
+    pub(crate) fn read(path: &Path) -> Result<Self, SweepError> {
+        let not_a_shard = || SweepError::NotAShard(path.to_owned());
+        let folder = WorkFolder::open(path).map_err(|_| not_a_shard())?;
+        folder.claim()?;
+        let identity = read_identity(&folder).filter(|identity| identity.shard.is_some()).ok_or_else(not_a_shard)?;
+        let missions = folder.read_whole(MISSIONS, MISSIONS_BYTES_MAX).ok();
+        let missions = missions.and_then(|bytes| serde_json::from_slice(&bytes).ok()).ok_or_else(not_a_shard)?;
+        let mut file = folder.append(ROWS)?;
+        let (rows, _) = read(&mut file, &folder.path().join(ROWS), identity.runs)?;
+        Ok(Self { identity, missions, rows })
+    }
 }
 
 /// An open folder. It is locked against other processes that write to it.
@@ -49,6 +87,11 @@ impl Store {
         Ok((Self { folder, rows: file }, rows))
     }
 
+    /// Keeps the missions beside the rows.
+    pub(crate) fn keep_missions(&self, missions: &Missions) -> Result<(), SweepError> {
+        Ok(self.folder.write(MISSIONS, &serde_json::to_vec_pretty(missions)?)?)
+    }
+
     /// Appends a row. When this returns, the line is in the file even if the process is killed right after.
     pub(crate) fn keep(&mut self, row: &Row) -> Result<(), SweepError> {
         let mut line = serde_json::to_vec(row)?;
@@ -69,16 +112,22 @@ fn check_identity(path: &Path, identity: &Identity) -> Result<bool, SweepError> 
     }
     let not_a_sweep = || SweepError::NotASweep(path.to_owned());
     let folder = WorkFolder::open(path).map_err(|_| not_a_sweep())?;
-    let found = folder.read_whole(IDENTITY, IDENTITY_BYTES_MAX).ok();
-    let found = found.and_then(|bytes| serde_json::from_slice::<Identity>(&bytes).ok());
     let folder_path = path.to_owned();
-    match found {
+    match read_identity(&folder) {
         Some(found) if found == *identity => Ok(true),
+        Some(found) if found.is_same_sweep(identity) => {
+            Err(SweepError::OtherShard { folder: folder_path, found: found.shard, expected: identity.shard })
+        }
         Some(Identity { name, .. }) if name == identity.name => Err(SweepError::Changed { folder: folder_path, name }),
         Some(Identity { name, .. }) => Err(SweepError::OtherExperiment { folder: folder_path, name }),
         None if is_empty(&folder)? => Ok(false),
         None => Err(not_a_sweep()),
     }
+}
+
+fn read_identity(folder: &WorkFolder) -> Option<Identity> {
+    let bytes = folder.read_whole(IDENTITY, IDENTITY_BYTES_MAX).ok()?;
+    serde_json::from_slice(&bytes).ok()
 }
 
 /// Whether the folder holds nothing, except the file of a sweep that was killed while it made the folder.
@@ -113,7 +162,7 @@ mod tests {
     use skein_report::ReportError;
 
     fn identity(hash: &str) -> Identity {
-        Identity { schema: "s".to_owned(), name: "e".to_owned(), hash: hash.to_owned(), runs: 3 }
+        Identity { schema: "s".to_owned(), name: "e".to_owned(), hash: hash.to_owned(), runs: 3, shard: None }
     }
 
     fn row(job: usize) -> Row {

@@ -4,8 +4,10 @@ use crate::error::SweepError;
 use crate::experiment::{Experiment, Mission};
 use crate::flight::{FlightMode, Interrupted, fly};
 use crate::grid::Grid;
+use crate::missions::Missions;
 use crate::report::SweepReport;
 use crate::row::Row;
+use crate::shard::Shard;
 use crate::store::{Identity, Store};
 use crate::worker_pool::WorkerPool;
 use skein_bus::{PinMode, pin_to_core};
@@ -19,7 +21,7 @@ use std::path::Path;
 pub struct Progress {
     /// Runs that are done, those of an earlier sweep in the same folder included.
     pub done: usize,
-    /// All runs.
+    /// All runs; those of the shard, if only a shard is flown.
     pub runs: usize,
 }
 
@@ -28,6 +30,8 @@ pub struct Progress {
 pub enum SweepEnd<'a> {
     /// All runs are done.
     Complete(SweepReport<'a>),
+    /// All runs of the shard are done. The results of all shards can be merged: [`crate::Shards`].
+    Shard(Progress),
     /// It was interrupted before all runs were done.
     Interrupted(Progress),
 }
@@ -38,7 +42,7 @@ impl<'a> SweepEnd<'a> {
     pub fn complete(self) -> Option<SweepReport<'a>> {
         match self {
             Self::Complete(report) => Some(report),
-            Self::Interrupted(_) => None,
+            Self::Shard(_) | Self::Interrupted(_) => None,
         }
     }
 }
@@ -47,6 +51,7 @@ impl<'a> SweepEnd<'a> {
 pub struct Sweep<'g, 'c> {
     grid: &'g Grid<'g>,
     workers: usize,
+    shard: Option<Shard>,
     parquet: bool,
     pilots: &'g PilotRegistry,
     interrupted: &'c Interrupted<'c>,
@@ -59,13 +64,19 @@ impl<'g, 'c> Sweep<'g, 'c> {
     #[must_use]
     pub fn new(grid: &'g Grid<'g>, pilots: &'g PilotRegistry) -> Self {
         let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        Self { grid, workers, parquet: false, pilots, interrupted: &|| None, progress: Box::new(|_| {}) }
+        Self { grid, workers, shard: None, parquet: false, pilots, interrupted: &|| None, progress: Box::new(|_| {}) }
     }
 
     /// Flies this many runs side by side.
     #[must_use]
     pub fn workers(self, workers: usize) -> Self {
         Self { workers, ..self }
+    }
+
+    /// Flies the runs of this shard alone. In a folder, nothing but their rows is written.
+    #[must_use]
+    pub fn shard(self, shard: Shard) -> Self {
+        Self { shard: Some(shard), ..self }
     }
 
     /// Writes the table of runs as Parquet as well.
@@ -104,7 +115,11 @@ impl<'g, 'c> Sweep<'g, 'c> {
     /// [`SweepError`]. If it is a usage error, nothing was flown.
     pub fn run_in_folder(mut self, folder: &Path) -> Result<SweepEnd<'g>, SweepError> {
         self.grid.check(self.pilots, !self.grid.experiment().processes)?;
-        let (mut store, mut rows) = Store::open(folder, &identity(self.grid))?;
+        let (mut store, mut rows) = Store::open(folder, &Identity { shard: self.shard, ..identity(self.grid) })?;
+        if self.shard.is_some() {
+            let (experiment, overrides) = (self.grid.experiment().clone(), self.grid.overrides().to_vec());
+            store.keep_missions(&Missions { experiment, overrides })?;
+        }
         let flights = folder.join("flights");
         // Left behind by a sweep that was killed.
         let _ = std::fs::remove_dir_all(&flights);
@@ -115,10 +130,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
         ended?;
         let end = self.end(rows)?;
         if let SweepEnd::Complete(report) = &end {
-            write(store.folder(), report)?;
-            if self.parquet {
-                store.folder().write("runs.parquet", &report.parquet()?)?;
-            }
+            write(store.folder(), report, self.parquet)?;
         }
         Ok(end)
     }
@@ -137,12 +149,13 @@ impl<'g, 'c> Sweep<'g, 'c> {
         rows: &mut Vec<Row>,
         mut keep: impl FnMut(&Row) -> Result<(), SweepError>,
     ) -> Result<(), SweepError> {
-        let (grid, pilots, interrupted, runs) = (self.grid, self.pilots, self.interrupted, self.grid.len());
-        let mut done = vec![false; runs];
+        let (grid, pilots, interrupted, runs) = (self.grid, self.pilots, self.interrupted, self.runs());
+        let mut done = vec![false; grid.len()];
         for row in &*rows {
             done[row.job] = true;
         }
-        let missing: Vec<usize> = (0..runs).filter(|&job| !done[job]).collect();
+        let wanted = |job: &usize| self.shard.is_none_or(|shard| shard.holds(*job));
+        let missing: Vec<usize> = (0..grid.len()).filter(wanted).filter(|&job| !done[job]).collect();
         (self.progress)(Progress { done: rows.len(), runs });
         let pin = |worker| {
             if let FlightMode::Processes { .. } = mode {
@@ -165,9 +178,16 @@ impl<'g, 'c> Sweep<'g, 'c> {
         )
     }
 
+    /// Number of runs to fly.
+    fn runs(&self) -> usize {
+        self.shard.map_or(self.grid.len(), |shard| shard.len(self.grid.len()))
+    }
+
     fn end(&self, rows: Vec<Row>) -> Result<SweepEnd<'g>, SweepError> {
-        let progress = Progress { done: rows.len(), runs: self.grid.len() };
-        if progress.done == progress.runs {
+        let progress = Progress { done: rows.len(), runs: self.runs() };
+        if progress.done == progress.runs && self.shard.is_some() {
+            Ok(SweepEnd::Shard(progress))
+        } else if progress.done == progress.runs {
             Ok(SweepEnd::Complete(SweepReport::new(self.grid, rows)))
         } else if (self.interrupted)().is_some() {
             Ok(SweepEnd::Interrupted(progress))
@@ -179,7 +199,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
 
 /// The identity of a grid's sweep. It hashes texts, not paths, so that a sweep may be resumed from another folder. It
 /// leaves out the metrics, which only choose what is shown.
-fn identity(grid: &Grid<'_>) -> Identity {
+pub(crate) fn identity(grid: &Grid<'_>) -> Identity {
     let mut digest = Digest::default();
     let mut fold = |text: &str| {
         digest.word(text.len() as u64).bytes(text.as_bytes());
@@ -201,10 +221,12 @@ fn identity(grid: &Grid<'_>) -> Identity {
         name: grid.experiment().name.clone(),
         hash: format!("{:016x}", digest.value()),
         runs: grid.len(),
+        shard: None,
     }
 }
 
-fn write(folder: &WorkFolder, report: &SweepReport<'_>) -> Result<(), SweepError> {
+/// Writes the results of a complete sweep into its folder.
+pub(crate) fn write(folder: &WorkFolder, report: &SweepReport<'_>, parquet: bool) -> Result<(), SweepError> {
     folder.write("runs.csv", &report.csv())?;
     folder.write("summary.json", &serde_json::to_vec_pretty(&report.summary())?)?;
     let plots = folder.subfolder("plots")?;
@@ -213,6 +235,9 @@ fn write(folder: &WorkFolder, report: &SweepReport<'_>) -> Result<(), SweepError
     }
     if let Some(csv) = report.ratios_csv() {
         folder.write("ratios.csv", csv.as_bytes())?;
+    }
+    if parquet {
+        folder.write("runs.parquet", &report.parquet()?)?;
     }
     Ok(())
 }
