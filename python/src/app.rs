@@ -27,9 +27,12 @@ pub(crate) fn answer(
     py.detach(|| app.run(arguments))
 }
 
-/// What pilots said under topics of their own, in the recording of a run: time, s, sender, topic, bytes.
+/// A message in a recording: time, s, sender, topic, bytes.
+type Said = (f64, u32, String, Py<PyBytes>);
+
+/// What pilots said under topics of their own, in the recording of a run.
 #[pyfunction]
-pub(crate) fn messages(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<(f64, u32, String, Py<PyBytes>)>> {
+pub(crate) fn messages(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<Said>> {
     let path = folder.join("run.mcap");
     let bytes = std::fs::read(&path).map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))?;
     let wrong = |error| PyValueError::new_err(format!("{}: {error}", path.display()));

@@ -99,6 +99,7 @@ impl Arrays {
 #[pymethods]
 impl PySwarm {
     #[new]
+    #[allow(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(signature = (text, name, overrides, *, neighbours = 6, obstacles = 2, peers = 4, message = 0))]
     fn new(
         py: Python<'_>,
