@@ -250,6 +250,20 @@ fn check_private(path: &Path) -> Result<(), BusError> {
     Err(BusError::Folder { path: path.to_owned(), why })
 }
 
+/// Keeps a run's files from being removed for as long as the result lives.
+///
+/// # Errors
+/// [`BusError::Folder`] if the run has ended, [`BusError::Io`].
+pub(crate) fn hold(path: &Path) -> Result<File, BusError> {
+    let root = path.parent().unwrap_or(Path::new("/"));
+    let guard = lock_root(root)?;
+    if path.join(LOCK).exists() {
+        return Ok(guard);
+    }
+    leave(root, guard);
+    Err(BusError::Folder { path: path.to_owned(), why: "the run has ended".to_owned() })
+}
+
 fn open_lock(path: &Path) -> Result<File, BusError> {
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(false).mode(0o600).open(path).map_err(BusError::io("open", path))

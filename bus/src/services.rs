@@ -1,6 +1,6 @@
 //! The run's services: the launcher makes them and sets every limit; all other processes open them.
 
-use crate::domain::Domain;
+use crate::domain::{Domain, hold};
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame};
 use crate::ports::{
@@ -18,6 +18,7 @@ use skein_protocol::downlink::{DownlinkHeader, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::record::{DroneRow, RecordHeader};
 use std::fmt::{Debug, Display};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
@@ -73,6 +74,8 @@ pub struct Services {
     node: Node<ipc::Service>,
     drones: usize,
     room: Room,
+    /// For an observer: the run's folder, which may vanish at any time.
+    visited: Option<PathBuf>,
     /// In the launcher: keeps all services open. A service exists as long as at least one process has it open.
     _kept: Option<Kept>,
 }
@@ -109,16 +112,27 @@ impl Services {
         };
         // iceoryx2 makes one of its files open to all users.
         domain.make_private()?;
-        Ok(Self { node, drones, room: Room::of(domain), _kept: Some(kept) })
+        Ok(Self { node, drones, room: Room::of(domain), visited: None, _kept: Some(kept) })
     }
 
-    /// Joins the run's services. For every process but the launcher. Each service is opened with its first port.
+    /// Joins the run's services. For the processes of the run but the launcher. Each service is opened with its first port.
     ///
     /// # Errors
     /// [`BusError::NoRoom`], [`BusError::Service`].
     pub fn open(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
         check_join()?;
-        Ok(Self { node: node(domain, name)?, drones, room: Room::of(domain), _kept: None })
+        Ok(Self { node: node(domain, name)?, drones, room: Room::of(domain), visited: None, _kept: None })
+    }
+
+    /// As [`Services::open`], for an observer. The launcher does not wait for observers when it removes the run's files. iceoryx2 would
+    /// then make the folders again, with a mode that lets others in, and no other run could start. So the files stay while a port is
+    /// made.
+    ///
+    /// # Errors
+    /// As [`Services::open`]; [`BusError::Folder`] if the run has ended.
+    pub fn visit(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
+        let _held = hold(domain.path())?;
+        Ok(Self { visited: Some(domain.path().to_owned()), ..Self::open(domain, drones, name)? })
     }
 
     /// Reserves all memory that the services have now. Before the first tick, when all ports are made, and after a port was added:
@@ -259,6 +273,7 @@ impl Services {
         P: ZeroCopySend + Debug + 'static,
         H: ZeroCopySend + Debug,
     {
+        let _held = self.visited.as_deref().map(hold).transpose()?;
         let service: Factory<P, H> = open(&self.node, name)?;
         let health = Health::default();
         let degraded = health.clone();

@@ -208,7 +208,7 @@ impl Accumulator {
     /// The summary of all records taken.
     pub(crate) fn finish(self, completion: &RunCompletion) -> Summary {
         let error = formation::error(&self.facts, &self.positions);
-        let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick + 1), self.counts.t_s);
+        let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick.saturating_add(1)), self.counts.t_s);
         let wall_s =
             self.end.as_ref().map(|end| end.totals.wall_s).or(completion.wall_s).filter(|wall_s| *wall_s > 0.0);
         let steps = ticks as f64 * f64::from(self.facts.drones);

@@ -69,7 +69,7 @@ impl<W: Write> TraceWriter<W> {
         let [vx, vy, vz] = row.velocity_mps.map(Cell::from);
         let [ax, ay, az] = row.commanded_mps2.map(Cell::from);
         let route = (row.route != NO_ROUTE && row.obeyed.ballot.is_some()).then_some(row.route);
-        let dropped: u32 = row.dropped.iter().sum();
+        let dropped = row.dropped.iter().fold(0u32, |sum, &count| sum.saturating_add(count));
         let leader = row.leader().map(|leader| leader.0);
         let cells: [Cell<'_>; COUNT] = [
             t_s.into(),

@@ -54,7 +54,7 @@ impl SwarmTap {
         let domain = Domain::join(path).map_err(Failure::environment)?;
         let scenario = scenario_file::read(path).map_err(Failure::environment)?;
         let open = |domain: &Domain| -> Result<(Services, RecordSubscriber), BusError> {
-            let services = Services::open(domain, mission::drones(&scenario), "observer")?;
+            let services = Services::visit(domain, mission::drones(&scenario), "observer")?;
             let records = services.watch_subscriber()?;
             Ok((services, records))
         };

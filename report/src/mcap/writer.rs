@@ -131,7 +131,7 @@ impl<W: Write + Seek> McapWriter<W> {
 
     /// Takes the record of a tick and its events.
     pub(crate) fn take(&mut self, record: RecordView<'_>, events: &[RunEvent]) -> Result<(), ReportError> {
-        let wanted = (record.head.tick + 1).is_multiple_of(self.stride);
+        let wanted = record.head.tick.wrapping_add(1).is_multiple_of(self.stride);
         let fresh = !record.rows.is_empty();
         let sample = self.observer.take(record, wanted);
         let written = sample

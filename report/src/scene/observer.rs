@@ -81,10 +81,10 @@ impl Observer {
         radio.heard.resize(record.rows.len(), 0);
         radio.dropped_by.resize(record.rows.len(), 0);
         for (drone, row) in record.rows.iter().enumerate() {
-            radio.heard[drone] += row.heard;
+            radio.heard[drone] = radio.heard[drone].saturating_add(row.heard);
             for (reason, &count) in DropReason::ALL.into_iter().zip(&row.dropped).filter(|(_, count)| **count > 0) {
                 add(&mut radio.dropped, frames::reason(reason), count);
-                radio.dropped_by[drone] += count;
+                radio.dropped_by[drone] = radio.dropped_by[drone].saturating_add(count);
             }
         }
         let listed = self.facts.drones as usize <= MAX_LISTED_DRONES || self.receiver.is_some();
@@ -93,7 +93,7 @@ impl Observer {
             if listed {
                 let deliveries = self.deliveries(frame, record.rows);
                 let (source, sequence) = (frame.source.0, frame.sequence);
-                let t_s = SimTime(frame.tick as i64 * self.dt_ns).secs();
+                let t_s = SimTime((frame.tick as i64).saturating_mul(self.dt_ns)).secs();
                 let content = frames::content(frame);
                 self.radio.frames.push(SentFrame { t_s, source, sequence, kind: topic.clone(), content, deliveries });
             }
@@ -141,7 +141,7 @@ impl Observer {
 fn add(counts: &mut BTreeMap<String, u32>, name: &str, count: u32) {
     // Allocates the name once, and not for every frame.
     if let Some(known) = counts.get_mut(name) {
-        *known += count;
+        *known = known.saturating_add(count);
     } else {
         counts.insert(name.to_owned(), count);
     }
