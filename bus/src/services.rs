@@ -135,8 +135,9 @@ impl Services {
         Ok(Self { visited: Some(domain.path().to_owned()), ..Self::open(domain, drones, name)? })
     }
 
-    /// Reserves all memory that the services have now. Before the first tick, when all ports are made, and after a port was added:
-    /// from then on, the run does not depend on what others do in /dev/shm.
+    /// Reserves all memory that the services have now. Call it before the first tick, when all ports are made: from then on,
+    /// what others do in /dev/shm does not end these processes. The ports of a process that joins later, such as a restarted
+    /// drone, are not reserved. Such a process only makes sure that there is room when it joins.
     ///
     /// # Errors
     /// [`BusError::NoRoom`]; then nothing is reserved. [`BusError::Io`].
