@@ -82,9 +82,14 @@ mod tests {
     fn this_process_uses_cpu_time_and_memory() {
         let me = std::process::id();
         let before = CpuUsage::of(me);
-        let sum = (0..20_000_000u64).fold(0u64, |sum, i| sum.wrapping_mul(31).wrapping_add(std::hint::black_box(i)));
-        std::hint::black_box(sum);
-        assert!(CpuUsage::of(me).since(before).cpu_ns > 0);
+        // The kernel may count a process' time only when its clock ticks, so a single tick can be missed.
+        let work = || {
+            let sum =
+                (0..20_000_000u64).fold(0u64, |sum, i| sum.wrapping_mul(31).wrapping_add(std::hint::black_box(i)));
+            std::hint::black_box(sum);
+            CpuUsage::of(me).since(before).cpu_ns > 0
+        };
+        assert!((0..100).any(|_| work()));
         let Memory { rss_mib, pss_mib } = Memory::of_all(&[me]);
         assert!(rss_mib >= pss_mib && pss_mib > 0.0);
         assert_eq!(CpuUsage::of(u32::MAX).cpu_ns, 0);
