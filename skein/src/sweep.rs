@@ -50,6 +50,13 @@ pub(crate) struct SweepArgs {
     /// Override a scenario key in every run, such as radio.range_m=200; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
+    #[command(flatten)]
+    pub(crate) results: ResultArgs,
+}
+
+/// How the results of a sweep are written and printed.
+#[derive(Debug, Args)]
+pub(crate) struct ResultArgs {
     /// Write the table of runs as Parquet as well: runs.parquet
     #[arg(long)]
     pub(crate) parquet: bool,
@@ -77,15 +84,8 @@ pub(crate) struct MergeArgs {
     /// Folder of the whole sweep [default: sweeps/<name>]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Write the table of runs as Parquet as well: runs.parquet
-    #[arg(long)]
-    pub(crate) parquet: bool,
-    /// Print summary.json as one JSON object
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Print nothing but errors
-    #[arg(long)]
-    pub(crate) quiet: bool,
+    #[command(flatten)]
+    pub(crate) results: ResultArgs,
 }
 
 /// Arguments of `scene`.
@@ -151,7 +151,7 @@ pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
 
 fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     check_experiment(file)?;
-    if args.parquet {
+    if args.results.parquet {
         check_parquet().map_err(Failure::usage)?;
     }
     let experiment = Experiment::read(file).map_err(Failure::usage)?;
@@ -159,9 +159,9 @@ fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Fa
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&experiment.name, args.shard));
-    let mut bar = RunsBar::new(args.quiet || args.json);
+    let mut bar = RunsBar::new(args.results.quiet || args.results.json);
     let mut sweep = Sweep::new(&grid, pilots).interrupted(&interrupted).progress(|progress| bar.show(progress));
-    sweep = sweep.parquet(args.parquet);
+    sweep = sweep.parquet(args.results.parquet);
     if let Some(jobs) = args.jobs {
         sweep = sweep.workers(jobs);
     }
@@ -183,21 +183,21 @@ fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Fa
         SweepEnd::Shard(progress) => {
             let (done, shard) = (progress.done, args.shard.map(|shard| shard.to_string()).unwrap_or_default());
             let path = folder.join("");
-            if args.json {
+            if args.results.json {
                 output::print_line(json!({ "shard": shard, "runs": done, "folder": path }))?;
-            } else if !args.quiet {
+            } else if !args.results.quiet {
                 let next = "merge all shards with `skein sweep merge`";
                 output::print_line(format!("shard {shard}: {done} runs are done; {next}\nfolder  {}", path.display()))?;
             }
             Ok(Exit::Reached)
         }
-        SweepEnd::Complete(report) => show(&report, &folder, args.json, args.quiet),
+        SweepEnd::Complete(report) => show(&report, &folder, &args.results),
     }
 }
 
 /// Merges the shards of a sweep, and prints its results.
 fn merge(args: &MergeArgs) -> Result<Exit, Failure> {
-    if args.parquet {
+    if args.results.parquet {
         check_parquet().map_err(Failure::usage)?;
     }
     let failure =
@@ -205,8 +205,8 @@ fn merge(args: &MergeArgs) -> Result<Exit, Failure> {
     let shards = Shards::read(&args.folders).map_err(failure)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(shards.name(), None));
     let grid = shards.grid();
-    let report = shards.write(&grid, &folder, args.parquet).map_err(failure)?;
-    show(&report, &folder, args.json, args.quiet)
+    let report = shards.write(&grid, &folder, args.results.parquet).map_err(failure)?;
+    show(&report, &folder, &args.results)
 }
 
 fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
@@ -215,10 +215,10 @@ fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
 }
 
 /// Prints the results of a complete sweep.
-fn show(report: &SweepReport<'_>, folder: &Path, json: bool, quiet: bool) -> Result<Exit, Failure> {
-    if json {
+fn show(report: &SweepReport<'_>, folder: &Path, args: &ResultArgs) -> Result<Exit, Failure> {
+    if args.json {
         output::print_line(report.summary())?;
-    } else if !quiet {
+    } else if !args.quiet {
         output::print_line(format!("{}folder  {}", report.table(), folder.join("").display()))?;
     }
     Ok(Exit::Reached)
