@@ -20,6 +20,7 @@
 mod altitude;
 pub mod braking_filter;
 pub mod braking_path;
+pub mod command_delay;
 pub mod detection;
 mod distant_peers;
 pub mod emergency_route;

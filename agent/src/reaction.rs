@@ -1,17 +1,15 @@
 //! The reaction time t_c of a drone: a command takes effect that long after it was given.
 
+use crate::command_delay::CommandDelay;
 use skein_protocol::Vec2;
-use std::collections::VecDeque;
 
 /// Holds commands back for the reaction time.
 #[derive(Clone, Debug)]
 pub(crate) struct ReactionDelay {
     nominal_s: f64,
     dt_s: f64,
-    /// Commands that have been given and have not taken effect, the oldest first, m/s².
-    pending: VecDeque<Vec2>,
-    /// The command that took effect last, m/s².
-    last: Vec2,
+    /// Commands, m/s².
+    commands: CommandDelay<Vec2>,
 }
 
 /// How a drone moves until a command that it gives now takes effect.
@@ -26,32 +24,27 @@ pub(crate) struct PendingMotion {
 impl ReactionDelay {
     /// A delay of `reaction_time_s` in ticks of `dt_s`.
     pub(crate) fn new(reaction_time_s: f64, dt_s: f64) -> Self {
-        let pending = VecDeque::from(vec![Vec2::zeros(); ticks(reaction_time_s, dt_s)]);
-        Self { nominal_s: reaction_time_s, dt_s, pending, last: Vec2::zeros() }
+        let mut commands = CommandDelay::default();
+        commands.set_ticks(ticks(reaction_time_s, dt_s));
+        Self { nominal_s: reaction_time_s, dt_s, commands }
     }
 
     /// Adds `extra_s` to the nominal reaction time and returns the sum, s. When the delay grows, the last command is
     /// repeated; when it shrinks, the oldest commands are skipped.
     pub(crate) fn set_extra(&mut self, extra_s: f64) -> f64 {
-        let wanted = ticks(self.nominal_s + extra_s, self.dt_s);
-        while self.pending.len() > wanted {
-            self.pending.pop_front();
-        }
-        while self.pending.len() < wanted {
-            self.pending.push_front(self.last);
-        }
+        self.commands.set_ticks(ticks(self.nominal_s + extra_s, self.dt_s));
         self.nominal_s + extra_s
     }
 
     /// The delay in whole ticks, s.
     pub(crate) fn delay_s(&self) -> f64 {
-        self.pending.len() as f64 * self.dt_s
+        self.commands.ticks() as f64 * self.dt_s
     }
 
     /// The motion of a drone with `velocity` (m/s) under the pending commands.
     pub(crate) fn pending_motion(&self, velocity: Vec2) -> PendingMotion {
         let mut motion = PendingMotion { offset: Vec2::zeros(), velocity };
-        for command in &self.pending {
+        for command in self.commands.pending() {
             let next = motion.velocity + command * self.dt_s;
             motion.offset += (motion.velocity + next) * (self.dt_s / 2.0);
             motion.velocity = next;
@@ -61,9 +54,7 @@ impl ReactionDelay {
 
     /// Accepts a command and returns the one that takes effect now, m/s².
     pub(crate) fn push(&mut self, command: Vec2) -> Vec2 {
-        self.pending.push_back(command);
-        self.last = self.pending.pop_front().unwrap_or(command);
-        self.last
+        self.commands.push(command)
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pilot_host::{HostParams, PilotHost, StepScratch};
+use skein_agent::command_delay::CommandDelay;
 use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::Frame;
@@ -12,7 +13,6 @@ use skein_protocol::{DroneId, MessageRef, UserMessage};
 use skein_scenario::Scenario;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
-use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The world and all drones of a mission. The pilots are the caller's: it reads what the drones sense and hear, steers them, and
@@ -183,25 +183,15 @@ struct SteeredDrone {
     slot: Slot,
     frames: Vec<Frame>,
     frames_total: u64,
-    /// Commands that a fault holds back, the oldest first, m/s².
-    held_mps2: VecDeque<[f64; 3]>,
-    /// The command that took effect last, m/s².
-    last_mps2: [f64; 3],
+    /// Commands that a fault holds back, m/s².
+    held_mps2: CommandDelay<[f64; 3]>,
 }
 
 impl SteeredDrone {
-    /// Holds the command of this tick back for so many ticks. When that becomes longer, the last command is repeated; when it
-    /// becomes shorter, the oldest are skipped: as the paper's pilot reacts.
+    /// Holds the command of this tick back for so many ticks, as the paper's pilot does.
     fn react_after(&mut self, ticks: usize) {
-        while self.held_mps2.len() > ticks {
-            self.held_mps2.pop_front();
-        }
-        while self.held_mps2.len() < ticks {
-            self.held_mps2.push_front(self.last_mps2);
-        }
-        self.held_mps2.push_back(self.slot.acceleration_mps2);
-        self.last_mps2 = self.held_mps2.pop_front().unwrap_or_default();
-        self.slot.acceleration_mps2 = self.last_mps2;
+        self.held_mps2.set_ticks(ticks);
+        self.slot.acceleration_mps2 = self.held_mps2.push(self.slot.acceleration_mps2);
     }
 
     fn flies(&self) -> bool {
