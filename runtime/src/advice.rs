@@ -23,7 +23,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
     let no_way = scenario.drones_without_a_way()?;
     let found = [
         too_fast(scenario, "drone.speed_mps", scenario.drone.speed_mps),
-        too_fast(scenario, "mission.reform_speed_max_mps", scenario.mission.reform_speed_max_mps),
+        too_fast(scenario, "mission.reform_speed_max_mps", scenario.reform_speed_max_mps()),
         slots_too_close(scenario),
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),

@@ -111,7 +111,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         guidance: GuidanceParams {
             speed_mps: drone.speed_mps,
             speed_change_mps: drone.speed_change_mps,
-            reform_speed_max_mps: scenario.mission.reform_speed_max_mps,
+            reform_speed_max_mps: scenario.reform_speed_max_mps(),
             braking_mps2: scenario.braking_mps2(),
         },
         safety: SafetyParams {

@@ -183,9 +183,10 @@ pub struct Mission {
     /// Required with `end = "time"`: how long the mission lasts.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub duration_s: Option<f64>,
-    /// Greatest speed while re-forming; at most `drone.speed_max_mps`.
+    /// Greatest speed while re-forming; at most `drone.speed_max_mps`. Default: the paper's v + δ, which is `drone.speed_mps`
+    /// plus `drone.speed_change_mps`, or `drone.speed_max_mps` if that is less.
     #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
-    pub reform_speed_max_mps: f64,
+    pub reform_speed_max_mps: Option<f64>,
     /// Greatest distance to its slot at which a drone has arrived.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub arrival_error_m: f64,
@@ -204,7 +205,7 @@ impl Default for Mission {
             stop_x_m: 100.0,
             goal_m: None,
             duration_s: None,
-            reform_speed_max_mps: 20.0,
+            reform_speed_max_mps: None,
             arrival_error_m: 0.8,
             reformation: Reformation::Optimal,
             tps_lambda: 0.0,

@@ -167,12 +167,21 @@ impl Scenario {
         drone.speed_mps * drone.reaction_time_s + drone.speed_mps.powi(2) / (2.0 * self.braking_mps2())
     }
 
+    /// Greatest speed while re-forming, m/s: `mission.reform_speed_max_mps`; or the paper's v + δ, the nominal speed plus
+    /// the greatest change of it, or the top speed if that is less.
+    #[must_use]
+    pub fn reform_speed_max_mps(&self) -> f64 {
+        let drone = &self.drone;
+        let changed_mps = drone.speed_mps + drone.speed_change_mps;
+        self.mission.reform_speed_max_mps.unwrap_or(changed_mps.min(drone.speed_max_mps))
+    }
+
     /// Greatest distance at which drones sense neighbours, m: `sensors.ranging_m`; or enough for two drones that fly at each
     /// other at the greatest speed of the mission to stop at the safe distance, and at least twice that distance.
     #[must_use]
     pub fn ranging_m(&self) -> f64 {
         let drone = &self.drone;
-        let top_mps = drone.speed_mps.max(self.mission.reform_speed_max_mps);
+        let top_mps = drone.speed_mps.max(self.reform_speed_max_mps());
         let late_m = 2.0 * top_mps * (drone.reaction_time_s + 2.0 * self.time.dt_s);
         let enough_m = 1.01 * drone.safe_distance_m + top_mps.powi(2) / self.braking_mps2() + late_m;
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))

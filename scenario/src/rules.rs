@@ -65,7 +65,9 @@ impl Rules<'_> {
         let (nominal, top) = (("drone.speed_mps", drone.speed_mps), ("drone.speed_max_mps", drone.speed_max_mps));
         self.at_most(nominal, top, "m/s");
         self.at_most(("drone.speed_change_mps", drone.speed_change_mps), nominal, "m/s");
-        self.at_most(("mission.reform_speed_max_mps", mission.reform_speed_max_mps), top, "m/s");
+        if let Some(reform_mps) = mission.reform_speed_max_mps {
+            self.at_most(("mission.reform_speed_max_mps", reform_mps), top, "m/s");
+        }
         let margin_m = self.scenario.avoidance.clearance_m.min(drone.safe_distance_m) / 4.0;
         let step_m = drone.speed_max_mps * self.scenario.time.dt_s;
         let keys = ["time.dt_s", "drone.speed_max_mps", "avoidance.clearance_m", "drone.safe_distance_m"];

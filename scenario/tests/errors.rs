@@ -107,7 +107,10 @@ fn broken_rules_between_keys_are_rejected() {
             "[formation]\n[drone]\nspeed_mps = 25",
             &["drone.speed_mps: found 25 m/s, expected at most drone.speed_max_mps"],
         ),
-        ("[formation]\n[drone]\nspeed_max_mps = 15", &["bad.toml:3:17: mission.reform_speed_max_mps: found 20 m/s"]),
+        (
+            "[formation]\n[mission]\nreform_speed_max_mps = 21",
+            &["bad.toml:3:24: mission.reform_speed_max_mps: found 21 m/s"],
+        ),
         ("[formation]\n[drone]\nspeed_change_mps = 11", &["drone.speed_change_mps: found 11 m/s"]),
         ("[formation]\n[sensors]\ndetection_range_m = 24", &["detection_range_m: found 24 m, expected at least 25 m"]),
         ("[formation]\n[drone]\nreaction_time_s = 2\n[sensors]\ndetection_range_m = 44", &["expected at least 45 m"]),

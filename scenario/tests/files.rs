@@ -56,7 +56,7 @@ fn the_paper_scenarios_have_the_published_parameters() {
             let s = load(&root().join(format!("scenarios/paper/{id}-{place}.toml")));
             assert_eq!(s.name, format!("{id}-{place}"));
             assert_eq!((s.formation.drones, s.formation.spacing_m, s.drone.safe_distance_m), (8, spacing, safe));
-            assert_eq!((s.sensors.detection_range_m, s.mission.reform_speed_max_mps), (range, reform));
+            assert_eq!((s.sensors.detection_range_m, s.reform_speed_max_mps()), (range, reform));
             let (low, high) = s.shapes().unwrap()[0].bounds();
             assert_eq!(
                 [low.x, low.y, high.x, high.y],

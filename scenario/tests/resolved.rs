@@ -44,6 +44,11 @@ fn defaults_follow_the_scenario() {
     let column = of(&[("formation.shape", "column"), ("formation.drones", "64")]);
     assert_eq!(column.timeout_s(), (2.0 * (252.0 + 64.0 * 3.85_f64)).ceil());
     assert_eq!(of(&[("time.timeout_s", "7")]).timeout_s(), 7.0);
+    // While re-forming, drones fly at most at v + δ.
+    assert_eq!(of(&[]).reform_speed_max_mps(), 15.0);
+    let small = [("drone.speed_mps", "3"), ("drone.speed_change_mps", "2"), ("drone.speed_max_mps", "4")];
+    assert_eq!((of(&small[..2]).reform_speed_max_mps(), of(&small).reform_speed_max_mps()), (5.0, 4.0));
+    assert_eq!(of(&[("mission.reform_speed_max_mps", "20")]).reform_speed_max_mps(), 20.0);
 }
 
 #[test]

@@ -54,7 +54,11 @@ fn change(scenario: &mut Scenario, rng: &mut SplitMix64) {
             let obstacle = &mut scenario.obstacles[rng.integer(0, obstacles - 1) as usize];
             if rng.integer(0, 1) == 0 { shift(obstacle, rng, shift_m) } else { resize(obstacle, rng) }
         }
-        _ => scale(&mut scenario.mission.reform_speed_max_mps, rng),
+        _ => {
+            let mut reform_mps = scenario.reform_speed_max_mps();
+            scale(&mut reform_mps, rng);
+            scenario.mission.reform_speed_max_mps = Some(reform_mps);
+        }
     }
 }
 
