@@ -21,18 +21,20 @@ use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::{OwnPlan, Straggler};
 use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S, SILENT_DRONE_RADIUS};
+use bytemuck::Zeroable;
 use skein_leader::candidates::MAX_ROLLOUT_DRONES;
-use skein_leader::cost::Flight;
+use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::leading::Leading;
 use skein_leader::ledger::Ledger;
 use skein_leader::member::Member;
+use skein_leader::obstacles::set_ids;
 use skein_leader::own_state::OwnState;
 use skein_leader::params::{Objective, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
-use skein_protocol::payload::{MAX_PLACES, Plan, QueuePlace, set_tag};
+use skein_protocol::payload::{Assignment, MAX_PLACES, Plan, QueuePlace, set_tag};
 use skein_protocol::{DroneId, Message, MessageRef, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
 
 /// The pilot of one drone, composed of machines that each own their state.
@@ -468,6 +470,23 @@ impl RolloutPilot for SwarmPilot {
 
     fn plan(&self) -> Option<&Plan> {
         self.leading.obeyed().map(|bundle| &bundle.plan)
+    }
+
+    fn part_past(&self, set: u32) -> Option<Assignment> {
+        let planned = self.leading.planned_sets().iter().find(|planned| planned.tag == set)?;
+        planned.parts.get(self.params.me).copied()
+    }
+
+    fn own_part(&self, plan: &Plan, position: Vec2) -> Assignment {
+        let (drone, ids) = (self.params.me, set_ids(&plan.set, plan.set_count));
+        let planner = &self.params.planner;
+        let shortest_of = |shapes: Vec<_>| {
+            let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: planner.course_y_m };
+            shortest(&trips(&[], &Routes::new(&shapes, &planner.routes), position, &flight)) as u16
+        };
+        let route = || self.leading.obstacles().shapes(ids).map_or(0, shortest_of);
+        let new = || Assignment { drone, leader: DroneId::NONE, route: route(), ..Assignment::zeroed() };
+        self.part_past(set_tag(ids)).unwrap_or_else(new)
     }
 
     fn slot(&self) -> Option<Vec2> {

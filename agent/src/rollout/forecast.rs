@@ -8,7 +8,7 @@ const ROUNDING: f64 = 1e-6;
 /// What one alternative leads to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
-    /// Whether all drones arrived and kept their distances.
+    /// Whether all drones arrived, kept their distances and flew the plan as it was ordered.
     pub good: bool,
     /// Cost by the objective, until the mission's end.
     pub cost: f64,

@@ -2,7 +2,7 @@
 
 use skein_leader::plan_bundle::PlanBundle;
 use skein_pilot::Pilot;
-use skein_protocol::payload::Plan;
+use skein_protocol::payload::{Assignment, Plan};
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
 
 /// A pilot that can be simulated: it can be cloned, given a plan, and asked what it makes of the plan.
@@ -21,6 +21,13 @@ pub trait RolloutPilot: Pilot + Clone {
 
     /// The plan that it obeys.
     fn plan(&self) -> Option<&Plan>;
+
+    /// Its assignment past the obstacle set with this tag; `None` if it has none.
+    fn part_past(&self, set: u32) -> Option<Assignment>;
+
+    /// Its assignment in a plan past an obstacle set that gives it none, being at `position` (world frame, m): the one that it
+    /// has for the set, or else the shortest route.
+    fn own_part(&self, plan: &Plan, position: Vec2) -> Assignment;
 
     /// Its slot in that plan, relative to the plan's anchor, m.
     fn slot(&self) -> Option<Vec2>;

@@ -6,12 +6,14 @@ use crate::rollout::params::RolloutParams;
 use crate::rollout::pilot::RolloutPilot;
 use crate::tuning::ROLLOUT_HORIZON_S;
 use skein_leader::geometry::nearest;
+use skein_leader::obstacles::set_ids;
 use skein_leader::params::{Destination, Objective};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_pilot::{Heard, Inbox, Out};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
 use skein_protocol::energy::{CHEAPEST_MPS, power_w};
 use skein_protocol::formation::HOLD_SPEED_MPS;
+use skein_protocol::payload::{Assignment, set_tag};
 use skein_protocol::{DroneId, Message, Phase, PlanStamp, SimTime, Vec2, horizontal, raised};
 
 /// One simulated drone.
@@ -62,6 +64,9 @@ pub(crate) struct RolloutSwarm<P> {
     path_s: f64,
     /// Whether all distances have been kept so far.
     safe: bool,
+    /// The plan that this swarm was given, and whether it has been flown as given so far.
+    ordered: Option<PlanBundle>,
+    as_ordered: bool,
 }
 
 impl<P: RolloutPilot> RolloutSwarm<P> {
@@ -87,6 +92,8 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
             pass_s: None,
             path_s: 0.0,
             safe: true,
+            ordered: None,
+            as_ordered: true,
         };
         swarm.obey(bundle);
         let gates = swarm.drones.iter().map(|drone| drone.pilot.last_gate_x_m());
@@ -94,11 +101,21 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         swarm
     }
 
-    /// Lets all drones obey a plan at once. The tick or two that its messages would take make no difference.
+    /// Lets all drones obey a plan at once. The tick or two that its messages would take make no difference. A drone that the plan
+    /// leaves out, because another leader's plan has brought it past the set, keeps its route: a drone without a part would
+    /// call an election, and the new leader would plan anew.
     fn obey(&mut self, bundle: &PlanBundle) {
         let newest = self.drones.iter().map(|drone| drone.pilot.newest_stamp()).max().unwrap_or_default();
         let mut bundle = bundle.clone();
         bundle.plan.stamp = self.now;
+        if bundle.plan.phase() == Phase::Avoid {
+            let left_out = self.drones.iter().filter(|drone| !bundle.parts.contains(drone.pilot.id()));
+            let kept: Vec<Assignment> =
+                left_out.map(|drone| drone.pilot.own_part(&bundle.plan, drone.position)).collect();
+            for part in kept {
+                bundle.parts.add(part);
+            }
+        }
         bundle.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });
         for drone in &mut self.drones {
             drone.pilot.obey(self.now, bundle.clone());
@@ -115,7 +132,20 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         let mut swarm = Self { start: self.now, energy_j: 0.0, ..self.clone() };
         swarm.path_s = bundle.parts.iter().map(|part| part.arrival_s).sum::<f64>() / bundle.parts.len().max(1) as f64;
         swarm.obey(bundle);
+        swarm.ordered = (bundle.plan.phase() == Phase::Avoid).then(|| bundle.clone());
         swarm
+    }
+
+    /// Whether every drone that is still before the gate has the route that the plan ordered. If the simulated leaders plan
+    /// anew, the forecast is not one of this plan.
+    fn keeps_order(&self) -> bool {
+        let Some(ordered) = &self.ordered else { return true };
+        let tag = set_tag(set_ids(&ordered.plan.set, ordered.plan.set_count));
+        self.drones.iter().filter(|drone| drone.position.x < self.gate_x_m).all(|drone| {
+            let given = ordered.parts.get(drone.pilot.id()).map(|part| part.route);
+            let flown = drone.pilot.part_past(tag).map(|part| part.route);
+            given.is_none() || flown.is_none() || given == flown
+        })
     }
 
     /// Simulates one step of all drones. `shapes`: the obstacles.
@@ -192,6 +222,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
     /// exceed `limit`.
     pub(crate) fn forecast(&mut self, objective: &Objective, limit: f64) -> Option<Forecast> {
         let elapsed_s = self.now.since(self.start);
+        self.as_ordered &= self.pass_s.is_some() || self.keeps_order();
         if self.pass_s.is_none() && self.drones.iter().all(|drone| drone.position.x >= self.gate_x_m) {
             self.pass_s = Some(elapsed_s);
         }
@@ -200,7 +231,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         let energy_j = self.energy_j + count * power_w(self.params.speed_mps) * rest_s;
         let end_s = elapsed_s + rest_s;
         let cost = objective.cost(energy_j, end_s);
-        let good = cruise_s.is_some() && self.safe;
+        let good = cruise_s.is_some() && self.safe && self.as_ordered;
         let pass_s = self.pass_s.unwrap_or(elapsed_s);
         let least_s = self.least_remaining_s();
         let least = objective.cost(self.energy_j + count * power_w(CHEAPEST_MPS) * least_s, elapsed_s + least_s);

@@ -42,6 +42,14 @@ impl RolloutPilot for Straight {
         self.obeyed.as_ref()
     }
 
+    fn part_past(&self, _set: u32) -> Option<Assignment> {
+        None
+    }
+
+    fn own_part(&self, _plan: &Plan, _position: Vec2) -> Assignment {
+        Assignment::zeroed()
+    }
+
     fn slot(&self) -> Option<Vec2> {
         Some(Vec2::zeros())
     }
