@@ -1,5 +1,8 @@
-//! Random scenes: a formation and obstacles that follow from a seed alone. Start and end lie clear of all obstacles in
-//! an unbounded plane, so a free path always exists.
+//! Random scenes: a formation, obstacles and a destination that follow from a seed alone. Start and end lie clear of all
+//! obstacles in an unbounded plane, so a free path always exists.
+//!
+//! The destination is drawn without looking at the obstacles. It lies beyond the whole field in which obstacles may be, so
+//! it tells a swarm neither how many obstacles there are nor which one is the last.
 
 use crate::error::SceneError;
 use crate::splitmix::SplitMix64;
@@ -52,6 +55,17 @@ const CLOSED: f64 = 0.9;
 /// decide whether it is open.
 const OPEN: f64 = 1.2;
 
+/// The field in which obstacles may be begins at this abscissa, m.
+const FIELD_M: f64 = 120.0;
+/// The least length of the field, m, and the range of what each obstacle adds to it, m.
+const FIELD_LENGTH_M: (f64, [f64; 2]) = (80.0, [50.0, 250.0]);
+/// An obstacle reaches at most this far from its centre, m.
+const REACH_M: f64 = 100.0;
+/// Room that is drawn between the field and the destination, m.
+const ROOM_M: [f64; 2] = [0.0, 400.0];
+/// Key of the stream from which the destination is drawn, beside those of the attempts.
+const DESTINATIONS: u64 = 0xde57_0000;
+
 /// Attempts to place one obstacle before the scene is drawn again.
 const PLACES: usize = 32;
 /// Attempts to draw a scene before giving up.
@@ -64,7 +78,8 @@ const SCENES: u64 = 64;
 pub fn scene_toml(seed: u64, bounds: SceneBounds) -> Result<String, SceneError> {
     let mut last = None;
     for attempt in 0..SCENES {
-        let Some(text) = scene(&mut SplitMix64::keyed(seed, attempt), seed, bounds) else { continue };
+        let room_m = SplitMix64::keyed(seed, DESTINATIONS + attempt).between(ROOM_M[0], ROOM_M[1]);
+        let Some(text) = scene(&mut SplitMix64::keyed(seed, attempt), seed, bounds, room_m) else { continue };
         match parse(seed, &text, &[]) {
             Ok(_) => return Ok(text),
             Err(error) => last = Some(error),
@@ -98,8 +113,8 @@ struct Extent {
     depth_m: f64,
 }
 
-/// One attempt at a scene; `None` if an obstacle found no place.
-fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds) -> Option<String> {
+/// One attempt at a scene; `None` if an obstacle found no place. `room_m`: between the field and the destination, m.
+fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds, room_m: f64) -> Option<String> {
     let drones = rng.integer(bounds.drones[0], bounds.drones[1]);
     let shape = rng.one(&["nested-v", "v", "line", "column", "grid", "circle"]);
     let safe_m = rng.between(20.0, 40.0).round();
@@ -108,9 +123,8 @@ fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds) -> Option<String>
     let count = rng.integer(bounds.obstacles[0], bounds.obstacles[1]);
     let extent = extent(shape, drones, spacing_m);
     let obstacles = obstacles(rng, count, extent.half_width_m)?;
-    let rear_m = obstacles.iter().map(|obstacle| obstacle.shape.bounds().1.x).fold(0.0, f64::max);
-    // Where the formation comes to rest: its last slot is beyond the last obstacle's planning distance.
-    let end_x_m = (rear_m + PLANNING_M + extent.depth_m + 20.0).ceil();
+    // Where the formation comes to rest: its last slot is beyond the planning distance of any obstacle that there may be.
+    let end_x_m = (field_end_m(bounds) + room_m + PLANNING_M + extent.depth_m).ceil();
     let mission = match rng.integer(0, 2) {
         0 => format!("end = \"goal\"\ngoal_m = [{end_x_m}, 0]"),
         _ => format!("end = \"hold\"\nstop_x_m = {end_x_m}"),
@@ -126,6 +140,12 @@ fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds) -> Option<String>
         text.push_str(&obstacle.toml);
     }
     Some(text)
+}
+
+/// Abscissa behind which no scene within these bounds has an obstacle, m.
+fn field_end_m(bounds: SceneBounds) -> f64 {
+    let (least_m, [_, each_m]) = FIELD_LENGTH_M;
+    FIELD_M + least_m + each_m * f64::from(bounds.obstacles[1]) + REACH_M
 }
 
 fn extent(shape: &str, drones: u32, spacing_m: f64) -> Extent {
@@ -148,12 +168,13 @@ fn extent(shape: &str, drones: u32, spacing_m: f64) -> Extent {
 /// Places the obstacles across the formation's course: at least 80 m ahead of the front slot, and over a length that
 /// grows with their number. `None` if an obstacle found no place.
 fn obstacles(rng: &mut SplitMix64, count: u32, half_width_m: f64) -> Option<Vec<PlacedObstacle>> {
-    let reach_m = 80.0 + rng.between(50.0, 250.0) * f64::from(count);
+    let (least_m, each_m) = FIELD_LENGTH_M;
+    let reach_m = least_m + rng.between(each_m[0], each_m[1]) * f64::from(count);
     let across_m = half_width_m.max(60.0);
     let mut placed: Vec<PlacedObstacle> = Vec::new();
     for _ in 0..count {
         let found = (0..PLACES).find_map(|_| {
-            let centre = Vec2::new(rng.between(120.0, 120.0 + reach_m), rng.between(-across_m, across_m));
+            let centre = Vec2::new(rng.between(FIELD_M, FIELD_M + reach_m), rng.between(-across_m, across_m));
             let new = obstacle(rng, tenths(centre))?;
             let ahead = new.shape.bounds().0.x >= 80.0;
             let fits = ahead && placed.iter().all(|other| gap_is_clear_cut(&new.shape, &other.shape));
@@ -240,6 +261,29 @@ mod tests {
         }
         let again = || scene_toml(7, SceneBounds::default()).unwrap();
         assert_eq!(again(), again());
+    }
+
+    #[test]
+    fn the_destination_is_drawn_without_the_obstacles_and_lies_beyond_all_of_them() {
+        let bounds = SceneBounds::default();
+        let mut rooms = Vec::new();
+        for seed in 1..=200 {
+            let scenario = random_scene(seed, bounds, &[]).unwrap();
+            let front_m = scenario.mission.goal_m.map_or(scenario.mission.stop_x_m, |goal| goal[0]);
+            let last_m = front_m + scenario.slots().iter().map(|slot| slot.x).fold(0.0, f64::min);
+            let room_m = last_m - field_end_m(bounds);
+            assert!((PLANNING_M..=PLANNING_M + ROOM_M[1] + 1.0).contains(&room_m), "seed {seed}: {room_m} m");
+            let rear_m = scenario.shapes().unwrap().iter().map(|shape| shape.bounds().1.x).fold(0.0, f64::max);
+            assert!(rear_m <= field_end_m(bounds), "seed {seed}: an obstacle ends at {rear_m} m");
+            rooms.push((room_m, rear_m));
+        }
+        let mean = |of: fn(&(f64, f64)) -> f64| rooms.iter().map(of).sum::<f64>() / rooms.len() as f64;
+        let (room_m, rear_m) = (mean(|pair| pair.0), mean(|pair| pair.1));
+        let covariance: f64 = rooms.iter().map(|pair| (pair.0 - room_m) * (pair.1 - rear_m)).sum();
+        let squares =
+            |of: fn(&(f64, f64)) -> f64, mean: f64| rooms.iter().map(|pair| (of(pair) - mean).powi(2)).sum::<f64>();
+        let correlation = covariance / (squares(|pair| pair.0, room_m) * squares(|pair| pair.1, rear_m)).sqrt();
+        assert!(correlation.abs() < 0.2, "{correlation}");
     }
 
     #[test]
