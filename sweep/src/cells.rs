@@ -3,7 +3,7 @@
 use crate::grid::Grid;
 use crate::metrics::{METRICS, SUCCESS, own_name};
 use crate::row::{Row, own_names};
-use crate::statistics::{Estimate, mean, rate};
+use crate::statistics::{Estimate, failures_at_most, mean, rate};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -41,6 +41,14 @@ impl Cell {
         }
     }
 
+    /// If no run failed: at most this share of runs fails, with 95 % confidence. `None` if one failed, or if all runs are one
+    /// flight.
+    #[must_use]
+    pub fn failures_at_most(&self) -> Option<f64> {
+        let success = self.success.filter(|success| self.equal == 0 && success.mean == 1.0)?;
+        failures_at_most(success.n)
+    }
+
     /// The cell as it stands in summary.json.
     pub(crate) fn json(&self, keys: &[&str]) -> Value {
         let grid: Map<String, Value> =
@@ -50,7 +58,8 @@ impl Cell {
         json!({
             "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
             "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
-            "equal_digests": self.equal > 0, "success": self.success, "metrics": metrics, "metrics_own": self.metrics_own,
+            "equal_digests": self.equal > 0, "success": self.success,
+            "failures_at_most": self.failures_at_most(), "metrics": metrics, "metrics_own": self.metrics_own,
         })
     }
 }
@@ -72,7 +81,7 @@ pub(crate) fn cells(grid: &Grid<'_>, rows: &[Row]) -> Vec<Cell> {
 }
 
 /// Whether these are at least two runs, all flown, with equal digests.
-fn are_equal(rows: &[Row]) -> bool {
+pub(crate) fn are_equal(rows: &[Row]) -> bool {
     let first = rows[0].digest.as_ref();
     rows.len() > 1 && first.is_some() && rows.iter().all(|row| row.digest.as_ref() == first)
 }

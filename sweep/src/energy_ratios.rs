@@ -1,9 +1,11 @@
 //! Energy ratios: the energy of each run over that of `shortest-path` on the same mission with the same seed.
 
+use crate::cells::are_equal;
 use crate::error::SweepError;
 use crate::grid::Grid;
 use crate::metrics::METRICS;
 use crate::row::Row;
+use crate::statistics::{self, Estimate, rate};
 use serde_json::{Value, json};
 use skein_report::plot::sweep::{Lines, Point, Series};
 use std::fmt::Write as _;
@@ -37,6 +39,8 @@ pub struct EnergyRatios {
     pub strategy: String,
     /// Ascending by ratio. Seeds with which not both strategies reached the goal are left out.
     pub by_ratio: Vec<SeedRatio>,
+    /// Whether neither strategy's runs differ by seed: then no estimate has an interval.
+    pub equal: bool,
 }
 
 /// The ratios of each strategy except the reference. Empty if the reference or any other strategy was not flown.
@@ -53,7 +57,8 @@ pub(crate) fn energy_ratios(grid: &Grid<'_>, rows: &[Row]) -> Vec<EnergyRatios> 
         let by_ratio = seed_ratios(grid, group, reference);
         let combination = grid.job(group[0].job).0;
         let (scenario, values) = (grid.scenario_name(combination), combination.values.clone());
-        (!by_ratio.is_empty()).then(|| EnergyRatios { scenario, values, strategy: strategy(group), by_ratio })
+        let equal = are_equal(group) && are_equal(reference);
+        (!by_ratio.is_empty()).then(|| EnergyRatios { scenario, values, strategy: strategy(group), by_ratio, equal })
     };
     groups.iter().filter(|group| strategy(group) != REFERENCE).filter_map(against).collect()
 }
@@ -72,17 +77,22 @@ fn seed_ratios(grid: &Grid<'_>, rows: &[Row], reference: &[Row]) -> Vec<SeedRati
 }
 
 impl EnergyRatios {
-    /// Mean of the ratios.
+    /// Mean of the ratios, with its interval; `None` if there are no ratios.
     #[must_use]
-    pub fn mean(&self) -> f64 {
-        self.by_ratio.iter().map(|pair| pair.ratio).sum::<f64>() / self.by_ratio.len() as f64
+    pub fn mean(&self) -> Option<Estimate> {
+        let ratios: Vec<f64> = self.by_ratio.iter().map(|pair| pair.ratio).collect();
+        statistics::mean(&ratios).map(|found| self.valid(found))
     }
 
-    /// Share of the runs that took at most 1 % more energy than the reference.
+    /// Share of the runs that took at most 1 % more energy than the reference, with its interval; `None` if there are none.
     #[must_use]
-    pub fn within_one_percent(&self) -> f64 {
+    pub fn within_one_percent(&self) -> Option<Estimate> {
         let within = self.by_ratio.iter().filter(|pair| pair.ratio <= ONE_PERCENT_WORSE).count();
-        within as f64 / self.by_ratio.len() as f64
+        rate(within, self.by_ratio.len()).map(|found| self.valid(found))
+    }
+
+    fn valid(&self, found: Estimate) -> Estimate {
+        if self.equal { found.without_interval() } else { found }
     }
 
     /// The ten worst seeds, worst first.
@@ -92,11 +102,14 @@ impl EnergyRatios {
 
     /// The ratios as they stand in summary.json.
     pub(crate) fn json(&self) -> Value {
+        let (mean, within) = (self.mean(), self.within_one_percent());
         let worst: Vec<Value> = self.worst().map(|pair| json!({ "seed": pair.seed, "ratio": pair.ratio })).collect();
         json!({
             "scenario": self.scenario, "grid": self.values, "strategy": self.strategy, "metric": METRIC,
-            "reference": REFERENCE, "n": self.by_ratio.len(), "mean": self.mean(),
-            "at_most_1_percent_worse": self.within_one_percent(), "worst": worst,
+            "reference": REFERENCE, "n": self.by_ratio.len(), "mean": mean.map(|found| found.mean),
+            "interval": mean.and_then(|found| found.interval()),
+            "at_most_1_percent_worse": within.map(|found| found.mean),
+            "at_most_1_percent_worse_interval": within.and_then(|found| found.interval()), "worst": worst,
         })
     }
 }
@@ -107,15 +120,22 @@ pub(crate) fn text(all: &[EnergyRatios]) -> String {
     for ratios in all {
         let at = std::iter::once(&ratios.scenario).chain(&ratios.values).map(String::as_str).collect::<Vec<_>>();
         let worst: Vec<String> = ratios.worst().map(|pair| format!("{} ({:.3})", pair.seed, pair.ratio)).collect();
+        let (Some(mean), Some(within)) = (ratios.mean(), ratios.within_one_percent()) else { continue };
+        let ends = |found: Estimate, scale: f64, digits: usize| {
+            let ends = found.interval().map(|ends| ends.map(|end| format!("{:.digits$}", end * scale)));
+            ends.map_or_else(String::new, |[low, high]| format!(" [{low}, {high}]"))
+        };
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{}, {}: energy / {REFERENCE} {:.4} on average over {} seeds, at most 1 % worse in {:.1} %, worst seeds {}",
+            "{}, {}: energy / {REFERENCE} {:.4}{} on average over {} seeds, at most 1 % worse in {:.1} %{}, worst seeds {}",
             at.join(" "),
             ratios.strategy,
-            ratios.mean(),
+            mean.mean,
+            ends(mean, 1.0, 4),
             ratios.by_ratio.len(),
-            100.0 * ratios.within_one_percent(),
+            100.0 * within.mean,
+            ends(within, 100.0, 1),
             worst.join(" ")
         );
     }
@@ -197,7 +217,10 @@ mod tests {
         let all = energy_ratios(&grid, &rows);
         assert_eq!(all.len(), 1);
         assert_eq!(all[0].by_ratio, [SeedRatio { seed: 7, ratio: 0.9 }, SeedRatio { seed: 8, ratio: 1.1 }]);
-        assert!((all[0].mean() - 1.0).abs() < 1e-12 && (all[0].within_one_percent() - 0.5).abs() < 1e-12);
+        let (mean, within) = (all[0].mean().unwrap(), all[0].within_one_percent().unwrap());
+        assert!((mean.mean - 1.0).abs() < 1e-12 && (within.mean - 0.5).abs() < 1e-12);
+        // 0.9, 1.1: standard deviation 0.1414, 12.7062 · 0.1414 / √2 = 1.2706.
+        assert!((mean.interval().unwrap()[1] - 2.2706).abs() < 1e-3 && within.interval().is_some(), "{mean:?}");
         assert_eq!(all[0].json()["worst"][0]["seed"], 8);
         assert_eq!(csv(&all, &[]).lines().nth(1), Some("random,congestion-aware,7,0.9"));
         assert!(text(&all).contains("worst seeds 8 (1.100) 7 (0.900)"));

@@ -100,7 +100,7 @@ fn brief(values: &[String]) -> Vec<String> {
 }
 
 /// Label of a metric on a plot's axis, and the factor to its unit there: energies are in kJ.
-fn unit(metric: &str) -> (String, f64) {
+pub(crate) fn unit(metric: &str) -> (String, f64) {
     let label = label(metric);
     match label.strip_suffix("(J)") {
         Some(energy) => (format!("{energy}(kJ)"), 1e-3),

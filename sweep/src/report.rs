@@ -6,6 +6,7 @@ use crate::error::SweepError;
 use crate::experiment::Mission;
 use crate::grid::Grid;
 use crate::metrics::{DEFAULT, METRICS, OWN_PREFIX, SUCCESS};
+use crate::paired::{self, PairedDifference, paired};
 use crate::plots::{Plot, plots};
 use crate::row::{Row, own_names, write_csv};
 use crate::table::table;
@@ -23,13 +24,17 @@ pub struct SweepReport<'a> {
     rows: Vec<Row>,
     cells: Vec<Cell>,
     ratios: Vec<EnergyRatios>,
+    paired: Vec<PairedDifference>,
 }
 
 impl<'a> SweepReport<'a> {
     /// Evaluates the rows of all runs, which may be in any order.
     pub(crate) fn new(grid: &'a Grid<'a>, mut rows: Vec<Row>) -> Self {
         rows.sort_by_key(|row| row.job);
-        Self { grid, cells: cells(grid, &rows), ratios: energy_ratios(grid, &rows), rows }
+        let (cells, ratios) = (cells(grid, &rows), energy_ratios(grid, &rows));
+        let mut report = Self { grid, rows, cells, ratios, paired: Vec::new() };
+        report.paired = paired(grid, &report.rows, &report.metrics());
+        report
     }
 
     /// One row for each run, in the order of the jobs.
@@ -50,6 +55,12 @@ impl<'a> SweepReport<'a> {
         &self.ratios
     }
 
+    /// Each strategy against each other one, in the metrics of the table.
+    #[must_use]
+    pub fn paired(&self) -> &[PairedDifference] {
+        &self.paired
+    }
+
     /// The content of summary.json.
     #[must_use]
     pub fn summary(&self) -> Value {
@@ -60,6 +71,7 @@ impl<'a> SweepReport<'a> {
             "seeds": experiment.seeds, "keys": keys,
             "cells": self.cells.iter().map(|cell| cell.json(&keys)).collect::<Vec<Value>>(),
             "ratios": self.ratios.iter().map(EnergyRatios::json).collect::<Vec<Value>>(),
+            "paired": self.paired.iter().map(PairedDifference::json).collect::<Vec<Value>>(),
         })
     }
 
@@ -99,6 +111,7 @@ impl<'a> SweepReport<'a> {
         let mut all = plots(experiment, &self.cells, &self.in_order())?;
         let ratios = energy_ratios::figure(&experiment.name, &self.ratios)?;
         all.extend(ratios.map(|svg| Plot { file: "ratios.svg".to_owned(), svg }));
+        all.extend(paired::plots(experiment, &self.paired)?);
         Ok(all)
     }
 
@@ -121,11 +134,11 @@ impl<'a> SweepReport<'a> {
         metrics
     }
 
-    /// The results as a text table, followed by the energy ratios.
+    /// The results as a text table, followed by the energy ratios and the paired differences of the strategies.
     #[must_use]
     pub fn table(&self) -> String {
         let table = table(&self.cells, &self.grid.keys(), &self.metrics());
-        table + &energy_ratios::text(&self.ratios)
+        table + &energy_ratios::text(&self.ratios) + &paired::text(&self.paired)
     }
 }
 

@@ -53,6 +53,13 @@ pub fn rate(successes: usize, n: usize) -> Option<Estimate> {
     Some(Estimate { n, mean: p, low: Some(low), high: Some(high), min, max })
 }
 
+/// With 95 % confidence, at most this share of runs fails if none of `n` has failed: the exact bound of Clopper and Pearson,
+/// 1 - 0.05^(1/n), which is close to 3 / n (the rule of three). `None` if `n` is 0.
+#[must_use]
+pub fn failures_at_most(n: usize) -> Option<f64> {
+    (n > 0).then(|| 1.0 - 0.05_f64.powf(1.0 / n as f64))
+}
+
 /// A mean with Student's t interval; `None` if there are no values. A single value has no interval.
 #[must_use]
 pub fn mean(values: &[f64]) -> Option<Estimate> {
@@ -99,6 +106,18 @@ mod tests {
         assert_eq!((all.mean, all.high), (1.0, Some(1.0)));
         assert!((all.low.unwrap() - 0.8865).abs() < 5e-5, "{all:?}");
         assert_eq!(rate(0, 0), None);
+    }
+
+    #[test]
+    fn without_a_failure_the_bound_is_that_of_clopper_and_pearson() {
+        // None of 10, 30, 1000: 25.89 %, 9.503 %, 0.2991 % (exact tables).
+        for (n, bound) in [(10, 0.2589), (30, 0.09503), (1000, 0.002991)] {
+            let found = failures_at_most(n).unwrap();
+            assert!((found - bound).abs() < 5e-5, "{n}: {found}");
+            // The chance of no failure at that share is 5 %.
+            assert!(((1.0 - found).powi(n as i32) - 0.05).abs() < 1e-9);
+        }
+        assert_eq!(failures_at_most(0), None);
     }
 
     #[test]

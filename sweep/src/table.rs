@@ -5,7 +5,7 @@ use crate::metrics::SUCCESS;
 use crate::statistics::Estimate;
 
 /// Greatest number of cells in the table. The others are in summary.json and the plots.
-const MAX_LINES: usize = 40;
+pub(crate) const MAX_LINES: usize = 40;
 
 /// The table. Each line is a cell: its scenario and strategy, the keys that vary, the number of runs, and the mean ± half
 /// the interval of each metric.
@@ -22,7 +22,12 @@ pub(crate) fn table(cells: &[Cell], keys: &[&str], metrics: &[String]) -> String
         line.extend(varying.iter().map(|&i| cell.values[i].clone()));
         let runs = cell.outcomes.values().sum::<usize>();
         line.push(if cell.equal > 0 { format!("{runs}, all equal") } else { runs.to_string() });
-        line.extend(metrics.iter().map(|name| shown(name, cell.estimate(name))));
+        let field = |name: &String| {
+            let bound = cell.failures_at_most().filter(|_| name == SUCCESS);
+            let bound = bound.map(|share| format!(", at most {:.1} % fail", 100.0 * share));
+            shown(name, cell.estimate(name)) + &bound.unwrap_or_default()
+        };
+        line.extend(metrics.iter().map(field));
         lines.push(line);
     }
     let columns = lines[0].len();
@@ -72,7 +77,7 @@ fn shown(name: &str, found: Option<Estimate>) -> String {
 }
 
 /// Rounds to four significant digits; digits before the point are all kept.
-fn brief(value: f64) -> String {
+pub(crate) fn brief(value: f64) -> String {
     let digits = if value == 0.0 { 0 } else { 3 - value.abs().log10().floor() as i32 };
     let text = format!("{value:.*}", digits.clamp(0, 4) as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
