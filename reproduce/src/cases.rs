@@ -1,13 +1,13 @@
 //! Names of the strategies, geometries and scenarios that are flown, and the seeds of jittered starts.
 
-/// The strategy that follows the paper to the letter.
+/// The strategy that follows the paper's rule: the default.
 pub const PAPER: &str = "congestion-aware-paper";
 /// The strategy that the paper compares with.
 pub const SHORTEST: &str = "shortest-path";
-/// The default strategy.
-pub const DEFAULT: &str = "congestion-aware";
+/// The strategy in which the leader looks ahead by simulation.
+pub const LOOK_AHEAD: &str = "congestion-aware";
 /// These three, in the order of the tables.
-pub(crate) const STRATEGIES: [&str; 3] = [PAPER, DEFAULT, SHORTEST];
+pub(crate) const STRATEGIES: [&str; 3] = [PAPER, LOOK_AHEAD, SHORTEST];
 /// The geometries, which were found by search because the paper gives none.
 pub(crate) const GEOMETRIES: [&str; 3] = ["s1", "s2", "s3b"];
 /// Where the obstacle is, seen in the direction of flight.

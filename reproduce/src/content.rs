@@ -1,7 +1,7 @@
 //! The text of the report.
 
 use crate::block::Block;
-use crate::cases::{DEFAULT, DRONES, GEOMETRIES, PAPER, PLACEMENTS, SHORTEST, fixed, jittered, seeds};
+use crate::cases::{DRONES, GEOMETRIES, LOOK_AHEAD, PAPER, PLACEMENTS, SHORTEST, fixed, jittered, seeds};
 use crate::figures::Figure;
 use crate::flight::{Flight, JITTER_M};
 use crate::forest::Forest;
@@ -90,10 +90,10 @@ fn opening(results: &Results, quick: bool) -> Vec<Block> {
     vec![
         Block::Text(format!(
             "{count} flights by the inline runtime, which gives the same digests as one process per drone. `{PAPER}` is \
-             the paper's rule to the letter; the paper compares it with `{SHORTEST}`; `{DEFAULT}` is the default. Means are \
-             over {seeds} starts of {scenarios}. In each start, every drone is displaced by up to {JITTER_M} m in a random \
+             the paper's rule and the default; the paper compares it with `{SHORTEST}`; `{LOOK_AHEAD}` looks ahead by simulation. \
+             Means are over {seeds} starts of {scenarios}. In each start, every drone is displaced by up to {JITTER_M} m in a random \
              direction. Brackets hold 95 % intervals (Student). `results.csv` lists all flights, each with the command that \
-             repeats it. `reproduction.json` holds the rows of all tables. `forest` holds the recorded forest mission."
+             repeats it. `reproduction.json` holds the rows of all tables. `forest` and `distribution` hold the recorded missions."
         )),
         Block::Text(
             "Time to pass is the paper's cost: from the first detection of the obstacle until the last drone is past \
@@ -112,7 +112,7 @@ fn differences(rows: &[Row]) -> Vec<Block> {
     blocks
 }
 
-fn ambiguities() -> [String; 2] {
+fn ambiguities() -> [String; 5] {
     [
         "Missing geometry. The paper gives neither the sizes of formation and obstacles nor the detection range or the safe \
          distance. S1, S2, S3b and the forest were found by a search for geometries that give the published numbers. So it \
@@ -122,6 +122,23 @@ fn ambiguities() -> [String; 2] {
          takes the longer side. In our flights the majority takes the shorter side, as the cost demands. For a swarm that \
          is its own mirror image, the published labels are read as mirrored. Splits in the tables have the paper's labels, \
          so that they can be compared. `results.csv` has them as flown, from left to right."
+            .to_owned(),
+        "The speed while re-forming. The ratio of R4 depends on `mission.reform_speed_max_mps`, which the paper does not give: \
+         it says v ± δ, and never above 20 m/s. The scenario files have 20 m/s in S1 and the forest, 15 m/s in S2, and 10 m/s in \
+         S3b. These values were fitted together with the geometry. The default of the key is v + δ = 15 m/s, which is what S2 has. \
+         A table below has the ratio with each cap. δ itself is used only to slow down in a queue and to catch up while re-forming."
+            .to_owned(),
+        "Where our rule is not the paper's text. The time of an assignment is computed from arrivals at nominal speed and a \
+         headway, not by simulating each assignment; the best assignment is found exactly by matching, not by trying all. Paths \
+         are our own: the shortest ones round the obstacles, which are widened by the planning distance. Reformation assigns slots \
+         with the least sum of squared distances; the paper's TPS mapping is `mission.reformation = \"tps\"`. The target shape \
+         is read from the scenario and does not change with the state. A drone in the danger zone takes a way of its own only if \
+         no plan covers the obstacle, which does not occur in these flights. Precedence in a queue is the order of arrival when \
+         the plan is made, and is then kept; in the paper the drone that is farthest ahead has precedence at any time. With a fixed \
+         order no two drones exchange their places while messages are under way."
+            .to_owned(),
+        "Between the two sets of the forest our groups close up to the full formation. In the paper, N1 and N2 split again as \
+         soon as they are past the first set."
             .to_owned(),
     ]
 }
@@ -174,7 +191,9 @@ fn assumptions() -> [String; 2] {
              for jitter: its slots are 35 m apart, and its safe distance is 33 m."
         ),
         "Assumptions. As in the paper, these flights have no delay, no loss and no time to compute. But a message takes one \
-         tick of 20 ms, and drones know of each other by beacons."
+         tick of 20 ms, and drones know of each other by beacons. A drone that senses any part of an obstacle knows its whole \
+         shape. The clocks of all drones agree. Power follows from the speed over ground, in still air, and acceleration costs \
+         nothing."
             .to_owned(),
     ]
 }
@@ -194,7 +213,8 @@ fn fastest(results: &Results) -> String {
     };
     let best: Vec<String> = scenarios.filter_map(best).collect();
     format!(
-        "The rule takes the split with the least forecast. Another split may be the fastest one as flown (left/right): {}.",
+        "The rule takes the split with the least forecast. Another split may be the fastest one as flown (left/right); the table \
+         above has both: {}.",
         best.join("; ")
     )
 }

@@ -3,12 +3,10 @@
 use crate::cases::PAPER;
 use crate::error::ReproduceError;
 use crate::flight::Flight;
-use skein_protocol::record::Outcome;
+use crate::recording::Recording;
 use skein_report::deviation::{self, ShapeDeviation};
 use skein_report::plot::reproduce::Snapshots;
-use skein_report::{Manifest, Recorder, RunCompletion, RunFacts, RunFolder, Summary, plot};
-use skein_runtime::run_facts::run_facts;
-use skein_runtime::{PilotRegistry, RuntimeError, inline};
+use skein_report::{RunFacts, RunFolder, Summary, plot};
 use skein_sweep::Interrupted;
 use std::path::{Path, PathBuf};
 
@@ -42,27 +40,9 @@ pub(crate) struct Forest {
 impl Forest {
     /// Flies the mission with the paper's rule and records it in this folder, which may hold an earlier recording.
     pub(crate) fn record(path: &Path, interrupted: &Interrupted<'_>) -> Result<Self, ReproduceError> {
-        let scenario = Flight::new("forest", PAPER).resolve()?;
-        let facts = run_facts(&scenario, "inline", "lockstep").map_err(RuntimeError::Shape)?;
-        let folder = RunFolder::at(path, true).map_err(ReproduceError::Folder)?;
-        let commit = option_env!("SKEIN_COMMIT").map(str::to_owned);
-        let resolved = serde_json::to_value(&scenario)?;
-        let manifest = Manifest::new(facts.clone(), resolved, env!("CARGO_PKG_VERSION"), commit);
-        folder.begin(&manifest)?;
-        let mut recorder = Recorder::in_folder(facts.clone(), &folder)?;
-        let end = inline::run(&scenario, &PilotRegistry::built_in()?, &mut recorder, interrupted)?;
-        let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: None, startup_s: Some(end.startup_s) };
-        let (summary, record) = recorder.finish(&completion);
-        folder.write_summary(&summary)?;
+        let Recording { facts, summary, folder } = Recording::make(path, &Flight::new("forest", PAPER), interrupted)?;
         let stop = || interrupted().is_some();
         let stop = skein_report::Interrupted::when(&stop);
-        if let Some(record) = record {
-            record.write_files(&manifest, &stop)?;
-            record.remove()?;
-        }
-        if let Some(error) = end.sink_error {
-            return Err(ReproduceError::Record(error.to_string()));
-        }
         let plots = plots(&folder, &facts, &stop)?;
         let snapshots = Snapshots::read(&folder, &MOMENTS_S)?;
         let deviations = deviation::read(&folder)?;

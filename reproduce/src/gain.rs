@@ -1,7 +1,7 @@
 //! The gain of the rules over shortest path, as a surface over the obstacle's shift and the safe distance.
 
 use crate::block::Block;
-use crate::cases::{DEFAULT, PAPER, SHORTEST};
+use crate::cases::{LOOK_AHEAD, PAPER, SHORTEST};
 use crate::figures::Figure;
 use crate::flight::Flight;
 use crate::results::{Results, field};
@@ -12,7 +12,7 @@ use skein_report::plot::surface::Surface;
 use std::fmt::Write as _;
 
 /// Strategies whose gain is shown.
-const RULES: [&str; 2] = [PAPER, DEFAULT];
+const RULES: [&str; 2] = [PAPER, LOOK_AHEAD];
 /// Gains and losses below this count as none, %.
 const NONE: f64 = 0.1;
 
@@ -77,7 +77,7 @@ fn flight(Place { shift_m, distance_m }: Place, strategy: &str) -> Flight {
 
 /// The flights that the surface needs.
 pub(crate) fn flights(quick: bool) -> Vec<Flight> {
-    let strategies = [PAPER, DEFAULT, SHORTEST];
+    let strategies = [PAPER, LOOK_AHEAD, SHORTEST];
     Axes::new(quick).places().flat_map(|place| strategies.map(|strategy| flight(place, strategy))).collect()
 }
 

@@ -70,7 +70,7 @@ pub(crate) fn table(rows: &[Row]) -> Block {
 }
 
 /// What the verdicts mean.
-pub(crate) const MEANING: &str = "A number agrees if it is within 5 % of the published one; the least separation, if it is not below the \
+pub(crate) const MEANING: &str = "A number agrees if it is within 5 % of the published one; the least separation, if it is at least the \
     safe distance; the error, if it is not above the published one. The geometry was fitted to the published times, so an \
     agreement shows that the paper's rule can give its numbers, and not that the authors flew this geometry.";
 

@@ -1,6 +1,6 @@
 //! Means over flights with jittered starts.
 
-use crate::cases::{DEFAULT, PAPER, SHORTEST, jittered, seeds, title};
+use crate::cases::{LOOK_AHEAD, PAPER, SHORTEST, jittered, seeds, title};
 use crate::flight::Flight;
 use crate::results::Results;
 use crate::row::{Quantity, Row, pass_s};
@@ -100,8 +100,8 @@ fn one_obstacle() -> Vec<Mean> {
             words: "energy, congestion-aware",
             unit: "kJ",
             published: Value::Null,
-            strategies: &[DEFAULT],
-            of: |start| Some(start.energy(DEFAULT)? / 1e3),
+            strategies: &[LOOK_AHEAD],
+            of: |start| Some(start.energy(LOOK_AHEAD)? / 1e3),
         },
         Mean {
             id: "R4.{}.energy.shortest.jitter",

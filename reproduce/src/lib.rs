@@ -6,8 +6,8 @@
 //! value, ours, and the command that repeats it.
 //!
 //! The report's folder holds `report.md` and `report.html`, `reproduction.json` (the rows), `results.csv` (one line for
-//! each flight), `gain.csv` (the gain over shift and safe distance), `figures/*.svg`, and in `forest` the recorded forest
-//! mission, from which figures are drawn.
+//! each flight), `gain.csv` (the gain over shift and safe distance), `figures/*.svg`, and in `forest` and `distribution` the
+//! recorded missions from which figures are drawn.
 //!
 //! This crate does not print and does not watch signals: progress and interruption are callbacks. It knows no other
 //! missions than the paper's and those that are compared with them.
@@ -27,6 +27,7 @@
 mod block;
 mod cases;
 mod content;
+mod distribution;
 mod error;
 mod figures;
 mod findings;
@@ -37,6 +38,7 @@ mod gain;
 mod headline;
 mod jitter;
 mod page;
+mod recording;
 mod reproduction;
 mod results;
 mod row;
@@ -45,7 +47,7 @@ mod studies;
 mod study;
 mod table;
 
-pub use cases::{DEFAULT, PAPER, SHORTEST};
+pub use cases::{LOOK_AHEAD, PAPER, SHORTEST};
 pub use error::{MissionError, ReproduceError};
 pub use flight::Flight;
 pub use headline::text as headline;

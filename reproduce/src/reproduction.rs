@@ -2,8 +2,9 @@
 
 use crate::block::Block;
 use crate::content::{TITLE, content};
+use crate::distribution;
 use crate::error::ReproduceError;
-use crate::figures::figures;
+use crate::figures::{Figure, figures};
 use crate::flights::flights;
 use crate::forest::Forest;
 use crate::gain;
@@ -17,8 +18,10 @@ use std::path::PathBuf;
 
 /// Name of the recorded mission in a report's folder. A folder that holds it is recognised as a report's.
 const FOREST: &str = "forest";
+/// Name of the folder of the two recorded missions that the paper's Fig. 2 compares.
+const DISTRIBUTION: &str = "distribution";
 /// Prefixes of the figures' file names.
-const FIGURES: [&str; 8] = ["f1-", "f2-", "f3-", "f4-", "f5-", "f6-", "e6-", "gain-"];
+const FIGURES: [&str; 9] = ["distribution-", "f1-", "f2-", "f3-", "f4-", "f5-", "f6-", "e6-", "gain-"];
 
 /// The settings of a reproduction.
 #[derive(Clone, Debug)]
@@ -56,23 +59,24 @@ impl Reproduction {
         let figures = folder.subfolder("figures")?;
         clear(&figures)?;
         let forest = Forest::record(&self.folder.join(FOREST), interrupted)?;
+        let distribution = distribution::figures(&self.folder.join(DISTRIBUTION), interrupted)?;
         if interrupted().is_some() {
             return Ok(None);
         }
         let rows = rows(&results, &forest, self.quick);
-        self.write_all(&results, &forest, &rows, [&folder, &figures])?;
+        self.write_all(&results, (&forest, distribution), &rows, [&folder, &figures])?;
         Ok(Some(rows))
     }
 
     fn write_all(
         &self,
         results: &Results,
-        forest: &Forest,
+        (forest, mut all): (&Forest, Vec<Figure>),
         rows: &[Row],
         [folder, drawings]: [&WorkFolder; 2],
     ) -> Result<(), ReproduceError> {
-        let figures = figures(results, forest)?;
-        let blocks = content(results, forest, rows, figures, self.quick);
+        all.extend(figures(results, forest)?);
+        let blocks = content(results, forest, rows, all, self.quick);
         for block in &blocks {
             if let Block::Figure(figure) = block {
                 drawings.write(&figure.file, figure.svg.as_bytes())?;

@@ -1,14 +1,14 @@
-//! What is flown besides the paper's own cases, one table each: the default strategy beside the paper's rule, every end of
+//! What is flown besides the paper's own cases, one table each: the look-ahead beside the paper's rule, every end of
 //! the mission and energy convention, no queue law, narrow passages, reaction time.
 
-use crate::cases::{DEFAULT, GEOMETRIES, PAPER, PLACEMENTS, SHORTEST, STRATEGIES, title};
+use crate::cases::{GEOMETRIES, LOOK_AHEAD, PAPER, PLACEMENTS, SHORTEST, STRATEGIES, title};
 use crate::findings;
 use crate::flight::Flight;
 use crate::study::{Study, StudyCase};
 
 /// All studies.
 pub(crate) fn studies(quick: bool) -> Vec<Study> {
-    vec![strategies(), ends(), ablation(quick), narrow(quick), reaction(quick)]
+    vec![caps(), strategies(), ends(), ablation(quick), narrow(quick), reaction(quick)]
 }
 
 fn strategies() -> Study {
@@ -20,10 +20,29 @@ fn strategies() -> Study {
         })
     };
     Study {
-        heading: "The default strategy beside the paper's rule",
+        heading: "The look-ahead beside the paper's rule",
         labels: &["scenario", "strategy"],
         cases: scenarios.chain(["forest".to_owned()]).flat_map(|scenario| case(&scenario)).collect(),
         finding: findings::strategies,
+    }
+}
+
+/// The greatest speed while re-forming. The paper gives v ± δ, which is 15 m/s at most, and a limit of 20 m/s.
+fn caps() -> Study {
+    let scenarios = GEOMETRIES.iter().map(|geometry| format!("{geometry}-right")).chain(["forest".to_owned()]);
+    let mut cases = Vec::new();
+    for (scenario, cap) in scenarios.flat_map(|scenario| ["10", "15", "20"].map(|cap| (scenario.clone(), cap))) {
+        for strategy in [PAPER, SHORTEST] {
+            let flight = Flight::new(&scenario, strategy).with("mission.reform_speed_max_mps", cap);
+            let id = format!("cap.{scenario}.{cap}.{strategy}");
+            cases.push(StudyCase::new(id, &[&title(&scenario), &format!("{cap} m/s"), strategy], flight));
+        }
+    }
+    Study {
+        heading: "The greatest speed while re-forming",
+        labels: &["scenario", "cap", "strategy"],
+        cases,
+        finding: findings::caps,
     }
 }
 
@@ -119,7 +138,7 @@ fn narrow(quick: bool) -> Study {
 fn reaction(quick: bool) -> Study {
     let times: &[&str] = if quick { &["0", "0.2", "0.5"] } else { &["0", "0.1", "0.2", "0.3", "0.4", "0.5"] };
     let mut cases = Vec::new();
-    for (geometry, strategy) in ["s1", "s2"].iter().flat_map(|geometry| [PAPER, DEFAULT].map(|s| (*geometry, s))) {
+    for (geometry, strategy) in ["s1", "s2"].iter().flat_map(|geometry| [PAPER, LOOK_AHEAD].map(|s| (*geometry, s))) {
         for &t_c in times {
             let flight = Flight::new(&format!("{geometry}-right"), strategy);
             let flight = if t_c == "0" { flight } else { flight.with("drone.reaction_time_s", t_c) };

@@ -35,7 +35,7 @@ fn a_single_drone_finds_its_path() {
 }
 
 #[test]
-fn the_default_strategy_reaches_every_hard_scene() {
+fn the_look_ahead_reaches_every_hard_scene() {
     for name in SWARMS {
         assert_reached(name, "congestion-aware");
     }

@@ -120,7 +120,8 @@ fn what_a_leader_rehearses_for_groups_that_meet_is_what_they_fly() {
 /// The amount of look-ahead depends on time, not on the number of ticks.
 #[test]
 fn shorter_ticks_give_the_same_choice() {
-    let [usual, short] = ["0.02", "0.0025"].map(|dt_s| fly_with("s2-right", &[("time.dt_s", dt_s)]));
+    let [usual, short] =
+        ["0.02", "0.0025"].map(|dt_s| fly_with("s2-right", &[("strategy", "congestion-aware"), ("time.dt_s", dt_s)]));
     assert_eq!(usual.groups, short.groups);
     assert!((usual.plans[1].1 - short.plans[1].1).abs() < 0.2, "{:?}, {:?}", usual.plans, short.plans);
 }
@@ -129,7 +130,8 @@ fn shorter_ticks_give_the_same_choice() {
 fn the_choice_minimizes_the_objective() {
     let name = "s1-right";
     let energy = fly(name, "congestion-aware");
-    let time = fly_with(name, &[("objective.energy_per_kj", "0"), ("objective.time_per_s", "1")]);
+    let sets = [("strategy", "congestion-aware"), ("objective.energy_per_kj", "0"), ("objective.time_per_s", "1")];
+    let time = fly_with(name, &sets);
     assert!(energy.energy_j <= time.energy_j, "{} J, {} J", energy.energy_j, time.energy_j);
     assert!(time.end_s <= energy.end_s, "{} s, {} s", time.end_s, energy.end_s);
 }

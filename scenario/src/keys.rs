@@ -27,9 +27,9 @@ pub struct Scenario {
     #[serde(default = "first_seed")]
     #[schemars(range(min = 0, max = 9_223_372_036_854_775_807_i64))]
     pub seed: u64,
-    /// How a leader assigns drones to the routes past an obstacle set. `congestion-aware`: the leader simulates a few good
-    /// groupings and the shortest paths, and takes the best by `objective`. `congestion-aware-paper`: the paper's rule.
-    /// `shortest-path`: every drone takes its shortest path. `fixed:L/R`: L drones pass the only obstacle on its left, R
+    /// How a leader assigns drones to the routes past an obstacle set. `congestion-aware-paper`: the paper's rule.
+    /// `congestion-aware`: the leader looks ahead: it simulates a few good groupings and the shortest paths, and takes the best by
+    /// `objective`. `shortest-path`: every drone takes its shortest path. `fixed:L/R`: L drones pass the only obstacle on its left, R
     /// drones on its right.
     #[serde(default)]
     pub strategy: Strategy,

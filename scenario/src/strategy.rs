@@ -11,12 +11,12 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Strategy {
-    /// `congestion-aware`: the leader simulates a few good groupings and the shortest paths to the mission's end. It takes
-    /// the best one by the scenario's [`Objective`](crate::Objective).
+    /// `congestion-aware-paper`, the default: the paper's rule (A3, C1), without simulation.
     #[default]
-    LookAhead,
-    /// `congestion-aware-paper`: the paper's rule (A3, C1), without simulation.
     PaperRule,
+    /// `congestion-aware`: the leader looks ahead. It simulates a few good groupings and the shortest paths to the mission's
+    /// end, and takes the best one by the scenario's [`Objective`](crate::Objective).
+    LookAhead,
     /// `shortest-path`: every drone takes its shortest path.
     ShortestPath,
     /// `fixed:L/R`: L drones pass the only obstacle on its left, R drones on its right.
@@ -38,8 +38,8 @@ pub struct StrategyError {
 impl Strategy {
     /// The words without numbers, and their strategies.
     pub const WORDS: [(&str, Self); 3] = [
-        ("congestion-aware", Self::LookAhead),
         ("congestion-aware-paper", Self::PaperRule),
+        ("congestion-aware", Self::LookAhead),
         ("shortest-path", Self::ShortestPath),
     ];
 }

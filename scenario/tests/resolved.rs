@@ -17,7 +17,7 @@ fn parse(text: &str, sets: &[(&str, &str)]) -> Scenario {
 #[test]
 fn the_shortest_scenario_has_the_defaults_of_the_paper() {
     let s = parse("[formation]", &[]);
-    assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::LookAhead));
+    assert_eq!((s.name.as_str(), s.seed, s.strategy), ("my-mission", 1, Strategy::PaperRule));
     assert!((9.81 * s.drone.drag_coefficient - 5.0).abs() < 1e-12);
     assert!((s.stopping_distance_m() - 10.0).abs() < 1e-9);
     assert_eq!(s.starts(), Shape::NestedV.slots(8, 40.0));

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct ScenarioArgs {
     /// Scenario file (TOML)
     pub(crate) scenario: PathBuf,
-    /// How drones choose routes: congestion-aware, congestion-aware-paper, shortest-path or
+    /// How drones choose routes: congestion-aware-paper, congestion-aware, shortest-path or
     /// fixed:L/R (number of drones to the left and to the right)
     #[arg(long, value_name = "STRATEGY")]
     pub(crate) strategy: Option<String>,
