@@ -190,6 +190,20 @@ fn processes_and_inline_give_the_same_digest() {
 }
 
 #[test]
+fn the_digest_does_not_depend_on_the_number_of_threads() {
+    // Nine drones are more than a thread takes at a time.
+    let with = |threads| ["--set", "formation.drones=9", "--set", "radio.loss=0.2", "--threads", threads];
+    let one = inline("s2-right", &with("1"));
+    for threads in ["2", "3", "16"] {
+        let several = inline("s2-right", &with(threads));
+        assert_eq!(digest(&several), digest(&one), "{threads} threads");
+        assert_eq!(several["messages"], one["messages"], "{threads} threads");
+    }
+    let refused = Place::new().run(&["run", &support::paper("s2-right"), "--threads", "2"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+}
+
+#[test]
 fn both_runtimes_give_the_same_digest_with_delay_and_loss() {
     let rough = ["--set", "radio.delay_s=0.1", "--set", "radio.loss=0.2", "--seed"];
     let with = |seed| [&rough[..], &[seed]].concat();

@@ -10,7 +10,7 @@ use std::process::Command;
 const PURE: [&str; 6] = ["protocol", "leader", "pilot", "agent", "world", "scenario"];
 
 /// The workspace packages that each package may depend on.
-const DIRECTIONS: [(&str, &[&str]); 13] = [
+const DIRECTIONS: [(&str, &[&str]); 14] = [
     ("skein-protocol", &[]),
     ("skein-leader", &["skein-protocol"]),
     ("skein-pilot", &["skein-protocol"]),
@@ -41,6 +41,7 @@ const DIRECTIONS: [(&str, &[&str]); 13] = [
         "skein-bench",
         &["skein-protocol", "skein-leader", "skein-scenario", "skein-bus", "skein-report", "skein-runtime"],
     ),
+    ("skein-hosts", &["skein-protocol", "skein-scenario", "skein-bus", "skein-runtime"]),
     (
         "skein",
         &[

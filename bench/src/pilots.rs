@@ -80,6 +80,7 @@ impl PilotBench {
                 patience: PATIENCE,
                 per_process: 1,
                 program: context.pilots.program(),
+                hosts: &[],
                 on_ready: &mut |_: &[ProcessInfo]| Ok(()),
                 interrupted: &mut || (context.interrupted)(),
             };

@@ -246,6 +246,12 @@ impl Control {
         self.barrier.words(drone).ready()
     }
 
+    /// Reports that a drone's process of this incarnation, from 1, is ready to fly. For a relay, in whose place that process is on another
+    /// machine.
+    pub fn announce(&self, drone: usize, incarnation: u32) {
+        self.barrier.words(drone).set_ready(incarnation);
+    }
+
     /// Notes how a drone's process ended by itself, before the drone is marked as dead. For the supervisor.
     pub fn set_end(&self, drone: usize, status: ExitStatus) {
         self.barrier.words(drone).set_end(status.into_raw());

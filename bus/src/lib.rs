@@ -63,6 +63,7 @@ mod segment;
 pub mod services;
 mod spec;
 mod stopwatch;
+mod tick_watch;
 mod tick_word;
 mod version;
 
@@ -84,4 +85,5 @@ pub use process_request::{ProcessRequest, RequestKind};
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};
 pub use spec::{ControlSpec, WaitMode};
 pub use stopwatch::{Lap, Stopwatch};
+pub use tick_watch::TickWatch;
 pub use version::Version;

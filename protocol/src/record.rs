@@ -201,13 +201,15 @@ pub enum FaultKind {
     Noise,
     /// Wind pushes the drone.
     Wind,
+    /// The machine that flies the drone is gone.
+    HostDown,
 }
 
 impl FaultKind {
     /// Whether the fault ends or stops the drone's process.
     #[must_use]
     pub fn stops_process(self) -> bool {
-        matches!(self, Self::Kill | Self::Hung | Self::Freeze | Self::Restart)
+        matches!(self, Self::Kill | Self::Hung | Self::Freeze | Self::Restart | Self::HostDown)
     }
 }
 

@@ -248,6 +248,7 @@ impl Accumulator {
             metrics_own: self.own_metrics.finish(),
             telemetry_refused: totals.map(|totals| totals.telemetry_refused),
             failures: self.failures,
+            hosts: Vec::new(),
             rejected_commands: totals.map(|totals| totals.rejected_commands),
             lost_ticks: self.counts.lost,
             digest: self.counts.digest.map(|digest| format!("{digest:016x}")),

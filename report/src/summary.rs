@@ -105,6 +105,9 @@ pub struct Summary {
     /// The pilots that failed.
     #[serde(default)]
     pub failures: Vec<FailureEntry>,
+    /// The other machines that flew drones. Drones of no host flew on the launcher's machine.
+    #[serde(default)]
+    pub hosts: Vec<HostEntry>,
     /// Number of ticks that drones did not answer in time (wall clock only).
     pub deadline_misses: u64,
     /// How late ticks opened, µs (wall clock only; null in lockstep).
@@ -117,6 +120,24 @@ pub struct Summary {
     pub lost_ticks: u64,
     /// Hash over every drone's state and every delivered message in every tick, 16 hex digits.
     pub digest: Option<String>,
+}
+
+/// A machine that flew drones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HostEntry {
+    /// Its name.
+    pub name: String,
+    /// The drones that flew there.
+    pub drones: Vec<u32>,
+    /// Time from the opening of a tick to the host's answer, µs. This and all that follows is null for a host that was gone before the
+    /// end.
+    pub lateness_us: Option<StepTimes>,
+    /// Number of ticks that it answered.
+    pub ticks: Option<u64>,
+    /// Bytes sent to it in ticks.
+    pub bytes_down: Option<u64>,
+    /// Bytes received from it in ticks.
+    pub bytes_up: Option<u64>,
 }
 
 /// How one obstacle set was passed.

@@ -13,7 +13,7 @@ pub(crate) fn fault_plan(scenario: &Scenario) -> FaultPlan {
     let fault = |keys: &Keys| Fault {
         effect: effect(keys, drones),
         time: time(keys),
-        targets: targets(keys),
+        targets: targets(keys, scenario),
         for_s: keys.for_s.unwrap_or(f64::INFINITY),
     };
     FaultPlan { seed: scenario.seed, faults: scenario.fault_plan.iter().map(fault).collect() }
@@ -22,8 +22,9 @@ pub(crate) fn fault_plan(scenario: &Scenario) -> FaultPlan {
 fn effect(keys: &Keys, drones: u32) -> FaultEffect {
     let vector = |key: Option<[f64; 2]>| key.map_or_else(Vec2::zeros, Vec2::from);
     match keys.kind {
-        FaultKind::Kill => FaultEffect::Kill,
-        FaultKind::Freeze => FaultEffect::Freeze,
+        FaultKind::HostDown if keys.for_s.is_some() => FaultEffect::Restart,
+        FaultKind::Kill | FaultKind::HostDown => FaultEffect::Kill,
+        FaultKind::Freeze | FaultKind::HostCut => FaultEffect::Freeze,
         FaultKind::Restart => FaultEffect::Restart,
         FaultKind::Slow => FaultEffect::Slow(keys.reaction_time_s.unwrap_or(0.0)),
         FaultKind::Deaf => FaultEffect::Deaf,
@@ -65,7 +66,14 @@ fn time(keys: &Keys) -> FaultTime {
     FaultTime::On { event, stage: keys.stage as usize, after_s: keys.after_s }
 }
 
-fn targets(keys: &Keys) -> FaultTargets {
+fn targets(keys: &Keys, scenario: &Scenario) -> FaultTargets {
+    if let Some(host) = &keys.host {
+        let hosts = scenario.hosts_of_drones().into_iter().zip(0..);
+        return FaultTargets::Drones(ids(hosts
+            .filter(|(name, _)| name.as_ref() == Some(host))
+            .map(|(_, id)| id)
+            .collect()));
+    }
     match (keys.drone, &keys.drones, keys.target) {
         (Some(drone), _, _) => FaultTargets::Drones(ids(vec![drone])),
         (_, Some(drones), _) => FaultTargets::Drones(ids(drones.clone())),

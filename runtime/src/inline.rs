@@ -1,5 +1,5 @@
-//! The inline runtime: it steps the same pilots and the same world by function calls in one thread. It is the reference
-//! for determinism, and the engine of large sweeps.
+//! The inline runtime: it steps the same pilots and the same world by function calls in one thread, or the pilots in several. It is
+//! the reference for determinism, and the engine of large sweeps.
 
 use crate::drone_factory::DroneFactory;
 use crate::error::RuntimeError;
@@ -15,7 +15,12 @@ use skein_protocol::{DroneId, SimTime};
 use skein_scenario::Scenario;
 use skein_world::World;
 use skein_world::faults::ProcessCommand;
+use std::num::NonZero;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
+
+/// Drones that a thread takes at a time. Chosen by hand: few enough that a leader that plans does not keep others waiting.
+const CHUNK: usize = 8;
 
 /// Flies a mission in this thread with the pilots that the scenario names. `interrupted` is called once per tick; it returns the
 /// number of a signal that should stop the run.
@@ -27,11 +32,25 @@ pub fn run(
     scenario: &Scenario,
     pilots: &PilotRegistry,
     sink: &mut dyn RecordSink,
+    interrupted: impl FnMut() -> Option<i32>,
+) -> Result<RunEnd, RuntimeError> {
+    run_on(NonZero::<usize>::MIN, scenario, pilots, sink, interrupted)
+}
+
+/// As [`run`], with the steps of the drones spread over this many threads. The digest does not depend on their number.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(
+    threads: NonZero<usize>,
+    scenario: &Scenario,
+    pilots: &PilotRegistry,
+    sink: &mut dyn RecordSink,
     mut interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
     let mut end = RunEnd::default();
     let started = Instant::now();
-    let mut swarm = InlineSwarm::new(scenario, pilots)?;
+    let mut swarm = InlineSwarm::new(threads, scenario, pilots)?;
     end.startup_s = started.elapsed().as_secs_f64();
     let opened = Instant::now();
     while swarm.world.ended().is_none() {
@@ -61,17 +80,19 @@ struct InlineSwarm<'s> {
     factory: DroneFactory<'s>,
     world: World,
     drones: Vec<InlineDrone>,
-    scratch: StepScratch,
+    /// One per thread.
+    scratch: Vec<StepScratch>,
 }
 
 impl<'s> InlineSwarm<'s> {
-    fn new(scenario: &'s Scenario, pilots: &'s PilotRegistry) -> Result<Self, RuntimeError> {
+    fn new(threads: NonZero<usize>, scenario: &'s Scenario, pilots: &'s PilotRegistry) -> Result<Self, RuntimeError> {
         pilots.check(scenario, true)?;
         let factory = DroneFactory::new(scenario, pilots);
         let world = mission::world(scenario)?;
         let new_drone = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO).map(InlineDrone::new);
         let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<_, _>>()?;
-        Ok(Self { factory, world, drones, scratch: StepScratch::default() })
+        let scratch = (0..threads.get()).map(|_| StepScratch::default()).collect();
+        Ok(Self { factory, world, drones, scratch })
     }
 
     fn tick(&mut self) {
@@ -80,9 +101,7 @@ impl<'s> InlineSwarm<'s> {
             carry_out(command, &mut self.drones, &self.factory, start);
         }
         let down = self.world.downlink().view();
-        for drone in &mut self.drones {
-            drone.step(&down, &mut self.scratch);
-        }
+        step_all(&mut self.drones, &down, &mut self.scratch);
         for (drone, id) in self.drones.iter().zip(0..).filter(|(drone, _)| drone.flies()) {
             self.world.take_slot(DroneId(id), &drone.slot);
             self.world.take_frames(DroneId(id), &drone.frames);
@@ -103,6 +122,27 @@ impl<'s> InlineSwarm<'s> {
         }
         sum
     }
+}
+
+/// Steps all drones, in as many threads as there are scratches. No drone sees what another one does in the same tick.
+fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, scratch: &mut [StepScratch]) {
+    let Some((own, others)) = scratch.split_first_mut() else { return };
+    let chunks = Mutex::new(drones.chunks_mut(CHUNK));
+    let next = || chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = |scratch: &mut StepScratch| {
+        while let Some(chunk) = next() {
+            chunk.iter_mut().for_each(|drone| drone.step(down, scratch));
+        }
+    };
+    if others.is_empty() {
+        return work(own);
+    }
+    std::thread::scope(|scope| {
+        for scratch in others {
+            scope.spawn(|| work(scratch));
+        }
+        work(own);
+    });
 }
 
 /// Does to a pilot what the supervisor does to a process.

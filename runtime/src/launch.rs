@@ -1,6 +1,7 @@
 //! How a run in processes is started.
 
 use crate::clock::Clock;
+use crate::host_share::HostShare;
 use crate::program::Program;
 use crate::tuning::HUNG_AFTER;
 use skein_bus::{PinMode, WaitMode};
@@ -26,6 +27,8 @@ pub struct Launch<'a> {
     pub per_process: u32,
     /// The program with the roles `world` and `drone`. Drones whose pilot is a program of its own are started from that one.
     pub program: &'a Program,
+    /// The drones that fly on other machines. All others fly on this one.
+    pub hosts: &'a [HostShare],
     /// Called with all processes of the run when they are ready and before the first tick. Called again, with the ended
     /// processes included, when a drone got a new process. An error of the first call ends the run with
     /// `RuntimeError::OnReady`.

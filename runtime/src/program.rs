@@ -39,6 +39,12 @@ impl Program {
         Self::new(words.iter().map(OsString::from).collect())
     }
 
+    /// Its words. A word that is no Unicode is shown with replacement characters.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        self.words.iter().map(|word| word.to_string_lossy().into_owned()).collect()
+    }
+
     /// A command that starts it. Arguments follow.
     #[must_use]
     pub fn command(&self) -> Command {
@@ -76,8 +82,7 @@ impl Program {
 
 impl fmt::Display for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words: Vec<_> = self.words.iter().map(|word| word.to_string_lossy()).collect();
-        f.write_str(&words.join(" "))
+        f.write_str(&self.words().join(" "))
     }
 }
 

@@ -1,5 +1,7 @@
 //! How a run ended.
 
+use crate::host_share::HostReport;
+
 /// How a run ended: what its record does not tell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunEnd {
@@ -15,4 +17,6 @@ pub struct RunEnd {
     pub bad_records: u64,
     /// What failed in the environment during the flight, such as the death of the world process.
     pub failure: Option<String>,
+    /// What became of each host, in the order of [`crate::Launch::hosts`]; `None` if it was gone before the end.
+    pub hosts: Vec<Option<HostReport>>,
 }

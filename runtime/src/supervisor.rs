@@ -7,9 +7,11 @@ use crate::drone_range::DroneRange;
 use crate::error::RuntimeError;
 use crate::launch::{Launch, ProcessInfo, ProcessRole};
 use crate::programs::Programs;
+use crate::relay_line::RelayRequest;
 use crate::run_end::RunEnd;
 use crate::tuning::{
-    END_LIMIT, HUNG_AFTER, RESTART_READY_LIMIT, START_LIMIT, START_LIMIT_PER_DRONE, STOPPED_POLL, SUPERVISOR_POLL,
+    END_LIMIT, HOST_REQUEST_LIMIT, HOST_RESTART_LIMIT, HUNG_AFTER, RESTART_READY_LIMIT, START_LIMIT,
+    START_LIMIT_PER_DRONE, STOPPED_POLL, SUPERVISOR_POLL,
 };
 use crate::world_process::DISMISSED;
 use crate::{mission, scenario_file};
@@ -70,7 +72,9 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             PinMode::Off => 1,
         };
         let control = Control::create(ControlSpec { drones, cores, per_process, wait: launch.wait })?;
-        let services = Services::create(domain, drones, per_process, "launcher")?;
+        // A relay sends what all drones of its host say.
+        let senders = launch.hosts.iter().map(|host| host.count as usize).fold(per_process, usize::max);
+        let services = Services::create(domain, drones, senders, "launcher")?;
         let record = services.record_subscriber()?;
         scenario_file::write(domain.path(), launch.scenario)?;
         let args = ChildArgs {
@@ -81,7 +85,12 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             pin: launch.pin,
         };
         Ok(Self {
-            children: Children::new(Programs::new(launch.scenario, launch.program), args, launch.patience)?,
+            children: Children::new(
+                Programs::new(launch.scenario, launch.program),
+                launch.hosts,
+                args,
+                launch.patience,
+            )?,
             launch,
             domain,
             control,
@@ -119,17 +128,14 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
     fn spawn_all(&mut self) -> Result<(), RuntimeError> {
         self.children.spawn(ChildRole::World, self.launch.clock)?;
         let (drones, per_process) = (self.drones() as u32, self.launch.per_process.max(1));
-        let mut first = 0;
-        while first < drones {
-            // A process has the drones from a multiple of `per_process` on, or fewer if they fly different programs.
-            let most = (first + per_process - first % per_process).min(drones);
-            let others = (first..most).take_while(|&id| self.children.share(DroneId(first), DroneId(id)));
-            let count = others.count() as u32;
-            let range = DroneRange { first: DroneId(first), count, incarnation: 1, first_tick: 0 };
-            self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
-            first += count;
+        let hosts = self.launch.hosts;
+        for (number, host) in hosts.iter().enumerate() {
+            let range = DroneRange { first: host.first, count: host.count, incarnation: 1, first_tick: 0 };
+            self.children.spawn(ChildRole::Relay(number, range), self.launch.clock)?;
         }
-        Ok(())
+        let here = |id: &u32| !hosts.iter().any(|host| host.flies(DroneId(*id)));
+        let first = (0..drones).find(here).unwrap_or(drones);
+        self.children.spawn_drones((first, drones), per_process, (1, 0), self.launch.clock)
     }
 
     /// Waits until all processes are ready. Returns false if a signal interrupted the wait.
@@ -162,7 +168,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             return RuntimeError::EndedEarly { process: role.to_string(), status };
         };
         let pilot = match role {
-            ChildRole::World => String::new(),
+            ChildRole::World | ChildRole::Relay(..) => String::new(),
             ChildRole::Drones(range) => {
                 let names = self.launch.scenario.pilot_names();
                 names.get(range.first.index()).map(|name| format!(", pilot {name:?}")).unwrap_or_default()
@@ -249,6 +255,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                     range.ids().for_each(|id| self.control.set_end(id.index(), status));
                     self.mark_dead(range);
                 }
+                // All drones of the host are dead, and the scenario says which host that is.
+                ChildRole::Relay(_, range) => self.mark_dead(range),
                 ChildRole::World => self.world_ended = Some(status),
             }
         }
@@ -265,6 +273,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
     fn serve_request(&mut self) {
         let Some(ProcessRequest { kind, drone, tick }) = self.control.next_request(Duration::ZERO) else { return };
         let reply = match kind {
+            RequestKind::Restart => self.try_restart(drone, tick),
+            _ if self.children.is_relayed(drone) => self.ask_host(kind, drone, tick),
             RequestKind::Kill => u32::from(self.kill_drone(drone)),
             RequestKind::KillProcess => u32::from(self.kill(drone)),
             RequestKind::Freeze => {
@@ -275,14 +285,35 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                 self.control.set_resume_from(drone.index(), tick);
                 u32::from(self.children.resume_drone(drone))
             }
-            RequestKind::Restart => self.restart(drone, tick).unwrap_or_else(|error| {
-                tracing::warn!(%error, "drone {drone} is dead again");
-                self.kill(drone);
-                self.control.mark_dead(drone.index());
-                0
-            }),
         };
         self.control.answer_request(reply);
+    }
+
+    /// Has a host do to one of its drones what the world requests. A host that does not answer is given up.
+    fn ask_host(&mut self, kind: RequestKind, drone: DroneId, tick: Tick) -> u32 {
+        match kind {
+            RequestKind::Freeze => self.control.freeze(drone.index()),
+            RequestKind::Resume => self.control.set_resume_from(drone.index(), tick),
+            _ => {}
+        }
+        let reply = self.children.ask_host(RelayRequest::new(kind, drone.0, tick, 0), HOST_REQUEST_LIMIT);
+        if reply.is_none() {
+            let given_up = self.children.kill_relay(drone);
+            given_up.into_iter().for_each(|range| self.mark_dead(range));
+        } else if matches!(kind, RequestKind::Kill | RequestKind::KillProcess) {
+            self.control.mark_dead(drone.index());
+        }
+        reply.unwrap_or(0)
+    }
+
+    /// Starts a new process for a dead drone. Returns its incarnation, or 0 if the drone is dead again.
+    fn try_restart(&mut self, drone: DroneId, tick: Tick) -> u32 {
+        self.restart(drone, tick).unwrap_or_else(|error| {
+            tracing::warn!(%error, "drone {drone} is dead again");
+            self.kill(drone);
+            self.control.mark_dead(drone.index());
+            0
+        })
     }
 
     /// Ends a drone: its process, unless others fly in it.
@@ -316,7 +347,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         clean_dead_nodes(self.domain)?;
         self.control.revive(drone, first_tick);
         let range = DroneRange { first: id, count: 1, incarnation, first_tick };
-        self.children.spawn(ChildRole::Drones(range), self.launch.clock)?;
+        self.start_again(range)?;
         let limit = Instant::now() + RESTART_READY_LIMIT;
         while self.control.ready(drone) != Some(incarnation) {
             self.reap();
@@ -334,6 +365,20 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         Ok(incarnation)
     }
 
+    /// Starts the new process, on the drone's host if it has one. A host that had gone may be back: it gets a new relay.
+    fn start_again(&mut self, range: DroneRange) -> Result<(), RuntimeError> {
+        let DroneRange { first: drone, incarnation, first_tick, .. } = range;
+        if self.children.is_relayed(drone) {
+            let request = RelayRequest::new(RequestKind::Restart, drone.0, first_tick, incarnation);
+            let reply = self.children.ask_host(request, HOST_RESTART_LIMIT);
+            let failed = RuntimeError::NotRestarted { drone, incarnation };
+            return if reply == Some(incarnation) { Ok(()) } else { Err(failed) };
+        }
+        let host = self.launch.hosts.iter().position(|host| host.flies(drone));
+        let role = host.map_or(ChildRole::Drones(range), |host| ChildRole::Relay(host, range));
+        self.children.spawn(role, self.launch.clock)
+    }
+
     /// Ends all processes: drones end by themselves when the mission is closed, and those that do not are killed.
     fn shut_down(&mut self) {
         self.control.close();
@@ -344,6 +389,10 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         let limit = Instant::now() + END_LIMIT;
         while !self.children.is_empty() && Instant::now() < limit {
             self.children.wait_any(SUPERVISOR_POLL);
+        }
+        self.end.hosts = vec![None; self.launch.hosts.len()];
+        for (host, report) in self.children.reports() {
+            self.end.hosts[host].get_or_insert(report);
         }
         self.children.kill_all();
         self.take_records(true);

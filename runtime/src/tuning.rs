@@ -59,3 +59,14 @@ pub(crate) const DISMISSAL_POLL: Duration = Duration::from_millis(1);
 
 /// A wall clock that has fallen behind by more than this starts anew instead of catching up: 1 s. Chosen by hand.
 pub(crate) const STALL_LIMIT: Duration = Duration::from_secs(1);
+
+/// A host carries out a kill, a stop or a continuation within this, its network included, or it is given up: 3 s. Chosen by hand: less
+/// than [`REQUEST_LIMIT`], so that the supervisor gives up first.
+pub(crate) const HOST_REQUEST_LIMIT: Duration = Duration::from_secs(3);
+
+/// A host restarts a process within this, its network included, or the drone is dead again: 10 s. Chosen by hand: more than
+/// [`RESTART_READY_LIMIT`] and less than [`RESTART_LIMIT`].
+pub(crate) const HOST_RESTART_LIMIT: Duration = Duration::from_secs(10);
+
+/// Time between two looks at whether a process of a host has ended while its drones are waited for: 1 ms. Chosen by hand.
+pub(crate) const WING_POLL: Duration = Duration::from_millis(1);

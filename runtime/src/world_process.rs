@@ -6,10 +6,10 @@ use crate::error::RuntimeError;
 use crate::mission;
 use crate::pacer::Pacer;
 use crate::tuning::{DISMISSAL_POLL, RECORD_LIMIT, RECORD_PATIENCE, RECORD_WARNING, REQUEST_LIMIT, RESTART_LIMIT};
+use crate::uplinks::Uplinks;
 use skein_bus::{
-    Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind,
-    SHARD_DRONES, Services, TickOutcome, UplinkSubscriber, WatchPublisher, WorldState, clean_dead_nodes, pin_to_core,
-    raise_file_limit, shards,
+    Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind, Services,
+    TickOutcome, WatchPublisher, WorldState, clean_dead_nodes, pin_to_core, raise_file_limit,
 };
 use skein_protocol::DroneId;
 use skein_protocol::record::{FaultKind, RecordHeader, RecordView};
@@ -62,7 +62,7 @@ pub fn run(args: &ChildArgs, clock: Clock, patience: Duration) -> Result<(), Run
 /// The world and its ports.
 struct WorldServer {
     downlink: DownlinkPublisher,
-    uplinks: Vec<UplinkSubscriber>,
+    uplinks: Uplinks,
     record: RecordPublisher,
     watch: WatchPublisher,
     control: Arc<Control>,
@@ -71,10 +71,6 @@ struct WorldServer {
     world: World,
     /// How each drone answered the tick.
     outcomes: Vec<TickOutcome>,
-    /// Number of frames received from each drone so far.
-    received: Vec<u64>,
-    /// Number of frames that each drone has announced so far.
-    announced: Vec<u64>,
     /// Records dropped since the last one that was delivered.
     lost_records: u32,
     /// The events of the dropped records.
@@ -83,6 +79,8 @@ struct WorldServer {
     wall_clock: bool,
     /// How long a drone may take to answer in lockstep.
     patience: Duration,
+    /// The host of each drone that flies on another machine.
+    hosts: Vec<Option<String>>,
 }
 
 /// How ticks are paced, and how long they may take.
@@ -108,7 +106,7 @@ impl WorldServer {
         };
         Ok(Self {
             downlink: services.downlink_publisher()?,
-            uplinks: (0..shards(drones)).map(|shard| services.uplink_subscriber(shard)).collect::<Result<_, _>>()?,
+            uplinks: Uplinks::new(services, drones)?,
             record: services.record_publisher(policy)?,
             watch: services.watch_publisher()?,
             control,
@@ -116,11 +114,10 @@ impl WorldServer {
             args,
             world: mission::world(scenario)?,
             outcomes: vec![TickOutcome::Pending; drones],
-            received: vec![0; drones],
-            announced: vec![0; drones],
             lost_records: 0,
             unsent_events: Vec::new(),
             patience,
+            hosts: scenario.hosts_of_drones(),
             wall_clock: clock != Clock::Lockstep,
         })
     }
@@ -128,9 +125,7 @@ impl WorldServer {
     /// Connects all ports now rather than during the first tick.
     fn connect(&self) -> Result<(), RuntimeError> {
         self.downlink.connect()?;
-        for uplink in &self.uplinks {
-            uplink.connect()?;
-        }
+        self.uplinks.connect()?;
         Ok(self.record.connect()?)
     }
 
@@ -207,7 +202,7 @@ impl WorldServer {
                     return Ok(());
                 }
                 self.outcomes[drone] = TickOutcome::Pending;
-                (self.received[drone], self.announced[drone]) = (0, 0);
+                self.uplinks.restart(drone);
                 self.connect()?;
             }
         }
@@ -221,7 +216,7 @@ impl WorldServer {
             match self.outcomes[drone] {
                 TickOutcome::Done => {
                     let slot = self.control.slot(drone);
-                    self.announced[drone] = slot.frames_total;
+                    self.uplinks.announce(drone, slot.frames_total);
                     self.world.take_slot(id, &slot);
                 }
                 TickOutcome::Late => self.world.hold(id),
@@ -247,6 +242,10 @@ impl WorldServer {
             return;
         }
         let end = self.control.end(drone);
+        if let (None, Some(host)) = (end, self.hosts.get(drone).and_then(Option::as_ref)) {
+            let detail = format!("its host {host} is gone");
+            return self.world.mark_dead(id, FaultKind::HostDown, false, &detail);
+        }
         let (code, signal) = (end.and_then(|end| end.code()), end.and_then(|end| end.signal()));
         let detail = match (code, signal) {
             (Some(code), _) => format!("its process exited with code {code}"),
@@ -260,32 +259,17 @@ impl WorldServer {
         self.world.mark_dead(id, FaultKind::Kill, false, &detail);
     }
 
-    /// Receives exactly the frames that drones have announced: one more call would look through all shards. If a drone is
-    /// late, this receives everything there is, so that the drone's buffer does not fill up.
     fn take_frames(&mut self) -> Result<(), RuntimeError> {
         let late = self.outcomes.contains(&TickOutcome::Late);
-        for (shard, uplink) in self.uplinks.iter().enumerate() {
-            let first = shard * SHARD_DRONES;
-            let drones = first..(first + SHARD_DRONES).min(self.announced.len());
-            let mut missing = drones.clone().any(|drone| self.received[drone] < self.announced[drone]);
-            while missing || late {
-                let Some(sample) = uplink.receive()? else {
-                    if self.wall_clock {
-                        break;
-                    }
-                    return Err(RuntimeError::MissingFrames { shard });
-                };
-                let source = DroneId(sample.header().source);
-                let current = self.world.incarnation(source) == Some(sample.header().incarnation);
-                // By the wall clock, frames of an ended process may still be in the buffer. They are lost.
-                if let Some(received) = self.received.get_mut(source.index()).filter(|_| current) {
-                    *received += sample.frames().len() as u64;
-                    self.world.take_frames(source, sample.frames());
-                }
-                missing = drones.clone().any(|drone| self.received[drone] < self.announced[drone]);
+        let world = &mut self.world;
+        self.uplinks.take((late, self.wall_clock), |header, frames| {
+            let source = DroneId(header.source);
+            let current = world.incarnation(source) == Some(header.incarnation);
+            if current {
+                world.take_frames(source, frames);
             }
-        }
-        Ok(())
+            current
+        })
     }
 
     /// Sends the record of the tick that ended. By the wall clock, a full recorder drops it. The next record that is

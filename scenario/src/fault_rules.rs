@@ -73,6 +73,12 @@ impl FaultRules<'_> {
             (FaultKind::Partition, [key, ..]) => {
                 self.expect(false, &[key], || "does not belong to a partition, expected its drones in sides".to_owned())
             }
+            (FaultKind::HostDown | FaultKind::HostCut, written) => {
+                if let Some(key) = written.first() {
+                    self.expect(false, &[key], || "does not belong to a fault of a host, expected host".to_owned());
+                }
+                self.host();
+            }
             (FaultKind::Partition | FaultKind::Wind, []) | (_, [_]) => {}
             (_, []) => self.expect(false, &["target", "kind"], || {
                 "is missing: expected the targets of the fault, one of drone, drones, target".to_owned()
@@ -90,9 +96,21 @@ impl FaultRules<'_> {
         }
     }
 
+    fn host(&mut self) {
+        let names: Vec<&str> = self.scenario.hosts.iter().map(|host| host.name.as_str()).collect();
+        let found = self.fault.host.as_deref();
+        self.expect(found.is_some_and(|name| names.contains(&name)), &["host", "kind"], || {
+            let found = found.map_or("is missing".to_owned(), |name| format!("found {name:?}"));
+            match names.is_empty() {
+                true => format!("{found}: expected the name of a host, and at least one [[host]] in the scenario"),
+                false => format!("{found}: expected the name of a host: {}", names.join(", ")),
+            }
+        });
+    }
+
     /// Keys that only some kinds allow, and keys that some kinds need.
     fn keys_of_kind(&mut self) {
-        use FaultKind::{Blind, Freeze, Noise, Partition, Restart, Slow, Wind};
+        use FaultKind::{Blind, Freeze, HostCut, HostDown, Noise, Partition, Restart, Slow, Wind};
         let fault = self.fault;
         let keys = [
             ("reaction_time_s", fault.reaction_time_s.is_some(), Slow),
@@ -110,6 +128,9 @@ impl FaultRules<'_> {
             let found = fault.kind.word();
             self.expect(false, &[key], || format!("belongs to kind = {:?}, found kind = {found:?}", kind.word()));
         }
+        self.expect(fault.host.is_none() || matches!(fault.kind, HostDown | HostCut), &["host"], || {
+            format!("belongs to kind = \"host-down\" or \"host-cut\", found kind = {:?}", fault.kind.word())
+        });
         let has = |wanted: &[&str]| keys.iter().any(|(key, is, _)| *is && wanted.contains(key));
         let needed: &[&str] = match fault.kind {
             Slow => &["reaction_time_s"],
@@ -121,7 +142,7 @@ impl FaultRules<'_> {
         self.expect(needed.is_empty() || has(needed), &[needed.first().unwrap_or(&"kind"), "kind"], || {
             format!("is missing: kind = {:?} needs {}", fault.kind.word(), needed.join(" or "))
         });
-        let spans = matches!(fault.kind, Freeze | Restart);
+        let spans = matches!(fault.kind, Freeze | Restart | HostCut);
         self.expect(!spans || fault.for_s.is_some(), &["for_s", "kind"], || {
             format!("is missing: kind = {:?} needs for_s", fault.kind.word())
         });

@@ -66,7 +66,9 @@ pub struct Fault {
     /// id that leads no group), `"random"` (chosen by the seed), `"all"`. The role is looked up when the fault begins. The
     /// fault waits while no drone has the role.
     pub target: Option<FaultTarget>,
-    /// Duration of the fault; absent: to the end of the mission. Required with `kind = "freeze"` and `kind = "restart"`:
+    /// With `kind = "host-down"` and `kind = "host-cut"`: the name of the host whose drones are the targets.
+    pub host: Option<String>,
+    /// Duration of the fault; absent: to the end of the mission. Required with `kind = "host-cut"`, and with `kind = "freeze"` and `kind = "restart"`:
     /// afterwards the process continues, or a new one starts. It lasts at least one tick.
     #[schemars(range(min = 0.0, max = 36_000.0))]
     pub for_s: Option<f64>,
@@ -115,6 +117,7 @@ impl Fault {
             drone: Some(drone),
             drones: None,
             target: None,
+            host: None,
             for_s,
             reaction_time_s: None,
             sides: None,
@@ -154,6 +157,10 @@ pub enum FaultKind {
     Noise,
     /// Wind accelerates the drone.
     Wind,
+    /// The host is gone: the processes of all its drones are killed. With `for_s`, new ones start afterwards.
+    HostDown,
+    /// The host's cable is cut: the processes of all its drones are stopped, and continued after `for_s`.
+    HostCut,
 }
 
 impl FaultKind {
@@ -171,6 +178,8 @@ impl FaultKind {
             Self::Blind => "blind",
             Self::Noise => "noise",
             Self::Wind => "wind",
+            Self::HostDown => "host-down",
+            Self::HostCut => "host-cut",
         }
     }
 }

@@ -3,7 +3,8 @@
 
 use crate::faults::{Fault, Faults};
 use crate::guidance::Guidance;
-use crate::limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES, MAX_PILOTS};
+use crate::hosts::HostKeys;
+use crate::limits::{MAX_DRONES, MAX_FAULTS, MAX_HOSTS, MAX_OBSTACLES, MAX_PILOTS};
 use crate::objective::Objective;
 use crate::obstacle::Obstacle;
 use crate::pilots::{FreeTable, PilotKeys};
@@ -73,6 +74,11 @@ pub struct Scenario {
     #[serde(default, rename = "pilot", skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = MAX_PILOTS))]
     pub pilots: Vec<PilotKeys>,
+    /// The machines that fly the drones, numbered from 0 in the order of the file. The first one has the drones from number 0 on,
+    /// the next one those that follow. All others fly on the launcher's machine.
+    #[serde(default, rename = "host", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = MAX_HOSTS))]
+    pub hosts: Vec<HostKeys>,
     /// Keys of the user's own. Every pilot gets them with the scenario; Skein does not check them.
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     #[schemars(extend("format" = "free"))]

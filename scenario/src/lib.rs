@@ -45,6 +45,8 @@ mod error;
 mod fault_rules;
 mod faults;
 mod guidance;
+mod host_rules;
+mod hosts;
 mod keys;
 mod limits;
 mod name;
@@ -69,10 +71,11 @@ pub use faults::{
     Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, PartitionSides, Sensor, SidesWord, TargetError,
 };
 pub use guidance::Guidance;
+pub use hosts::HostKeys;
 pub use keys::{
     Avoidance, Drone, End, Formation, FormationShape, Mission, Protocol, Reformation, Scenario, Sensors, Time,
 };
-pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_OBSTACLES, MAX_PILOTS};
+pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_HOSTS, MAX_OBSTACLES, MAX_PILOTS};
 pub use objective::Objective;
 pub use obstacle::Obstacle;
 pub use parse::ScenarioSource;

@@ -11,3 +11,6 @@ pub const MAX_PILOTS: usize = 256;
 
 /// Greatest number of faults.
 pub const MAX_FAULTS: usize = 1024;
+
+/// Greatest number of hosts.
+pub const MAX_HOSTS: usize = 256;

@@ -1,6 +1,7 @@
 //! What a scenario can do: it is parsed from text, and gives the values that follow from its keys.
 
 use crate::error::ScenarioErrors;
+use crate::hosts::HostKeys;
 use crate::keys::{End, FormationShape, Scenario};
 use crate::parse::{self, ScenarioSource};
 use crate::passage::Barrier;
@@ -87,6 +88,15 @@ impl Scenario {
             }
         }
         tables
+    }
+
+    /// The name of each drone's host, by the drone's number; `None`: the launcher's machine.
+    #[must_use]
+    pub fn hosts_of_drones(&self) -> Vec<Option<String>> {
+        let named = |host: &HostKeys| std::iter::repeat_n(Some(host.name.clone()), host.drones as usize);
+        let mut hosts: Vec<_> = self.hosts.iter().flat_map(named).collect();
+        hosts.resize(self.formation.drones as usize, None);
+        hosts
     }
 
     /// The name of the pilot that flies each drone, by its number.

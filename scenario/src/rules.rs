@@ -5,7 +5,7 @@ use crate::keys::{End, Scenario};
 use crate::name::is_name_char;
 use crate::node::number;
 use crate::strategy::Strategy;
-use crate::{fault_rules, near, pilot_rules};
+use crate::{fault_rules, host_rules, near, pilot_rules};
 use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
@@ -26,6 +26,7 @@ pub(crate) fn broken(scenario: &Scenario) -> Vec<BrokenRule> {
     rules.broken.extend(crate::radio::broken(scenario));
     rules.broken.extend(fault_rules::broken(scenario));
     rules.broken.extend(pilot_rules::broken(scenario));
+    rules.broken.extend(host_rules::broken(scenario));
     rules.broken
 }
 

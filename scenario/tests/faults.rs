@@ -29,9 +29,13 @@ fn every_kind_is_read_and_survives_json_and_toml() {
         [[fault]]\nkind = \"partition\"\nat_s = 1\nsides = [[0, 1], [7]]\nfor_s = 3\n\
         [[fault]]\nkind = \"blind\"\nat_s = 1\ndrone = 0\nsensor = \"ranging\"\n\
         [[fault]]\nkind = \"noise\"\nat_s = 1\ndrone = 0\nposition_bias_m = [1, 0]\n\
-        [[fault]]\nkind = \"wind\"\nat_s = 1\ngust_mps2 = 0.2\n";
+        [[fault]]\nkind = \"wind\"\nat_s = 1\ngust_mps2 = 0.2\n\
+        [[fault]]\nkind = \"host-down\"\nat_s = 1\nhost = \"a\"\n\
+        [[fault]]\nkind = \"host-cut\"\nat_s = 1\nfor_s = 2\nhost = \"b\"\n\
+        [[host]]\nname = \"a\"\ndrones = 2\n[[host]]\nname = \"b\"\ndrones = 1\nconnect = \"tls/10.0.0.2:1\"\n";
     let scenario = parse(&format!("{HEAD}{faults}"), &[]).unwrap_or_else(|errors| panic!("{errors}"));
-    assert_eq!(scenario.fault_plan.len(), 11);
+    assert_eq!(scenario.fault_plan.len(), 13);
+    assert_eq!(scenario.hosts_of_drones()[1..4], [Some("a".to_owned()), Some("b".to_owned()), None]);
     let json = serde_json::to_value(&scenario).unwrap();
     assert_eq!(Scenario::from_json(&json, SOURCE).unwrap(), scenario);
     assert_eq!(serde_json::from_value::<Scenario>(json).unwrap(), scenario);
@@ -99,6 +103,32 @@ fn an_invalid_fault_is_rejected_with_its_place() {
             "belongs to kind = \"slow\", found kind = \"deaf\"",
         ),
         ("kind = \"noise\"\nat_s = 1\ndrone = 1", "kind = \"noise\" needs position_std_m or position_bias_m or"),
+        ("kind = \"host-down\"\nat_s = 1\nhost = \"a\"", "fault.0.host: found \"a\": expected the name of a host, and"),
+        (
+            "kind = \"host-down\"\nat_s = 1\n[[host]]\nname = \"b\"\ndrones = 8",
+            "fault.0.host: is missing: expected the name of a host: b",
+        ),
+        (
+            "kind = \"host-cut\"\nat_s = 1\nhost = \"b\"\n[[host]]\nname = \"b\"\ndrones = 8",
+            "fault.0.for_s: is missing: kind = \"host-cut\" needs for_s",
+        ),
+        (
+            "kind = \"host-down\"\nat_s = 1\nhost = \"b\"\ntarget = \"all\"\n[[host]]\nname = \"b\"\ndrones = 8",
+            "fault.0.target: does not belong to a fault of a host",
+        ),
+        ("kind = \"kill\"\nat_s = 1\ndrone = 1\nhost = \"b\"", "fault.0.host: belongs to kind = \"host-down\""),
+        (
+            "kind = \"kill\"\nat_s = 1\ndrone = 1\n[[host]]\nname = \"b\"\ndrones = 9",
+            "f.toml:12:10: host.0.drones: found 9 drones up to this host, expected formation.drones = 8 at most",
+        ),
+        (
+            "kind = \"kill\"\nat_s = 1\ndrone = 1\n[[host]]\nname = \"b/c\"\ndrones = 1",
+            "f.toml:11:8: host.0.name: found \"b/c\", expected letters",
+        ),
+        (
+            "kind = \"kill\"\nat_s = 1\ndrone = 1\n[[host]]\nname = \"b\"\ndrones = 1\n[[host]]\nname = \"b\"\ndrones = 1",
+            "f.toml:14:8: host.1.name: found \"b\" twice",
+        ),
         ("kind = \"wind\"\nat_s = 1", "kind = \"wind\" needs wind_mps2 or gust_mps2"),
         ("kind = \"partition\"\nat_s = 1", "fault.0.sides: is missing"),
         (

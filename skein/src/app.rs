@@ -5,7 +5,7 @@ use crate::exit::{Exit, Failure};
 use crate::output::KeptStdout;
 use crate::run::OnFolder;
 use crate::{
-    bench, check, clean, doctor, hunt, replay, report, reproduce, roles, run, schema, sweep, top, topic, view,
+    bench, check, clean, doctor, hosts, hunt, replay, report, reproduce, roles, run, schema, sweep, top, topic, view,
 };
 use clap::Parser;
 use skein_pilot::{Birth, Pilot, PilotError};
@@ -144,6 +144,7 @@ fn dispatch(command: Command, pilots: &PilotRegistry, on_folder: Option<&OnFolde
         .map_err(|error| Failure::environment(format!("stdout: {error}")))?;
     match command {
         Command::Run(args) => run::run(&args, pilots, on_folder),
+        Command::Host(args) => hosts::host(&args, pilots),
         Command::Check(args) => check::check(&args, pilots),
         Command::Sweep(args) => sweep::sweep(&args, pilots),
         Command::Hunt(args) => hunt::hunt(&args, pilots),

@@ -35,6 +35,8 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Fly one mission: one world process and one process per drone
     Run(RunArgs),
+    /// Offer this machine to runs on other machines, which then fly drones here
+    Host(crate::hosts::HostArgs),
     /// Check a scenario and print what would be started, without starting it
     Check(CheckArgs),
     /// Fly a grid of missions side by side; write CSV, JSON and plots with 95 % intervals; resumable
@@ -198,9 +200,15 @@ pub(crate) struct RunArgs {
     /// Drones per process; the digest does not depend on it
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub(crate) drones_per_process: u32,
+    /// With `--runtime inline`: number of threads that step the drones; the digest does not depend on it
+    #[arg(long, value_name = "COUNT", default_value = "1")]
+    pub(crate) threads: NonZero<usize>,
     /// End when this parent process ends; set by `sweep`
     #[arg(long, hide = true, value_name = "PID")]
     pub(crate) parent: Option<u32>,
+    /// How to reach other machines.
+    #[command(flatten)]
+    pub(crate) network: crate::hosts::NetworkArgs,
 }
 
 /// Arguments of every child process.

@@ -35,6 +35,11 @@ pub(crate) fn scenario(args: &ScenarioArgs, pilots: &PilotRegistry, inline: bool
     overrides.extend(args.seed.iter().map(|value| ("seed".to_owned(), value.clone())));
     // A name needs no quotes; a number would be one without.
     overrides.extend(args.pilot.iter().map(|name| ("pilot.0.name".to_owned(), format!("{name:?}"))));
+    if !args.hosts.is_empty() {
+        let tables: Vec<_> =
+            args.hosts.iter().map(|(name, drones)| format!("{{name = {name:?}, drones = {drones}}}")).collect();
+        overrides.push(("host".to_owned(), format!("[{}]", tables.join(", "))));
+    }
     let source = ScenarioSource { name: &name, stem: &stem };
     let mut scenario = Scenario::parse_bytes(&bytes, source, &overrides).map_err(Failure::diagnostic)?;
     resolve_commands(&mut scenario, path.parent().unwrap_or(Path::new("")));

@@ -52,6 +52,7 @@ mod complaint;
 mod doctor;
 mod exit;
 mod experiment_file;
+mod hosts;
 mod hunt;
 mod input;
 mod interrupt;

@@ -60,6 +60,13 @@ pub(crate) fn key_value(text: &str) -> Result<(String, String), ArgumentError> {
     }
 }
 
+/// Parses `NAME=COUNT`.
+pub(crate) fn name_and_count(text: &str) -> Result<(String, u32), ArgumentError> {
+    let wrong = ArgumentError("expected NAME=COUNT, such as a=4: a host's name and its number of drones");
+    let (name, count) = text.split_once('=').ok_or(wrong)?;
+    Ok((name.to_owned(), count.parse().map_err(|_| wrong)?))
+}
+
 /// Parses a time, s.
 pub(crate) fn seconds(text: &str) -> Result<Duration, ArgumentError> {
     let seconds = text.parse().ok().filter(|s: &f64| (0.01..=1e6).contains(s));

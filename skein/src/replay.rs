@@ -101,6 +101,7 @@ fn fly(
         patience: PATIENCE,
         per_process: 1,
         program: pilots.program(),
+        hosts: &[],
         on_ready: &mut |_: &[ProcessInfo]| Ok(()),
         interrupted: &mut || interrupt.signal(),
     };

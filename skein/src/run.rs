@@ -12,13 +12,14 @@ use crate::progress::MissionBar;
 use rustix::process::Signal;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{
-    DataFiles, FlightRecord, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary, Role,
-    RunCompletion, RunFacts, RunFolder, Summary, page, text,
+    DataFiles, FlightRecord, HostEntry, Interrupted, Manifest, ProcessEntry, Recorder, ReportError, ReservedSummary,
+    Role, RunCompletion, RunFacts, RunFolder, StepTimes, Summary, page, text,
 };
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{
-    Launch, PilotRegistry, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent, inline, supervisor,
+    HostReport, HostShare, Launch, PilotRegistry, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent,
+    inline, supervisor,
 };
 use skein_scenario::Scenario;
 use std::path::Path;
@@ -35,6 +36,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     }
     let scenario = input::scenario(&args.scenario, pilots, args.runtime == RuntimeChoice::Inline)?;
     check_packing(args, &scenario)?;
+    check_threads(args)?;
     if args.runtime == RuntimeChoice::Processes {
         check_room(scenario.formation.drones, args.drones_per_process)?;
     }
@@ -52,6 +54,14 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
         }
         warn_of_idle_pilots(pilots, &scenario);
     }
+    let own_program = pilots.flies_own(&scenario).then(|| pilots.program().hash()).transpose();
+    let own_program = own_program.map_err(Failure::environment)?;
+    let shares = match args.runtime {
+        RuntimeChoice::Processes => {
+            args.network.shares((&args.scenario, &scenario), own_program.as_deref(), args.drones_per_process)?
+        }
+        RuntimeChoice::Inline => Vec::new(),
+    };
     let interrupt = Interrupt::watch()?;
     let folder = open_folder(args, &scenario)?;
     if let Some(tell) = on_folder {
@@ -59,7 +69,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     }
     let manifest = manifest(&facts, &scenario)?;
     let flown = begin(args, &folder, &manifest, scenario.timeout_s()).and_then(|Begun { reserved, mut sink }| {
-        let end = fly(args, &scenario, pilots, &folder, &interrupt, &mut sink).map_err(failure)?;
+        let end = fly(args, (&scenario, &shares), pilots, &folder, &interrupt, &mut sink).map_err(failure)?;
         Ok((end, reserved, sink.finish()))
     });
     let (end, reserved, recorder) = match flown {
@@ -75,6 +85,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     let completion = RunCompletion { fallback: Outcome::Aborted, wall_s: Some(wall_s), startup_s: Some(end.startup_s) };
     let reporting = Instant::now();
     let (mut summary, record) = recorder.finish(&completion);
+    summary.hosts = host_entries(&shares, &end);
     if let (None, Some(signal)) = (&summary.reason, end.signal) {
         summary.reason = Some(format!("interrupted by signal {signal}"));
     }
@@ -99,6 +110,23 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     Ok(exit(end.signal.or(stopped), !trouble.is_empty(), &summary))
 }
 
+/// What became of each host.
+fn host_entries(shares: &[HostShare], end: &RunEnd) -> Vec<HostEntry> {
+    let entry = |(share, report): (&HostShare, &Option<HostReport>)| HostEntry {
+        name: share.name.clone(),
+        drones: (share.first.0..share.first.0 + share.count).collect(),
+        lateness_us: report.as_ref().and_then(|report| report.lateness_us).map(|[p50, p99, max]| StepTimes {
+            p50,
+            p99,
+            max,
+        }),
+        ticks: report.as_ref().map(|report| report.ticks),
+        bytes_down: report.as_ref().map(|report| report.bytes_down),
+        bytes_up: report.as_ref().map(|report| report.bytes_up),
+    };
+    shares.iter().zip(&end.hosts).map(entry).collect()
+}
+
 /// What a flight writes to.
 struct Begun {
     reserved: ReservedSummary,
@@ -116,6 +144,14 @@ fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, timeout_s: f64
         false => Recorder::in_folder(facts, folder).map_err(Failure::environment)?,
     };
     Ok(Begun { reserved, sink: MissionBar::new(recorder, quiet, timeout_s, gate_x_m) })
+}
+
+/// Refuses threads for processes: each is on a core of its own anyway.
+fn check_threads(args: &RunArgs) -> Result<(), Failure> {
+    match (args.runtime, args.threads.get()) {
+        (RuntimeChoice::Inline, _) | (_, 1) => Ok(()),
+        (_, threads) => Err(Failure::usage(format!("--threads {threads}: expected --runtime inline beside it"))),
+    }
 }
 
 /// Refuses process faults if drones share processes: the fault would hit all drones of the process.
@@ -191,7 +227,7 @@ fn write_files(
 
 fn fly(
     args: &RunArgs,
-    scenario: &Scenario,
+    (scenario, hosts): (&Scenario, &[HostShare]),
     pilots: &PilotRegistry,
     folder: &RunFolder,
     interrupt: &Interrupt,
@@ -205,7 +241,7 @@ fn fly(
     match args.runtime {
         RuntimeChoice::Inline => {
             on_ready(&[launcher]).map_err(RuntimeError::OnReady)?;
-            inline::run(scenario, pilots, sink, || interrupt.signal())
+            inline::run_on(args.threads, scenario, pilots, sink, || interrupt.signal())
         }
         RuntimeChoice::Processes => {
             skein_bus::clean()?;
@@ -217,6 +253,7 @@ fn fly(
                 patience: args.patience,
                 per_process: args.drones_per_process,
                 program: pilots.program(),
+                hosts,
                 on_ready: &mut on_ready,
                 interrupted: &mut || interrupt.signal(),
             };

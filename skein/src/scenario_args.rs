@@ -1,6 +1,6 @@
 //! Which scenario a command flies.
 
-use crate::options::key_value;
+use crate::options::{key_value, name_and_count};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -20,6 +20,9 @@ pub(crate) struct ScenarioArgs {
     /// --set pilot.0.name=NAME
     #[arg(long, value_name = "NAME")]
     pub(crate) pilot: Option<String>,
+    /// Machines that fly drones, and how many: the first one flies the drones from number 0 on. It replaces all [[host]] tables
+    #[arg(long, value_name = "NAME=COUNT", value_delimiter = ',', value_parser = name_and_count)]
+    pub(crate) hosts: Vec<(String, u32)>,
     /// Override a scenario key, such as radio.delay_s=0.1; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
@@ -28,6 +31,13 @@ pub(crate) struct ScenarioArgs {
 impl ScenarioArgs {
     /// A file as it is.
     pub(crate) fn of_file(scenario: &Path) -> Self {
-        Self { scenario: scenario.to_owned(), strategy: None, seed: None, pilot: None, overrides: Vec::new() }
+        Self {
+            scenario: scenario.to_owned(),
+            strategy: None,
+            seed: None,
+            pilot: None,
+            hosts: Vec::new(),
+            overrides: Vec::new(),
+        }
     }
 }

@@ -50,6 +50,7 @@ fn fly_processes(
         patience: PATIENCE,
         per_process: 1,
         program: context.pilots.program(),
+        hosts: &[],
         on_ready: &mut |_| Ok(()),
         interrupted: &mut || (context.interrupted)(),
     };

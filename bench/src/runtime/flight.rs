@@ -164,6 +164,7 @@ pub(super) fn processes(
         patience: PATIENCE,
         per_process: processes.per_process,
         program: context.pilots.program(),
+        hosts: &[],
         on_ready: &mut |started: &[ProcessInfo]| {
             lock(&usage).begin(started);
             Ok(())
