@@ -97,30 +97,38 @@ fn a_resumed_sweep_gives_the_same_files_as_an_undisturbed_one() {
 #[test]
 fn merged_shards_give_the_same_files_as_one_machine() {
     let place = Place::new();
-    let file = experiment(&place, "e.toml", "seeds = 4");
+    let file = experiment(&place, "e.toml", "seeds = 14");
     let whole = place.run(&["sweep", &file, "--out", "whole"]);
     assert_eq!(whole.code, Some(0), "{whole:?}");
-    let shard =
-        |part: &'static str, out: &'static str| ["sweep", "e.toml", "--shard", part, "--out", out, "--jobs", "1"];
+    let folders = ["a", "b", "c", "d", "e", "f", "g"];
+    let parts = ["1/7", "2/7", "3/7", "4/7", "5/7", "6/7", "7/7"];
+    let shard = |(part, out)| (["sweep", "e.toml", "--shard", part, "--out", out, "--jobs", "1"], out);
+    let shards: Vec<_> = parts.into_iter().zip(folders).map(shard).collect();
     let merge = |folders: &[&str]| place.run(&[&["sweep", "merge"], folders, &["--out", "merged"]].concat());
 
-    let mut flight = place.start(&shard("1/3", "a"));
-    eventually("a run is done", || rows(&place.join("a")) >= 1);
-    signal("KILL", flight.pid());
-    flight.end();
-    for (part, out, runs) in [("2/3", "b", 5), ("3/3", "c", 5)] {
-        let done = place.run(&shard(part, out));
-        assert_eq!((done.code, rows(&place.join(out))), (Some(0), runs), "{done:?}");
+    // Two of them are killed.
+    for (args, out) in &shards[..2] {
+        let mut flight = place.start(args);
+        eventually("a run is done", || rows(&place.join(out)) >= 1);
+        signal("KILL", flight.pid());
+        flight.end();
+        assert!(rows(&place.join(out)) < 8, "{out} was killed too late");
+    }
+    for (args, out) in &shards[2..] {
+        let done = place.run(args);
+        assert_eq!((done.code, rows(&place.join(out))), (Some(0), 8), "{done:?}");
         assert!(done.stdout.contains("skein sweep merge") && !place.join(out).join("runs.csv").exists(), "{done:?}");
     }
-    let early = merge(&["a", "b", "c"]);
-    assert!(early.code == Some(2) && early.stderr.contains("of 16 runs are missing"), "{early:?}");
-    let resumed = place.run(&shard("1/3", "a"));
-    assert_eq!((resumed.code, rows(&place.join("a"))), (Some(0), 6), "{resumed:?}");
+    let early = merge(&folders);
+    assert!(early.code == Some(2) && early.stderr.contains("of 56 runs are missing"), "{early:?}");
+    for (args, out) in &shards[..2] {
+        let resumed = place.run(args);
+        assert_eq!((resumed.code, rows(&place.join(out))), (Some(0), 8), "{resumed:?}");
+    }
 
     // The experiment is not needed any more.
     fs::remove_file(place.join("e.toml")).unwrap();
-    let merged = merge(&["c", "a", "b"]);
+    let merged = merge(&["c", "a", "g", "f", "b", "e", "d"]);
     assert_eq!(merged.code, Some(0), "{merged:?}");
     for file in ["runs.csv", "summary.json", "ratios.csv"] {
         assert_eq!(read(&place, &format!("whole/{file}")), read(&place, &format!("merged/{file}")), "{file}");
