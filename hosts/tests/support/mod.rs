@@ -58,19 +58,35 @@ impl Place {
     }
 
     pub(crate) fn command(&self, args: &[&str]) -> Command {
+        self.command_by(&[], args)
+    }
+
+    fn command_by(&self, by: &[&str], args: &[&str]) -> Command {
         let folder = hosts_program().parent().unwrap();
         let path =
             format!("{}:{}:{}", folder.display(), self.path().join("bin").display(), std::env::var("PATH").unwrap());
-        let mut command = Command::new(swarm());
-        command.args(args).current_dir(self.path()).env("XDG_RUNTIME_DIR", self.path().join("x")).env("PATH", path);
+        let program = swarm();
+        let words = [by, &[program.to_str().unwrap()]].concat();
+        let mut command = Command::new(words[0]);
+        command
+            .args(&words[1..])
+            .args(args)
+            .current_dir(self.path())
+            .env("XDG_RUNTIME_DIR", self.path().join("x"))
+            .env("PATH", path);
         command.env_remove("SKEIN_LOG").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
 
     /// Starts a host and waits until it offers its drones.
     pub(crate) fn host(&self, name: &str, endpoint: &str, more: &[&str]) -> Host {
+        self.host_by(&[], name, endpoint, more)
+    }
+
+    /// As [`Place::host`], by a program that becomes the host.
+    pub(crate) fn host_by(&self, by: &[&str], name: &str, endpoint: &str, more: &[&str]) -> Host {
         let args = [&["host", "--name", name, "--listen", endpoint], more].concat();
-        let mut child = self.command(&args).stderr(Stdio::inherit()).spawn().unwrap();
+        let mut child = self.command_by(by, &args).stderr(Stdio::inherit()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.contains(&format!("host {name} offers")), "{line:?}");
