@@ -464,3 +464,32 @@ fn the_range_is_a_distance_in_space() {
     assert_eq!(at(40.1), Delivery::Drop(DropReason::Range));
     assert_eq!(at(-40.1), Delivery::Drop(DropReason::Range));
 }
+
+/// Two strategies send different frames, so their frames have different numbers at the same time.
+#[test]
+fn keyed_by_time_a_link_meets_the_same_air_whatever_was_sent_before() {
+    let delay = Delay { mean_s: 0.2, jitter_s: 0.1, model: DelayModel::Gamma };
+    let by_frame = radio(ChannelModel { loss: 0.3, delay, ..ChannelModel::default() });
+    let by_time = Radio { keyed_by_time: true, ..by_frame.clone() };
+    let outcomes = |radio: &Radio, ahead: u32| -> Vec<Delivery> {
+        let at = |tick: u32| SimTime::from_secs(f64::from(tick) * PERIOD_S);
+        (0..MANY).map(|tick| radio.outcome(link(0, 1, tick + ahead), Vec3::zeros(), at(tick))).collect()
+    };
+    assert_eq!(outcomes(&by_time, 0), outcomes(&by_time, 7));
+    assert_ne!(outcomes(&by_frame, 0), outcomes(&by_frame, 7));
+    // The rate is that of the model, and moments, directions and topics are independent of each other.
+    let lost = |link: Link, ahead_s: f64| -> Vec<bool> {
+        let at = |tick: u32| SimTime::from_secs(f64::from(tick) * PERIOD_S + ahead_s);
+        let outcome = |tick| by_time.outcome(link, Vec3::zeros(), at(tick));
+        (0..MANY).map(|tick| outcome(tick) == Delivery::Drop(DropReason::Loss)).collect()
+    };
+    let base = lost(link(0, 1, 0), 0.0);
+    let other_topic = Link { topic: Topic::Plan as u16, ..link(0, 1, 0) };
+    let error = (0.3 * 0.7 / f64::from(MANY)).sqrt();
+    assert!((rate(&base) - 0.3).abs() < ERRORS * error);
+    for other in [lost(link(1, 0, 0), 0.0), lost(other_topic, 0.0), lost(link(0, 1, 0), 0.02)] {
+        let both: Vec<bool> = base.iter().zip(&other).map(|(a, b)| *a && *b).collect();
+        let error = (0.09 * 0.91 / f64::from(MANY)).sqrt();
+        assert!((rate(&both) - 0.09).abs() < ERRORS * error, "{}", rate(&both));
+    }
+}

@@ -39,6 +39,9 @@ pub struct RadioKeys {
     /// 1 + this.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub asymmetry: f64,
+    /// Whether random numbers are keyed by link and time instead of the frame's number, so that strategies that send different
+    /// frames meet the same air. Frames of one topic that a drone sends in one tick then share their fate at a receiver.
+    pub keyed_by_time: bool,
     /// Bit rate of the channel that all drones share. Frames queue for it; absent: no limit.
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub rate_bps: Option<f64>,
@@ -67,6 +70,7 @@ impl Default for RadioKeys {
             path_loss_exponent: 2.0,
             duplicate: 0.0,
             asymmetry: 0.0,
+            keyed_by_time: false,
             rate_bps: None,
             queue_limit_s: 1.0,
             burst: None,

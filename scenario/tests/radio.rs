@@ -37,7 +37,7 @@ fn every_key_reaches_the_radio_model() {
         range: Some(Range { half_m: 300.0, shadowing_db: 4.0, exponent: 2.5 }),
         duplicate: 0.05,
     };
-    assert_eq!(s.radio(), Radio { seed: 7, channel: air, asymmetry: 0.5, rules: Vec::new() });
+    assert_eq!(s.radio(), Radio { seed: 7, channel: air, asymmetry: 0.5, keyed_by_time: false, rules: Vec::new() });
     assert_eq!(s.channel(), Some(SharedChannel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
 }
 

@@ -3,6 +3,7 @@
 
 use super::link::Link;
 use crate::ids::DroneId;
+use crate::time::SimTime;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Number of attempts after which a rejection method gives up. For each method in this module, an attempt succeeds with a
@@ -21,6 +22,18 @@ impl KeyedRng {
         key[8..12].copy_from_slice(&link.sequence.to_le_bytes());
         key[12..14].copy_from_slice(&link.topic.to_le_bytes());
         key[16..].copy_from_slice(purpose);
+        Self(xxh3_64_with_seed(&key, seed))
+    }
+
+    /// Numbers for the frames of one topic that are transmitted on a link at a time. Different values of `purpose` give
+    /// independent sequences.
+    pub(crate) fn of_moment(seed: u64, link: Link, aired: SimTime, purpose: &[u8; 4]) -> Self {
+        let mut key = [0; 24];
+        key[..4].copy_from_slice(&link.source.0.to_le_bytes());
+        key[4..8].copy_from_slice(&link.destination.0.to_le_bytes());
+        key[8..16].copy_from_slice(&aired.0.to_le_bytes());
+        key[16..18].copy_from_slice(&link.topic.to_le_bytes());
+        key[20..].copy_from_slice(purpose);
         Self(xxh3_64_with_seed(&key, seed))
     }
 

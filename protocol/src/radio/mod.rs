@@ -44,6 +44,11 @@ pub struct Radio {
     /// log-uniformly from 1 to 1 + `asymmetry`. Delay and loss are multiplied by it in one direction and divided by it in
     /// the other.
     pub asymmetry: f64,
+    /// Whether random numbers are keyed by the time of transmission instead of the frame's sequence number. Flights that send
+    /// different frames then meet the same air: a link loses or delays at the same moments. Frames of one topic that a drone
+    /// sends in one tick share their fate at a receiver.
+    #[serde(default)]
+    pub keyed_by_time: bool,
     /// Rules that replace the channel model for some frames. If several rules cover a frame, the last one applies.
     pub rules: Vec<Rule>,
 }
@@ -70,7 +75,11 @@ impl Radio {
     }
 
     fn outcome_in(&self, channel: &ChannelModel, link: Link, path: Vec3, aired: SimTime) -> Delivery {
-        let draw = |purpose| KeyedRng::of_frame(self.seed, link, purpose).unit();
+        let keyed = |purpose| match self.keyed_by_time {
+            true => KeyedRng::of_moment(self.seed, link, aired, purpose),
+            false => KeyedRng::of_frame(self.seed, link, purpose),
+        };
+        let draw = |purpose| keyed(purpose).unit();
         if let Some(range) = channel.range {
             let heard = range.heard(path.norm_squared());
             if heard < 1.0 && draw(b"rnge") >= heard {
@@ -87,8 +96,7 @@ impl Radio {
         if channel.loss > 0.0 && draw(b"loss") < channel.loss * factor {
             return Delivery::Drop(DropReason::Loss);
         }
-        let arrival =
-            |purpose| aired.after(factor * channel.delay.draw(|| KeyedRng::of_frame(self.seed, link, purpose)));
+        let arrival = |purpose| aired.after(factor * channel.delay.draw(|| keyed(purpose)));
         let due = arrival(b"dely");
         if channel.duplicate > 0.0 && draw(b"dupl") < channel.duplicate {
             let copy = arrival(b"copy");

@@ -35,7 +35,7 @@ fn fill(keys: &mut Map<String, Json>, preset: Map<String, Json>) {
 /// The radio of these keys. `seed` keys its random numbers.
 pub(crate) fn radio(seed: u64, keys: &RadioKeys) -> Radio {
     let rules = keys.rules.iter().map(|rule| channel_rule(keys, rule)).collect();
-    Radio { seed, channel: channel_model(keys), asymmetry: keys.asymmetry, rules }
+    Radio { seed, channel: channel_model(keys), asymmetry: keys.asymmetry, keyed_by_time: keys.keyed_by_time, rules }
 }
 
 /// The channel that all drones share; `None` if bandwidth is no limit. `seed` keys its random numbers.
