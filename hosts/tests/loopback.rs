@@ -187,3 +187,21 @@ fn a_program_that_is_missing_or_another_one_on_the_host_is_refused() {
     elsewhere.script("pilot", &format!("{pilot}# another one\n"));
     assert!(refusal().contains("host b: the program pilot is another one here"), "{}", refusal());
 }
+
+#[test]
+fn a_pilot_of_ones_own_flies_on_hosts_of_its_program_only() {
+    let place = Place::new();
+    let scenario = place.scenario("");
+    let host = place.host("a", &free_endpoint(), &[]);
+    let short = ["--pilot", "thinker", "--set", "time.timeout_s=2"];
+    let alone = place.fly(&scenario, &[&["--runtime", "inline"], &short[..]].concat());
+    let flown = place.fly(&scenario, &[&["--hosts", "a=4", "--connect", &host.endpoint], &short[..]].concat());
+    assert_eq!(flown["digest"], alone["digest"]);
+    assert_eq!(flown["pilots"][0]["name"], "thinker");
+    // A host that another program offers.
+    let other = place.host_of("true", "b", &free_endpoint());
+    let args = ["run", &scenario, "--quiet", "--no-record", "--pilot", "thinker", "--hosts", "b=4", "--connect"];
+    let done = place.run(&[&args[..], &[&other.endpoint]].concat());
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.code() == Some(2) && said.contains("host b: the program true is another one here"), "{done:?}");
+}

@@ -18,9 +18,15 @@ fn hosts_program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_skein-hosts"))
 }
 
-/// An application with the built-in pilots.
+/// An application with the built-in pilots and `thinker`.
 pub(crate) fn swarm() -> PathBuf {
-    hosts_program().with_file_name("examples").join("swarm")
+    let path = hosts_program().with_file_name("examples").join("swarm");
+    assert!(
+        path.is_file(),
+        "expected {}: `cargo test -p skein-hosts` and `cargo test --workspace` build it",
+        path.display()
+    );
+    path
 }
 
 /// A working folder with a domain that no other test shares.
@@ -86,7 +92,19 @@ impl Place {
     /// As [`Place::host`], by a program that becomes the host.
     pub(crate) fn host_by(&self, by: &[&str], name: &str, endpoint: &str, more: &[&str]) -> Host {
         let args = [&["host", "--name", name, "--listen", endpoint], more].concat();
-        let mut child = self.command_by(by, &args).stderr(Stdio::inherit()).spawn().unwrap();
+        Self::offer(self.command_by(by, &args), name, endpoint)
+    }
+
+    /// A host that flies drones with another program.
+    pub(crate) fn host_of(&self, program: &str, name: &str, endpoint: &str) -> Host {
+        let mut command = Command::new(hosts_program());
+        command.args(["host", "--name", name, "--listen", endpoint, "--program", &format!("[{program:?}]")]);
+        command.env("XDG_RUNTIME_DIR", self.path().join("x")).stdout(Stdio::piped());
+        Self::offer(command, name, endpoint)
+    }
+
+    fn offer(mut command: Command, name: &str, endpoint: &str) -> Host {
+        let mut child = command.stderr(Stdio::inherit()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         assert!(line.contains(&format!("host {name} offers")), "{line:?}");
