@@ -6,6 +6,8 @@ use crate::obstacles::{Obstacles, set_array, set_ids};
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
+use crate::relays::Relays;
+use crate::tuning::FAR_REPEATS;
 use skein_protocol::payload::{MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
@@ -13,6 +15,7 @@ use std::collections::BTreeMap;
 /// The broadcasts of one drone: their periods, and what was said when.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Broadcaster {
+    beacon_s: f64,
     beacon_ticks: u64,
     repeat_s: f64,
     /// When each known obstacle is said again.
@@ -26,6 +29,8 @@ pub(crate) struct Broadcaster {
     next_repeat: SimTime,
     /// The last plan of its own whose assignments it has said in full.
     announced: PlanStamp,
+    /// Number of repetitions of plans.
+    repetitions: u32,
 }
 
 /// What is said of a bundle's assignments.
@@ -35,6 +40,8 @@ struct Extent {
     all: bool,
     /// The plan itself, too.
     plan: bool,
+    /// Also assignments of drones that this drone does not hear directly.
+    far: bool,
 }
 
 impl Broadcaster {
@@ -42,6 +49,7 @@ impl Broadcaster {
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let repeat_s = params.repeat_period_s;
         Self {
+            beacon_s: params.beacon_period_s,
             beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
             repeat_s,
             obstacles: BTreeMap::new(),
@@ -50,6 +58,7 @@ impl Broadcaster {
             spoken: false,
             next_repeat: params.start,
             announced: PlanStamp::default(),
+            repetitions: 0,
         }
     }
 
@@ -78,9 +87,11 @@ impl Broadcaster {
         now: SimTime,
         own: &OwnState,
         places: &[QueuePlace; MAX_PLACES],
+        relays: &mut Relays,
         say: &mut Vec<Message>,
     ) {
         if self.beacon_due(own.tick, k.me()) {
+            relays.look(k, now, own, self.beacon_s);
             say.push(Message::Pose(pose(k, now, own, places)));
         }
         if std::mem::replace(&mut self.term, k.election().obeyed()) != k.election().obeyed() {
@@ -91,15 +102,16 @@ impl Broadcaster {
         if self.repeat_due(now) && k.election().leads() {
             self.say_plans(k, now, say);
         }
-        self.say_obstacles(k, now, say);
+        self.say_obstacles(k, now, relays.is_wide(), say);
         if self.passed.is_due(now) {
             say_passed(k, now, own, say);
         }
+        relays.speak(k, now, say);
     }
 
     /// Says the obstacles that are due and that no plan covers yet, so that the leader learns what any member senses. A drone
     /// says what it has sensed first at once.
-    fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, say: &mut Vec<Message>) {
+    fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, wide: bool, say: &mut Vec<Message>) {
         if self.obstacles.len() < k.obstacles().count() {
             for (id, known) in k.obstacles().iter() {
                 let (me, repeat_s) = (k.me(), self.repeat_s);
@@ -112,7 +124,7 @@ impl Broadcaster {
             }
         }
         for (&id, gossip) in &mut self.obstacles {
-            if gossip.is_due(now) && is_open(k, id) {
+            if gossip.is_due(now) && (is_open(k, id) || (wide && is_missed(k, now, id))) {
                 say.extend(obstacle(k.obstacles(), id));
             }
         }
@@ -140,14 +152,16 @@ impl Broadcaster {
         let Some(bundle) = k.ledger().obeyed() else { return };
         let own = bundle.plan.id.ballot == k.election().obeyed();
         let new = own && self.announced != bundle.plan.id;
+        self.repetitions = if new { 0 } else { self.repetitions.wrapping_add(1) };
+        let far = self.repetitions.is_multiple_of(FAR_REPEATS);
         if own {
             say.push(Message::Plan(bundle.plan));
         }
         if own || bundle.plan.group != k.election().scope() {
-            say_parts(k, bundle, now, Extent { all: new, plan: !own }, say);
+            say_parts(k, bundle, now, Extent { all: new, plan: !own, far }, say);
         }
         if let Some(origin) = k.ledger().origin() {
-            say_parts(k, origin, now, Extent { all: false, plan: true }, say);
+            say_parts(k, origin, now, Extent { all: false, plan: true, far }, say);
         }
         if own {
             self.announced = bundle.plan.id;
@@ -167,7 +181,7 @@ fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_P
         term: k.election().obeyed(),
         incarnation: k.incarnation(),
         flags: flag(k.election().leads(), POSE_LEADS) | flag(k.is_impaired(), POSE_IMPAIRED),
-        reserved: 0,
+        hears: k.peers().hears(k.me(), now),
     }
 }
 
@@ -176,11 +190,18 @@ fn is_open(k: &Knowledge, id: ObstacleId) -> bool {
     !k.obstacles().has_passed(k.me(), id) && !k.ledger().sets().iter().any(|set| set.ids.contains(&id))
 }
 
+/// Whether an obstacle is in the plan that this drone obeys, and a neighbour may not obey that plan because it does not know
+/// the obstacle.
+fn is_missed(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
+    let Some(set) = k.ledger().sets().iter().find(|set| set.ids.contains(&id)) else { return false };
+    k.peers().direct(now).any(|(_, pose)| set.scope.contains(pose.group) && pose.obeyed < set.stamp)
+}
+
 /// Says which sets this drone has passed, until the swarm re-forms.
 fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
     for set in k.ledger().sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m()) {
         let (ids, set_count) = set_array(&set.ids);
-        say.push(Message::Passed(Passed { stamp: now, set_count, set: ids, reserved: 0 }));
+        say.push(Message::Passed(Passed { stamp: now, set_count, set: ids, of: 0 }));
     }
 }
 
@@ -188,7 +209,8 @@ fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message
 /// there is no assignment to be said.
 fn say_parts(k: &Knowledge, bundle: &PlanBundle, now: SimTime, extent: Extent, say: &mut Vec<Message>) {
     let (stamp, peers) = (bundle.plan.id, k.peers());
-    let late = |id: DroneId| peers.is_living(id, now) && peers.last(id).is_some_and(|pose| pose.obeyed < stamp);
+    let heard = |id: DroneId| if extent.far { peers.is_living(id, now) } else { peers.is_direct(id, now) };
+    let late = |id: DroneId| heard(id) && peers.last(id).is_some_and(|pose| pose.obeyed < stamp);
     let first = say.len();
     let parts = bundle.parts.iter().filter(|part| extent.all || late(part.drone));
     say.extend(parts.map(|part| Message::Assignment(*part)));

@@ -73,6 +73,8 @@ pub enum Input {
     Claim(GroupId),
     /// Transfer the leadership to this drone. Without effect unless this drone leads.
     Transfer(DroneId),
+    /// Further drones become known: it is too early for a first claim.
+    Settling,
     /// Time has passed.
     Tick {
         /// Number of living members that are closer to the destination than this drone, without the missing leader.
@@ -213,6 +215,12 @@ impl Election {
                 None
             }
             Input::Claim(scope) => self.claim(now, scope),
+            Input::Settling => {
+                if !self.obeyed.is_some() {
+                    self.heard = now;
+                }
+                None
+            }
             Input::Transfer(heir) => {
                 self.leads.then(|| self.message(LeadershipKind::LeadershipTransfer, now, epoch, heir))
             }
@@ -309,7 +317,8 @@ impl Election {
     }
 
     fn message(&self, kind: LeadershipKind, stamp: SimTime, epoch: u32, heir: DroneId) -> Leadership {
-        Leadership { stamp, ballot: self.obeyed, kind: kind.to_wire(), group: self.scope, epoch, heir }
+        let (ballot, group, kind) = (self.obeyed, self.scope, kind.to_wire() as u16);
+        Leadership { stamp, ballot, kind, hops: 0, group, epoch, heir }
     }
 }
 

@@ -4,7 +4,8 @@
 //! does not repeat it in that interval. A change, such as a drone that is heard again after a silence, starts with the
 //! shortest interval. So a fact spreads at once, and a swarm that agrees says little.
 
-use crate::tuning::{MAX_GOSSIP_DOUBLINGS, REDUNDANCY};
+use crate::tuning::{MAX_GOSSIP_DOUBLINGS, NEAR_REDUNDANCY, REDUNDANCY};
+use skein_protocol::digest::Digest;
 use skein_protocol::{DroneId, SimTime};
 
 /// The repetitions of one fact by one drone.
@@ -13,6 +14,8 @@ pub(crate) struct Gossip {
     shortest_s: f64,
     /// Point within the second half of each interval at which this drone speaks, 0 to 1. It differs between drones.
     phase: f64,
+    /// Whether that point is drawn anew for each interval, so that each drone comes first at some time.
+    varies: Option<DroneId>,
     /// How often the shortest interval has been doubled.
     doublings: u32,
     /// Start of the present interval.
@@ -28,12 +31,35 @@ impl Gossip {
     pub(crate) fn new(now: SimTime, shortest_s: f64, me: DroneId) -> Self {
         // Multiples of the golden ratio spread the drones evenly, whatever their number is.
         let phase = (f64::from(me.0) * 0.618_033_988_749_894_9).fract();
-        Self { shortest_s, phase, doublings: 0, since: now, heard: 0, over: false }
+        Self { shortest_s, phase, varies: None, doublings: 0, since: now, heard: 0, over: false }
+    }
+
+    /// As [`Self::new`], but the point at which this drone speaks is drawn anew for each interval.
+    pub(crate) fn varying(now: SimTime, shortest_s: f64, me: DroneId) -> Self {
+        let mut gossip = Self { varies: Some(me), ..Self::new(now, shortest_s, me) };
+        gossip.restart(now);
+        gossip
+    }
+
+    /// Whether this is the first interval since the fact was new, and this drone has not had its turn.
+    pub(crate) fn is_first(&self) -> bool {
+        self.doublings == 0 && !self.over
+    }
+
+    /// How often the shortest interval has been doubled.
+    pub(crate) fn doublings(&self) -> u32 {
+        self.doublings
     }
 
     /// Starts again with the shortest interval: some drone may not know the fact.
     pub(crate) fn restart(&mut self, now: SimTime) {
-        *self = Self { doublings: 0, since: now, heard: 0, over: false, ..*self };
+        self.begin(now, 0);
+    }
+
+    fn begin(&mut self, now: SimTime, doublings: u32) {
+        let draw = |me: DroneId| (Digest::chain(u64::from(me.0), now.0 as u64) >> 11) as f64 / (1_u64 << 53) as f64;
+        let phase = self.varies.map_or(self.phase, draw);
+        *self = Self { phase, doublings, since: now, heard: 0, over: false, ..*self };
     }
 
     /// Notes that another drone has said the fact.
@@ -46,11 +72,11 @@ impl Gossip {
         let length_s = self.shortest_s * f64::from(1_u32 << self.doublings);
         let age_s = now.since(self.since);
         let turn = !self.over && age_s >= length_s * (0.5 + 0.5 * self.phase);
-        let due = turn && self.heard < REDUNDANCY;
+        let enough = if self.varies.is_some() { NEAR_REDUNDANCY } else { REDUNDANCY };
+        let due = turn && self.heard < enough;
         self.over |= turn;
         if age_s >= length_s {
-            let doublings = (self.doublings + 1).min(MAX_GOSSIP_DOUBLINGS);
-            *self = Self { doublings, since: now, heard: 0, over: false, ..*self };
+            self.begin(now, (self.doublings + 1).min(MAX_GOSSIP_DOUBLINGS));
         }
         due
     }

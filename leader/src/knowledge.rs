@@ -182,6 +182,14 @@ impl Knowledge {
         self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
     }
 
+    /// Hears a beacon of `drone` that another drone passed on. Returns the same as [`Self::hear_pose`].
+    pub(crate) fn hear_of(&mut self, now: SimTime, drone: DroneId, pose: Pose) -> bool {
+        self.peers.hear_of(now, drone, pose);
+        let ballot = self.election.obeyed();
+        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
+        self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
+    }
+
     /// Learns of an obstacle. Returns whether it is new.
     pub(crate) fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
         let new = self.obstacles.learn(now, id, shape, witness);
@@ -192,15 +200,14 @@ impl Knowledge {
         new
     }
 
-    /// Hears a message about leadership; returns the answer. Claims and heartbeats count only from the claimant itself.
+    /// Hears a message about leadership that [`crate::relays::Relays`] admitted; returns the answer.
     pub(crate) fn hear_leadership(
         &mut self,
         now: SimTime,
         source: DroneId,
         message: &Leadership,
     ) -> Option<Leadership> {
-        let relayed = matches!(message.kind(), LeadershipKind::PreVote | LeadershipKind::PreVoteRejection);
-        if message.ballot.claimant.0 >= self.drones || (!relayed && message.ballot.claimant != source) {
+        if message.ballot.claimant.0 >= self.drones {
             return None;
         }
         let others_reject = || !self.election.leads() && self.lower_living_peers(now, source) >= MAX_REJECTIONS;
@@ -219,16 +226,18 @@ impl Knowledge {
 
     /// Hears a plan.
     pub(crate) fn hear_plan(&mut self, now: SimTime, source: DroneId, plan: &Plan) {
-        if self.obeys(now, source, Term { ballot: plan.id.ballot, scope: plan.group, named: false }) {
+        let (ballot, scope) = (plan.id.ballot, plan.group);
+        if self.obeys(now, Term { ballot, scope, named: false, goes_on: ballot.claimant == source }, source) {
             self.ledger.hear_plan(plan, &self.obstacles);
             self.join(now);
         }
     }
 
-    /// Hears a drone's assignment.
-    pub(crate) fn hear_assignment(&mut self, now: SimTime, source: DroneId, part: &Assignment) {
-        let named = part.drone == self.me;
-        if self.obeys(now, source, Term { ballot: part.id.ballot, scope: part.scope, named }) {
+    /// Hears a drone's assignment. `goes_on`: whether the term's leader was heard of just now.
+    pub(crate) fn hear_assignment(&mut self, now: SimTime, source: DroneId, part: &Assignment, goes_on: bool) {
+        let (ballot, scope, named) = (part.id.ballot, part.scope, part.drone == self.me);
+        let goes_on = ballot.claimant == source || (named && goes_on);
+        if self.obeys(now, Term { ballot, scope, named, goes_on }, source) {
             self.ledger.hear_assignment(part, &self.obstacles);
             self.join(now);
         }
@@ -236,15 +245,15 @@ impl Knowledge {
 
     /// Takes note of the term that a message of `source` belongs to. Returns whether this drone obeys it and does not
     /// lead it.
-    fn obeys(&mut self, now: SimTime, source: DroneId, term: Term) -> bool {
-        let Term { ballot, scope, named } = term;
+    fn obeys(&mut self, now: SimTime, term: Term, source: DroneId) -> bool {
+        let Term { ballot, scope, named, goes_on } = term;
         if ballot.claimant.0 >= self.drones {
             return false;
         }
         // A repetition by another drone does not show that the leader lives, nor that there is such a term. A repetition
         // by a drone that leads another term by now does not show that this term goes on.
         let over = ballot == self.election.obeyed() && self.term_of(source) > ballot;
-        if ballot.claimant == source && !over {
+        if goes_on && !over {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named });
         }
         ballot == self.election.obeyed() && !self.election.leads()
@@ -252,7 +261,7 @@ impl Knowledge {
 
     /// Hears which obstacles a drone has passed.
     pub(crate) fn hear_passed(&mut self, source: DroneId, passed: &Passed) {
-        self.obstacles.hear_passed(source, passed);
+        self.obstacles.hear_passed(passed.drone(source), passed);
     }
 
     /// Notes which planned sets this drone has passed, being at `position`.
@@ -309,4 +318,6 @@ struct Term {
     scope: GroupId,
     /// Whether the message names this drone.
     named: bool,
+    /// Whether the message shows that the term's leader lives.
+    goes_on: bool,
 }

@@ -18,9 +18,10 @@ use crate::peers::Peers;
 use crate::plan_bundle::PlanBundle;
 use crate::planned_set::PlannedSet;
 use crate::planner::Planner;
+use crate::relays::Relays;
 use crate::roles::Roles;
 use crate::situation::Situation;
-use skein_protocol::payload::{Assignment, MAX_PLACES, QueuePlace};
+use skein_protocol::payload::{Assignment, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
 
@@ -37,6 +38,8 @@ pub struct Leading {
     membership: Membership,
     planner: Planner,
     broadcaster: Broadcaster,
+    relays: Relays,
+    leader_timeout_s: f64,
 }
 
 impl Leading {
@@ -50,6 +53,8 @@ impl Leading {
             membership: Membership::default(),
             planner: Planner::new(params.drones, params.repeat_period_s),
             broadcaster: Broadcaster::new(params),
+            relays: Relays::new(params),
+            leader_timeout_s: params.election.leader_timeout_s,
         }
     }
 
@@ -57,7 +62,8 @@ impl Leading {
     /// one group that this drone leads in its first term.
     #[must_use]
     pub fn rollout_member(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
-        Self { knowledge: self.knowledge.of_rollout_member(params, now, ledger), ..Self::new(params) }
+        let knowledge = self.knowledge.of_rollout_member(params, now, ledger);
+        Self { knowledge, relays: Relays::unused(params), ..Self::new(params) }
     }
 
     /// Whether this drone leads a group.
@@ -196,7 +202,8 @@ impl Leading {
         if source == self.knowledge.me() || source.0 >= self.drones {
             return;
         }
-        match message.into() {
+        let message = message.into();
+        match message {
             MessageRef::Pose(pose) => {
                 if self.knowledge.is_back(now, source, pose) {
                     self.broadcaster.restart_gossip(now);
@@ -204,20 +211,44 @@ impl Leading {
                 if self.knowledge.hear_pose(now, source, pose) {
                     self.roles.note_plan_conflict();
                 }
+                self.relays.hear_state(&self.knowledge, now, source, None);
             }
             MessageRef::Obstacle(o) => {
                 self.knowledge.learn(now, o.id, o.shape, o.witness);
-                self.broadcaster.hear_obstacle(o.id);
+                if !self.relays.is_wide() || self.relays.is_near(&self.knowledge, source) {
+                    self.broadcaster.hear_obstacle(o.id);
+                }
             }
             MessageRef::Leadership(l) => {
-                say.extend(self.knowledge.hear_leadership(now, source, l).map(Message::Leadership));
+                if self.relays.admits(&self.knowledge, now, source, l) {
+                    say.extend(self.knowledge.hear_leadership(now, source, l).map(Message::Leadership));
+                }
             }
             MessageRef::Plan(plan) => self.knowledge.hear_plan(now, source, plan),
-            MessageRef::Assignment(part) => self.knowledge.hear_assignment(now, source, part),
+            MessageRef::Assignment(part) => {
+                let goes_on = self.relays.knows_term(now, part.id.ballot, self.leader_timeout_s);
+                self.knowledge.hear_assignment(now, source, part, goes_on);
+            }
             MessageRef::Arrivals(row) => self.planner.hear(now, row),
             MessageRef::Passed(passed) => self.knowledge.hear_passed(source, passed),
+            MessageRef::Presence(presence) => self.hear_presence(now, source, presence),
             // A message of the pilot's own says nothing about leading.
             MessageRef::User(_) => {}
+        }
+        let is_fact = !matches!(message, MessageRef::Leadership(_) | MessageRef::Pose(_) | MessageRef::Presence(_));
+        if is_fact && self.relays.is_wide() {
+            self.relays.hear(&self.knowledge, now, source, &message.to_message());
+        }
+    }
+
+    /// Hears of drones that `source` has heard of.
+    fn hear_presence(&mut self, now: SimTime, source: DroneId, presence: &Presence) {
+        let me = self.knowledge.me();
+        for (drone, pose) in presence.poses().filter(|(drone, _)| *drone != me && drone.0 < self.drones) {
+            if self.knowledge.hear_of(now, drone, pose) {
+                self.roles.note_plan_conflict();
+            }
+            self.relays.hear_state(&self.knowledge, now, drone, Some((source, &pose)));
         }
     }
 
@@ -233,6 +264,9 @@ impl Leading {
 
     /// Runs the election: heartbeats, pre-votes, claims and transfers go into `say`. Call once per tick.
     pub fn elect(&mut self, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
+        if self.relays.is_settling(&self.knowledge, now) {
+            self.knowledge.elect(now, Input::Settling);
+        }
         let (closer, delay_s) = (self.knowledge.closer(now, own), self.peers().delay_s());
         say.extend(self.knowledge.elect(now, Input::Tick { closer, delay_s }).map(Message::Leadership));
         if let Some(input) = self.roles.decide(&self.knowledge, now, own) {
@@ -289,6 +323,6 @@ impl Leading {
 
     /// Says what is due: the beacon, and repetitions. `places` are this drone's places in queues. Call once per tick.
     pub fn speak(&mut self, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_PLACES], say: &mut Vec<Message>) {
-        self.broadcaster.speak(&self.knowledge, now, own, places, say);
+        self.broadcaster.speak(&self.knowledge, now, own, places, &mut self.relays, say);
     }
 }

@@ -66,6 +66,8 @@ mod plan_exchange;
 mod plan_pace;
 pub mod planned_set;
 mod planner;
+mod presences;
+mod relays;
 mod roles;
 pub mod roster;
 pub mod routes;

@@ -182,7 +182,7 @@ mod tests {
         let mut obstacles = Obstacles::new(4, 40.0);
         obstacles.learn(SimTime::ZERO, ObstacleId(1), disc(0.0), DroneId(0));
         let (set, set_count) = set_array(&[ObstacleId(1), ObstacleId(9)]);
-        let message = Passed { stamp: SimTime::ZERO, set_count, set, reserved: 0 };
+        let message = Passed { stamp: SimTime::ZERO, set_count, set, of: 0 };
         obstacles.hear_passed(DroneId(2), &message);
         obstacles.hear_passed(DroneId(99), &message);
         assert!(obstacles.has_passed(DroneId(2), ObstacleId(1)));

@@ -1,7 +1,8 @@
 //! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
-use crate::tuning::DELAY_WEIGHT;
+use crate::tuning::{DELAY_WEIGHT, DIRECT_S};
+use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
 
@@ -21,12 +22,18 @@ struct Peer {
     silence_s: f64,
     /// Of its beacons, by their times of arrival.
     timeout: AdaptiveTimeout,
+    /// When it was last heard without a relay.
+    direct: Option<SimTime>,
     pose: Pose,
 }
 
 impl Peer {
     fn lives(&self, now: SimTime) -> bool {
         now.since(self.timeout.last()) <= self.silence_s
+    }
+
+    fn is_direct(&self, now: SimTime) -> bool {
+        self.direct.is_some_and(|direct| now.since(direct) <= self.silence_s)
     }
 
     /// A moment until which it certainly lives.
@@ -74,6 +81,17 @@ impl Peers {
     /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
     /// Age is by simulated time alone, which goes on when a process is restarted.
     pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
+        self.take(now, source, pose, Some(now));
+    }
+
+    /// Takes a beacon that another drone passed on. It is ignored if the peer itself is heard.
+    pub fn hear_of(&mut self, now: SimTime, peer: DroneId, pose: Pose) {
+        if !self.is_heard_now(peer, now) {
+            self.take(now, peer, pose, None);
+        }
+    }
+
+    fn take(&mut self, now: SimTime, source: DroneId, pose: Pose, direct: Option<SimTime>) {
         let delay_s = now.since(pose.stamp);
         if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
             return;
@@ -81,7 +99,7 @@ impl Peers {
         match self.place(source) {
             Err(place) => {
                 let timeout = AdaptiveTimeout::new(now);
-                let peer = Peer { silence_s: timeout.timeout_s(self.timeout_s), timeout, pose };
+                let peer = Peer { silence_s: timeout.timeout_s(self.timeout_s), timeout, direct, pose };
                 self.quiet_until = self.quiet_until.min(peer.lives_until());
                 self.ids.insert(place, source);
                 self.stamps.insert(place, pose.stamp);
@@ -90,11 +108,14 @@ impl Peers {
             Ok(place) if pose.stamp > self.stamps[place] => {
                 let peer = &mut self.last[place];
                 peer.pose = pose;
+                peer.direct = direct.or(peer.direct);
                 peer.timeout.hear(now, 0.0, peer.silence_s);
                 peer.silence_s = peer.timeout.timeout_s(self.timeout_s);
                 self.stamps[place] = pose.stamp;
                 self.quiet_until = self.quiet_until.min(peer.lives_until());
-                self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
+                if direct.is_some() {
+                    self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
+                }
             }
             Ok(_) => {}
         }
@@ -124,6 +145,30 @@ impl Peers {
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
         self.place(peer).ok().map(|place| &self.last[place])
+    }
+
+    /// Whether a peer's own beacon was heard just now.
+    pub(crate) fn is_heard_now(&self, peer: DroneId, now: SimTime) -> bool {
+        self.get(peer).and_then(|known| known.direct).is_some_and(|direct| now.since(direct) <= DIRECT_S)
+    }
+
+    /// Whether a peer is heard without a relay.
+    pub(crate) fn is_direct(&self, peer: DroneId, now: SimTime) -> bool {
+        self.get(peer).is_some_and(|known| known.is_direct(now))
+    }
+
+    /// The peers that are heard without a relay, by id.
+    pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
+        self.known().filter(move |(_, known)| known.is_direct(now)).map(|(id, known)| (id, &known.pose))
+    }
+
+    /// What drone `me` says in [`Pose::hears`].
+    pub(crate) fn hears(&self, me: DroneId, now: SimTime) -> u32 {
+        let heard = self.direct(now).count();
+        if heard == 0 || heard + 1 >= self.drones as usize {
+            return 0;
+        }
+        hash_of(self.direct(now).map(|(id, _)| id).chain([me]))
     }
 
     /// How long a beacon takes to arrive, s: a running mean.
@@ -219,6 +264,12 @@ impl Peers {
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
         self.ids.iter().copied().zip(&self.last)
     }
+}
+
+/// A hash of a set of drones, whatever their order; never 0.
+fn hash_of(drones: impl Iterator<Item = DroneId>) -> u32 {
+    let sum = drones.fold(0_u64, |sum, id| sum.wrapping_add(Digest::chain(1, u64::from(id.0))));
+    ((sum >> 32) as u32).max(1)
 }
 
 /// Where a drone is at `now` if it has kept the velocity of its beacon, world frame, m.

@@ -79,6 +79,38 @@ pub(crate) const REDUNDANCY: u32 = 3;
 /// By hand; `skein sweep experiments/presets.toml`.
 pub(crate) const MAX_GOSSIP_DOUBLINGS: u32 = 3;
 
+// ---- Relays (`relays.rs`, `presences.rs`) ----
+
+/// A drone that hears this many copies from drones close to it does not pass a message on. No unit. 2. By hand.
+pub(crate) const NEAR_REDUNDANCY: u32 = 2;
+/// A drone is close if it is nearer than this part of the distance of the farthest neighbour. No unit. 0.5. By hand.
+pub(crate) const NEAR: f64 = 0.5;
+/// A drone passes messages on once a neighbour has heard other drones than it does for this long, s. At least three beacons,
+/// and twice the message delay is added. 0.5. By hand: longer than a crash is noticed by some and not by others.
+pub(crate) const WIDE_S: f64 = 0.5;
+/// Longest time until a message of a leader is passed on, s. 0.1: half of a heartbeat period. By hand.
+pub(crate) const HOP_S: f64 = 0.1;
+/// What was not heard for this long is forgotten, s. 30. By hand.
+pub(crate) const RELAY_MEMORY_S: f64 = 30.0;
+/// Most frames that a drone passes on in one tick. 4. By hand.
+pub(crate) const MAX_RELAYED_PER_TICK: usize = 4;
+/// An assignment is passed on by drones in all directions from this interval on. No unit. 2. By hand.
+pub(crate) const DETOUR_DOUBLINGS: u32 = 2;
+/// A drone's news is passed on this many times at once. 2. By hand.
+pub(crate) const NEWS_TIMES: u32 = 2;
+/// Drones without news are passed on once per this many repeat periods. No unit. 8: with the default period every 1.6 s. By
+/// hand.
+pub(crate) const PRESENCE_REPEATS: f64 = 8.0;
+/// A drone heard directly within this time needs no relay, s. 1. By hand: several beacons.
+pub(crate) const DIRECT_S: f64 = 1.0;
+/// No first claim is made while further drones became known within this time, s. 0.6. By hand: three hops.
+pub(crate) const SETTLED_S: f64 = 0.6;
+/// The first claim is not delayed for longer, s. 5. By hand.
+pub(crate) const UNSETTLED_S: f64 = 5.0;
+/// A leader repeats the assignment of a drone that it does not hear directly in every fourth repetition only. 4. By hand:
+/// the drones between them repeat it, too.
+pub(crate) const FAR_REPEATS: u32 = 4;
+
 // ---- Formation (`formation_planner.rs`) ----
 
 /// Distance of slots from drones that hover dead, in safe distances. No unit. 1.05. By hand. The pilot's own paths keep

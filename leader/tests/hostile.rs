@@ -141,7 +141,7 @@ fn arrivals() -> impl Strategy<Value = Arrivals> {
 
 /// A message with honest and hostile fields.
 fn message() -> impl Strategy<Value = Message> {
-    let leadership = (instant(), ballot(), 0..8u32, group(), any::<u32>(), drone());
+    let leadership = (instant(), ballot(), 0..8u16, 0..3u16, group(), any::<u32>(), drone());
     let passed = (instant(), set());
     prop_oneof![
         pose().prop_map(Message::Pose),
@@ -150,10 +150,11 @@ fn message() -> impl Strategy<Value = Message> {
             id: ObstacleId(id),
             witness
         })),
-        leadership.prop_map(|(stamp, ballot, kind, group, epoch, heir)| Message::Leadership(Leadership {
+        leadership.prop_map(|(stamp, ballot, kind, hops, group, epoch, heir)| Message::Leadership(Leadership {
             stamp,
             ballot,
             kind,
+            hops,
             group,
             epoch,
             heir
@@ -161,7 +162,7 @@ fn message() -> impl Strategy<Value = Message> {
         plan().prop_map(Message::Plan),
         assignment().prop_map(Message::Assignment),
         arrivals().prop_map(Message::Arrivals),
-        passed.prop_map(|(stamp, (set, set_count))| Message::Passed(Passed { stamp, set, set_count, reserved: 0 })),
+        passed.prop_map(|(stamp, (set, set_count))| Message::Passed(Passed { stamp, set, set_count, of: 0 })),
     ]
 }
 

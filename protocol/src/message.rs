@@ -5,7 +5,7 @@
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
-use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose};
+use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose, Presence};
 use crate::topic_name::OWN_TOPIC;
 use crate::user_message::UserMessage;
 use crate::wire::{ArrivalsKind, LeadershipKind, Phase, UnknownCode};
@@ -32,6 +32,8 @@ pub enum Message {
     Arrivals(Arrivals),
     /// A drone's notice that it has passed an obstacle set.
     Passed(Passed),
+    /// The states of drones that the source has heard of.
+    Presence(Presence),
     /// A message of a pilot's own.
     User(UserMessage),
 }
@@ -48,6 +50,7 @@ impl Message {
             Self::Assignment(_) => Topic::Assignment,
             Self::Arrivals(_) => Topic::Arrivals,
             Self::Passed(_) => Topic::Passed,
+            Self::Presence(_) => Topic::Presence,
             Self::User(message) => return message.topic().kind(),
         };
         topic as u16
@@ -65,6 +68,7 @@ impl Message {
             Self::Assignment(payload) => bytemuck::bytes_of(payload),
             Self::Arrivals(payload) => bytemuck::bytes_of(payload),
             Self::Passed(payload) => bytemuck::bytes_of(payload),
+            Self::Presence(payload) => bytemuck::bytes_of(payload),
             Self::User(message) => message.payload(),
         };
         let mut frame = Frame {
@@ -103,6 +107,8 @@ pub enum MessageRef<'a> {
     Arrivals(&'a Arrivals),
     /// See [`Message::Passed`].
     Passed(&'a Passed),
+    /// See [`Message::Presence`].
+    Presence(&'a Presence),
     /// See [`Message::User`].
     User(&'a UserMessage),
 }
@@ -117,6 +123,7 @@ impl<'a> From<&'a Message> for MessageRef<'a> {
             Message::Assignment(payload) => Self::Assignment(payload),
             Message::Arrivals(payload) => Self::Arrivals(payload),
             Message::Passed(payload) => Self::Passed(payload),
+            Message::Presence(payload) => Self::Presence(payload),
             Message::User(message) => Self::User(message),
         }
     }
@@ -143,6 +150,7 @@ impl<'a> MessageRef<'a> {
             Topic::Assignment => Self::Assignment(read(frame)?),
             Topic::Arrivals => Self::Arrivals(read(frame)?),
             Topic::Passed => Self::Passed(read(frame)?),
+            Topic::Presence => Self::Presence(read(frame)?),
         };
         message.check()?;
         Ok(message)
@@ -159,6 +167,7 @@ impl<'a> MessageRef<'a> {
             Self::Assignment(payload) => Message::Assignment(*payload),
             Self::Arrivals(payload) => Message::Arrivals(*payload),
             Self::Passed(payload) => Message::Passed(*payload),
+            Self::Presence(payload) => Message::Presence(*payload),
             Self::User(message) => Message::User(*message),
         }
     }
@@ -185,7 +194,7 @@ impl<'a> MessageRef<'a> {
             }
             Self::Leadership(l) => {
                 lineage(l.group)?;
-                known(LeadershipKind::from_wire(l.kind))
+                known(LeadershipKind::from_wire(l.kind.into()))
             }
             Self::Plan(p) => {
                 lineage(p.group)?;
@@ -212,6 +221,14 @@ impl<'a> MessageRef<'a> {
                 a.gate_s.iter().try_for_each(|&gate_s| bounded_or_never(gate_s.into(), "arrival"))
             }
             Self::Passed(p) => below(p.set_count, set_limit, "obstacle count"),
+            Self::Presence(p) => {
+                lineage(p.group)?;
+                below(p.count, payload::MAX_PRESENT as u32 + 1, "drone count")?;
+                p.poses().try_for_each(|(_, pose)| {
+                    finite(&pose.position_m, "position")?;
+                    finite(&pose.velocity_mps, "velocity")
+                })
+            }
             // Checked when it is read: only the name has rules.
             Self::User(_) => Ok(()),
         }
@@ -271,7 +288,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_bytes_cause_a_panic(kind in 0u16..9, len in 0u32..400, bytes in prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)) {
+        fn no_bytes_cause_a_panic(kind in 0u16..11, len in 0u32..400, bytes in prop::collection::vec(any::<u8>(), FRAME_PAYLOAD)) {
             let mut frame = Frame { kind, version: payload::VERSION, len, payload: [0; FRAME_PAYLOAD] };
             frame.payload.copy_from_slice(&bytes);
             if let Ok(message) = Message::decode(&frame) {

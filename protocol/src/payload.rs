@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
 /// Version of all layouts in this module. A receiver rejects a frame of another version.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
@@ -80,8 +80,9 @@ pub struct Pose {
     pub incarnation: u32,
     /// Combination of [`POSE_LEADS`] and [`POSE_IMPAIRED`].
     pub flags: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// A hash of the drones that the drone hears without a relay, itself included. Two drones that hear the same drones have
+    /// the same hash. 0 if the drone hears nobody, hears all drones of the swarm, or does not say.
+    pub hears: u32,
 }
 
 impl Pose {
@@ -110,6 +111,66 @@ impl Pose {
     }
 }
 
+/// Maximum number of drones in one [`Presence`].
+pub const MAX_PRESENT: usize = 6;
+
+/// The state of a drone that the source of the message has heard of.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Present {
+    /// Time of the state.
+    pub stamp: SimTime,
+    /// The drone.
+    pub drone: DroneId,
+    /// Number of the drone's process, as in [`Pose::incarnation`].
+    pub incarnation: u32,
+    /// As in [`Pose::flags`].
+    pub flags: u32,
+    /// Position, world frame, m.
+    pub position_m: [f32; 3],
+    /// Horizontal velocity, world frame, m/s.
+    pub velocity_mps: [f32; 2],
+}
+
+/// The states of drones that some drones do not hear themselves. All of them are in one group and obey one term and one plan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Presence {
+    /// The plan that the drones obey.
+    pub obeyed: PlanStamp,
+    /// The drones' group.
+    pub group: GroupId,
+    /// The term that the drones obey.
+    pub term: Ballot,
+    /// Number of entries of `drones` in use, at most [`MAX_PRESENT`].
+    pub count: u32,
+    /// The drones.
+    pub drones: [Present; MAX_PRESENT],
+}
+
+impl Presence {
+    /// The last beacons of the drones, as far as they are passed on: without the climb, the places in queues, and the drones
+    /// that each of them hears.
+    pub fn poses(&self) -> impl Iterator<Item = (DroneId, Pose)> + '_ {
+        self.drones.iter().take(self.count as usize).map(|present| {
+            let ([x, y, z], [vx, vy]) = (present.position_m.map(f64::from), present.velocity_mps.map(f64::from));
+            let pose = Pose {
+                stamp: present.stamp,
+                position_m: [x, y, z],
+                velocity_mps: [vx, vy, 0.0],
+                queue: [QueuePlace::default(); MAX_PLACES],
+                obeyed: self.obeyed,
+                group: self.group,
+                term: self.term,
+                incarnation: present.incarnation,
+                flags: present.flags,
+                hears: 0,
+            };
+            (present.drone, pose)
+        })
+    }
+}
+
 /// An obstacle that a drone has sensed, sent to the drones that have not sensed it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -131,7 +192,9 @@ pub struct Leadership {
     /// The term.
     pub ballot: Ballot,
     /// A [`LeadershipKind`], see [`Leadership::kind`].
-    pub kind: u32,
+    pub kind: u16,
+    /// How often the message was passed on. A drone that passes it on adds 1.
+    pub hops: u16,
     /// The group that the term is about.
     pub group: GroupId,
     /// Number of the last plan made in this term; 0 if none.
@@ -145,7 +208,7 @@ impl Leadership {
     /// counts as a heartbeat.
     #[must_use]
     pub fn kind(&self) -> LeadershipKind {
-        LeadershipKind::from_wire(self.kind).unwrap_or(LeadershipKind::Heartbeat)
+        LeadershipKind::from_wire(self.kind.into()).unwrap_or(LeadershipKind::Heartbeat)
     }
 }
 
@@ -158,6 +221,7 @@ impl fmt::Debug for Leadership {
             .field("group", &self.group)
             .field("epoch", &self.epoch)
             .field("heir", &self.heir)
+            .field("hops", &self.hops)
             .finish()
     }
 }
@@ -313,7 +377,7 @@ impl fmt::Debug for Arrivals {
     }
 }
 
-/// Reports that the source is past these obstacles: beyond the rear edge of the set by the planning distance.
+/// Reports that a drone is past these obstacles: beyond the rear edge of the set by the planning distance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Passed {
@@ -323,6 +387,14 @@ pub struct Passed {
     pub set_count: u32,
     /// The obstacles, in ascending order.
     pub set: [ObstacleId; MAX_SET],
-    /// Always 0.
-    pub reserved: u32,
+    /// 0 if the source itself is past them. Otherwise the source passes a report on, of the drone with this number less 1.
+    pub of: u32,
+}
+
+impl Passed {
+    /// The drone that is past the obstacles, in a message of `source`.
+    #[must_use]
+    pub fn drone(&self, source: DroneId) -> DroneId {
+        self.of.checked_sub(1).map_or(source, DroneId)
+    }
 }

@@ -22,12 +22,22 @@ pub enum Topic {
     Arrivals = 6,
     /// Carries a [`Passed`](crate::payload::Passed).
     Passed = 7,
+    /// Carries a [`Presence`](crate::payload::Presence).
+    Presence = 9,
 }
 
 impl Topic {
     /// All topics, in the order of their numbers on the wire.
-    pub const ALL: [Self; 7] =
-        [Self::Pose, Self::Obstacle, Self::Leadership, Self::Plan, Self::Assignment, Self::Arrivals, Self::Passed];
+    pub const ALL: [Self; 8] = [
+        Self::Pose,
+        Self::Obstacle,
+        Self::Leadership,
+        Self::Plan,
+        Self::Assignment,
+        Self::Arrivals,
+        Self::Passed,
+        Self::Presence,
+    ];
 
     /// The topic with this number on the wire; `None` if no topic has it.
     #[must_use]
@@ -46,6 +56,7 @@ impl Topic {
             Self::Assignment => "assignment",
             Self::Arrivals => "arrivals",
             Self::Passed => "passed",
+            Self::Presence => "presence",
         }
     }
 

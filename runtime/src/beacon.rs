@@ -33,7 +33,7 @@ impl Pilot for BeaconPilot {
                 term: Ballot::NONE,
                 incarnation: self.incarnation,
                 flags: 0,
-                reserved: 0,
+                hears: 0,
             }));
         }
         Command::default()

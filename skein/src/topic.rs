@@ -59,7 +59,7 @@ pub(crate) struct Filter {
     /// Only messages of this drone
     #[arg(long, value_name = "ID")]
     pub(crate) drone: Option<u32>,
-    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed, arrivals, or a topic that pilots define
+    /// Only frames of this kind: pose, obstacle, leadership, plan, assignment, passed, arrivals, presence, or a topic that pilots define
     #[arg(long, value_parser = kind)]
     pub(crate) kind: Option<String>,
     /// Stop after N lines

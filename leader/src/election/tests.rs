@@ -124,8 +124,8 @@ fn a_rejection_counts_up_to_its_stamp_and_not_if_it_is_from_the_future() {
     let mut drone = machine(2);
     sign(&mut drone, 0.0, ballot(1, 1), N, false);
     let rejection = |stamp| {
-        let kind = LeadershipKind::PreVoteRejection.to_wire();
-        Input::Heard(Leadership { stamp, ballot: ballot(1, 1), kind, group: N, epoch: 0, heir: DroneId::NONE })
+        let kind = LeadershipKind::PreVoteRejection.to_wire() as u16;
+        Input::Heard(Leadership { stamp, ballot: ballot(1, 1), kind, hops: 0, group: N, epoch: 0, heir: DroneId::NONE })
     };
     drone.handle(at(1.0), 0, rejection(at(60.0)));
     assert!(!drone.has_leader(at(1.1)));

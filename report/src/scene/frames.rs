@@ -81,7 +81,11 @@ pub(super) fn content(frame: &AirFrame) -> String {
         }
         Ok(Message::Assignment(part)) => format!("drone {}: {}, place {}", part.drone, part.group, part.rank),
         Ok(Message::Arrivals(row)) => format!("drone {}: arrival times by {} routes", row.drone, row.routes),
-        Ok(Message::Passed(passed)) => format!("passed {} obstacles", passed.set_count),
+        Ok(Message::Passed(passed)) => match passed.of.checked_sub(1) {
+            Some(drone) => format!("drone {drone} passed {} obstacles", passed.set_count),
+            None => format!("passed {} obstacles", passed.set_count),
+        },
+        Ok(Message::Presence(presence)) => format!("passes on the states of {} drones", presence.count),
         Ok(Message::User(message)) => format!("{} bytes", message.bytes().len()),
         Err(error) => error.to_string(),
     }
@@ -96,7 +100,7 @@ mod tests {
     use skein_protocol::radio::{ChannelModel, Radio, Range};
 
     fn frame(sequence: u32) -> AirFrame {
-        let passed = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), reserved: 0 };
+        let passed = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), of: 0 };
         AirFrame {
             tick: 3,
             source: DroneId(0),

@@ -5,9 +5,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use skein_protocol::payload::{
-    Arrivals, Assignment, Leadership, MAX_ROUTES, MAX_SET, NO_ROUTE, Obstacle, Passed, Plan, Pose, QueuePlace,
+    Arrivals, Assignment, Leadership, MAX_ROUTES, MAX_SET, NO_ROUTE, Obstacle, Passed, Plan, Pose, Presence, QueuePlace,
 };
-use skein_protocol::{Ballot, Message, ObstacleId, PlanStamp, UserMessage};
+use skein_protocol::{Ballot, DroneId, Message, ObstacleId, PlanStamp, UserMessage};
 
 /// The fields of a message. SI units, world frame.
 #[must_use]
@@ -20,6 +20,7 @@ pub fn message_json(message: &Message) -> Value {
         Message::Assignment(assignment) => of_assignment(assignment),
         Message::Arrivals(arrivals) => of_arrivals(arrivals),
         Message::Passed(passed) => of_passed(passed),
+        Message::Presence(presence) => of_presence(presence),
         Message::User(message) => of_user(message),
     }
 }
@@ -50,6 +51,7 @@ fn of_leadership(leadership: &Leadership) -> Value {
     json!({
         "stamp_s": leadership.stamp.secs(), "ballot": ballot(leadership.ballot), "kind": leadership.kind(),
         "group": leadership.group.to_string(), "epoch": leadership.epoch, "heir": leadership.heir,
+        "hops": leadership.hops,
     })
 }
 
@@ -80,7 +82,20 @@ fn of_arrivals(arrivals: &Arrivals) -> Value {
 }
 
 fn of_passed(passed: &Passed) -> Value {
-    json!({ "stamp_s": passed.stamp.secs(), "obstacles": set(passed.set_count, &passed.set) })
+    json!({ "stamp_s": passed.stamp.secs(), "drone": passed.of.checked_sub(1), "obstacles": set(passed.set_count, &passed.set) })
+}
+
+fn of_presence(presence: &Presence) -> Value {
+    let drone = |(id, pose): (DroneId, Pose)| {
+        json!({
+            "drone": id, "stamp_s": pose.stamp.secs(), "position_m": pose.position_m, "velocity_mps": pose.velocity_mps,
+            "incarnation": pose.incarnation, "leads": pose.leads(), "impaired": pose.is_impaired(),
+        })
+    };
+    json!({
+        "obeyed": stamp(presence.obeyed), "group": presence.group.to_string(), "term": ballot(presence.term),
+        "drones": presence.poses().map(drone).collect::<Vec<_>>(),
+    })
 }
 
 /// A message of a pilot's own: its bytes in Base64, and as text if they are text.
@@ -119,14 +134,16 @@ mod tests {
         let claim = Leadership {
             stamp: SimTime::from_secs(1.5),
             ballot: Ballot { round: 2, incarnation: 1, claimant: DroneId(3) },
-            kind: LeadershipKind::Claim.to_wire(),
+            kind: LeadershipKind::Claim.to_wire() as u16,
             group: GroupId::ALL.child(1),
             epoch: 0,
             heir: DroneId::NONE,
+            hops: 0,
         };
         let ballot = json!({ "round": 2, "incarnation": 1, "claimant": 3 });
         let wanted = json!({
             "stamp_s": 1.5, "ballot": ballot, "kind": "claim", "group": "N1", "epoch": 0, "heir": null,
+            "hops": 0,
         });
         assert_eq!(message_json(&Message::Leadership(claim)), wanted);
         let plan = Plan {

@@ -161,7 +161,7 @@ mod tests {
     use skein_protocol::record::RecordHeader;
 
     fn frame(tick: u64) -> AirFrame {
-        let passed = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), reserved: 0 };
+        let passed = Passed { stamp: SimTime::ZERO, set_count: 1, set: Default::default(), of: 0 };
         AirFrame {
             tick,
             source: DroneId(1),

@@ -160,7 +160,7 @@ fn frames_carry_the_link_faults_of_their_sender() {
         stamp: skein_protocol::SimTime::ZERO,
         set_count: 0,
         set: [skein_protocol::ObstacleId(0); 32],
-        reserved: 0,
+        of: 0,
     };
     let frame = skein_protocol::Message::Passed(passed).encode();
     world.take_frames(ID, &[frame]);

@@ -25,7 +25,7 @@ fn fly(world: &mut World, slot: &Slot) -> Vec<RunEvent> {
 
 fn frame() -> Frame {
     let passed =
-        skein_protocol::payload::Passed { stamp: SimTime::ZERO, set_count: 0, set: [ObstacleId(0); 32], reserved: 0 };
+        skein_protocol::payload::Passed { stamp: SimTime::ZERO, set_count: 0, set: [ObstacleId(0); 32], of: 0 };
     Message::Passed(passed).encode()
 }
 
