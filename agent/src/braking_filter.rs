@@ -12,7 +12,8 @@
 //!
 //! Braking paths are compared at ticks whose number is a multiple of a stride. These ticks are the same for all drones, so the
 //! invariant is exact there. [`BrakingFilterParams::margin_m`] covers the loss of distance between the compared ticks.
-
+//!
+//! A drone that senses no neighbours keeps to the lines of [`crate::separation`] instead.
 //!
 //! # Example
 //!
@@ -20,7 +21,7 @@
 //!
 //! ```
 //! use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
-//! use skein_protocol::Vec2;
+//! use skein_protocol::{SimTime, Vec2};
 //!
 //! let mut filter = BrakingFilter::new(BrakingFilterParams {
 //!     safe_distance_m: 10.0,
@@ -33,6 +34,7 @@
 //! let (position, velocity) = (Vec2::zeros(), Vec2::new(10.0, 0.0));
 //! let own = OwnMotion {
 //!     tick: 0,
+//!     now: SimTime::ZERO,
 //!     sensed_position: position,
 //!     sensed_velocity: velocity,
 //!     position,
@@ -43,7 +45,7 @@
 //! let wish = Vec2::new(5.0, 0.0);
 //! let mut command = |ahead_m: f64| {
 //!     let other = Moving { position_m: Vec2::new(ahead_m, 0.0), velocity_mps: -velocity };
-//!     filter.filter(&own, wish, [].into_iter(), [other].into_iter())
+//!     filter.filter(&own, wish, [].into_iter(), [other].into_iter(), [].into_iter())
 //! };
 //! assert_eq!(command(500.0), wish, "there is room");
 //! assert!(command(30.15).x < -4.0, "each needs 10 m to stop, and 10 m must remain");
@@ -51,8 +53,9 @@
 
 use crate::braking_path::{BrakingLaw, BrakingPath};
 use crate::program::{HalfPlane, Program};
-use skein_protocol::Vec2;
+use crate::separation::separating_line::{SeparatingLine, Side};
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
+use skein_protocol::{SimTime, Vec2};
 
 /// Constants of the rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +88,8 @@ pub struct Moving {
 pub struct OwnMotion {
     /// Number of the present tick, in which neighbours are sensed.
     pub tick: u64,
+    /// The present time.
+    pub now: SimTime,
     /// Position now, world frame, m.
     pub sensed_position: Vec2,
     /// Velocity now, world frame, m/s.
@@ -125,18 +130,22 @@ impl BrakingFilterParams {
     /// Number of ticks between two comparisons of braking paths. Let h be the time between two comparisons. Between them, the
     /// distance of two paths falls by at most h²/8 · (v²/D + 2a) below the smaller of the two compared distances. v is the
     /// relative speed, at most twice the greatest speed.
-    fn stride(&self) -> u32 {
+    #[must_use]
+    pub fn stride(&self) -> u32 {
         let relative_mps = 2.0 * self.speed_max_mps;
         let bend = relative_mps * relative_mps / self.safe_distance_m + 2.0 * self.acceleration_max_mps2;
         ((8.0 * self.margin_m() / bend).sqrt() / self.dt_s).max(1.0) as u32
     }
 
     /// The distance that two drones keep, m.
-    pub(crate) fn keep_m(&self) -> f64 {
+    #[must_use]
+    pub fn keep_m(&self) -> f64 {
         self.safe_distance_m + self.margin_m()
     }
 
-    fn law(&self) -> BrakingLaw {
+    /// How a drone brakes.
+    #[must_use]
+    pub fn law(&self) -> BrakingLaw {
         BrakingLaw { deceleration_mps2: self.braking_mps2, dt_s: self.dt_s }
     }
 
@@ -213,15 +222,17 @@ impl BrakingFilter {
     /// Returns the allowed acceleration nearest to `wanted` that the search finds, world frame, m/s². The norm of `wanted` is
     /// first limited to the greatest acceleration. The result is `wanted` itself if it is allowed, and full braking in the worst
     /// case. `obstacles`: each shape in the world frame, and its distance from where the drone's centre is when the command takes
-    /// effect, m.
+    /// effect, m. `lines`: each line to which the drone is bound, and the drone's side of it.
     pub fn filter<'a>(
         &mut self,
         own: &OwnMotion,
         wanted: Vec2,
         obstacles: impl Iterator<Item = (&'a ConvexShape, f64)> + Clone,
         neighbours: impl Iterator<Item = Moving>,
+        lines: impl Iterator<Item = (&'a SeparatingLine, Side)>,
     ) -> Vec2 {
         self.compare(own, neighbours);
+        self.keep_to(own, lines);
         let reach_m =
             self.params.reach_m(own.velocity.norm_squared(), 1) + self.params.clearance_m + CLEARANCE_ROUNDING_M;
         let near = obstacles.filter(move |(_, distance_m)| *distance_m <= reach_m).map(|(shape, _)| shape);
@@ -286,17 +297,50 @@ impl BrakingFilter {
     }
 
     fn sample(&mut self, own: &OwnMotion, own_path: &BrakingPath, other_path: &BrakingPath, keep_m: f64) {
-        let (stride, tick) = (u64::from(self.stride), own.tick);
         let flown_m = own.position - own.sensed_position;
         // Each command can lengthen this drone's path by one tick.
         let last = own_path.ticks().max(other_path.ticks()) + own.lag + 2;
-        let mut ticks = own.lag + 1;
-        loop {
+        self.sample_ticks(own, last, |ticks| {
             let (here, there) = (own_path.at(ticks), other_path.at(ticks));
             let (offset, distance_m) = (here - there, (here - there).norm());
             let normal = if distance_m > 1e-9 { offset / distance_m } else { Vec2::x() };
             let room_m = share(own.lag) * (distance_m - keep_m).max(0.0);
-            self.samples.push(Sample { ticks: ticks - own.lag, normal, own_m: here - flown_m, room_m });
+            Sample { ticks: ticks - own.lag, normal, own_m: here - flown_m, room_m }
+        });
+    }
+
+    /// Samples the braking path of this drone for each line that some command could bring too near.
+    fn keep_to<'a>(&mut self, own: &OwnMotion, lines: impl Iterator<Item = (&'a SeparatingLine, Side)>) {
+        let half_m = self.params.keep_m() / 2.0;
+        let reach_m = self.params.reach_m(own.velocity.norm_squared(), 1);
+        let path = BrakingPath::new(Vec2::zeros(), own.velocity, self.params.law());
+        let dt_s = self.params.dt_s;
+        for (line, side) in lines {
+            let inward = line.normal() * side.sign();
+            let here_m = inward.dot(&own.position);
+            let beyond_m = |offset_m: f64| here_m - side.sign() * offset_m - half_m;
+            let begins_m = beyond_m(line.offset_m(own.now, f64::from(own.lag) * dt_s));
+            if begins_m.min(beyond_m(line.stop_m())) > reach_m {
+                continue;
+            }
+            // Each command can lengthen this drone's path by one tick.
+            let rests = (line.rests_after_s(own.now) / dt_s).ceil() as u32;
+            let last = (path.ticks() + own.lag + 2).max(rests);
+            self.sample_ticks(own, last, |ticks| {
+                let own_m = path.at(ticks - own.lag);
+                let offset_m = line.offset_m(own.now, f64::from(ticks) * dt_s);
+                let room_m = (beyond_m(offset_m) + inward.dot(&own_m)).max(0.0);
+                Sample { ticks: ticks - own.lag, normal: inward, own_m, room_m }
+            });
+        }
+    }
+
+    /// Adds a sample for the first tick that a command can change, for each compared tick after it, and for one at `last` or later.
+    fn sample_ticks(&mut self, own: &OwnMotion, last: u32, sample: impl Fn(u32) -> Sample) {
+        let (stride, tick) = (u64::from(self.stride), own.tick);
+        let mut ticks = own.lag + 1;
+        loop {
+            self.samples.push(sample(ticks));
             if ticks >= last {
                 break;
             }

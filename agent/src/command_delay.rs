@@ -34,6 +34,11 @@ impl<T: Copy> CommandDelay<T> {
         self.pending.iter()
     }
 
+    /// Replaces the commands that have not taken effect: each by what `next` returns, the oldest first.
+    pub fn replace(&mut self, mut next: impl FnMut() -> T) {
+        self.pending.iter_mut().for_each(|command| *command = next());
+    }
+
     /// Accepts a command and returns the one that takes effect now.
     pub fn push(&mut self, command: T) -> T {
         self.pending.push_back(command);

@@ -36,6 +36,7 @@ mod reaction;
 pub mod rollout;
 pub mod route_follower;
 pub mod safety;
+pub mod separation;
 mod silent_drones;
 mod stale_formation;
 mod state_predictor;

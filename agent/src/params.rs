@@ -7,10 +7,12 @@ use crate::neighbour_table::NeighbourParams;
 use crate::queue::QueueParams;
 use crate::rollout::RolloutParams;
 use crate::safety::SafetyParams;
+use crate::separation::SeparationParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
-use skein_protocol::{DroneId, SimTime};
+use skein_protocol::{DroneId, SimTime, Vec2};
+use std::sync::Arc;
 
 /// Parameters of a [`crate::SwarmPilot`].
 #[derive(Clone, Debug)]
@@ -39,6 +41,8 @@ pub struct PilotParams {
     pub speed_max_mps: f64,
     /// Whether it has a sensor that ranges neighbours.
     pub ranging: bool,
+    /// Where each drone starts, world frame, m. A drone that senses no neighbours keeps its first distances by it.
+    pub starts_m: Arc<[Vec2]>,
     /// Stopping distances.
     pub braking: Braking,
     /// Planning while it leads. Headway, routes and course line apply to every drone.
@@ -53,6 +57,8 @@ pub struct PilotParams {
     pub queue: bool,
     /// Time between two beacons, s.
     pub beacon_period_s: f64,
+    /// Time between two statements of its separating lines, s.
+    pub separation_period_s: f64,
     /// Time between two repetitions of a message that has to be repeated, s.
     pub repeat_period_s: f64,
     /// Silence after which a peer counts as gone, s.
@@ -131,6 +137,20 @@ impl PilotParams {
     pub fn separation_kept_m(&self) -> f64 {
         let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
         filter.keep_m().max(self.safety.keep_m(self.braking.reaction_time_s))
+    }
+
+    /// The parameters of the lines that keep drones apart; `None` if drones sense each other.
+    pub(crate) fn separation(&self) -> Option<SeparationParams> {
+        (!self.ranging).then(|| SeparationParams {
+            me: self.me,
+            incarnation: self.incarnation,
+            starts_m: Arc::clone(&self.starts_m),
+            start_velocity: Vec2::new(self.guidance.speed_mps, 0.0),
+            keep_m: self.braking_filter().keep_m(),
+            braking_mps2: self.safety.braking_mps2,
+            period_s: self.separation_period_s,
+            dt_s: self.dt_s,
+        })
     }
 
     pub(crate) fn neighbours(&self) -> NeighbourParams {

@@ -52,6 +52,32 @@ impl ReactionDelay {
         motion
     }
 
+    /// Replaces all pending commands by full braking from `velocity` (m/s) with `braking_mps2`. A drone that missed ticks was braked
+    /// by its failsafe, and goes on braking until its next command takes effect.
+    pub(crate) fn brake(&mut self, mut velocity: Vec2, braking_mps2: f64) {
+        let dt_s = self.dt_s;
+        self.commands.replace(|| {
+            let (speed, step) = (velocity.norm(), braking_mps2 * dt_s);
+            let braking = if speed > step { velocity * (-braking_mps2 / speed) } else { -velocity / dt_s };
+            velocity += braking * dt_s;
+            braking
+        });
+    }
+
+    /// The positions of a drone at `position` (m) with `velocity` (m/s) at the end of each tick whose command is pending, m. The first
+    /// entry is `position`.
+    pub(crate) fn pending_positions(&self, position: Vec2, velocity: Vec2) -> Vec<Vec2> {
+        let (mut at, mut speed) = (position, velocity);
+        let mut positions = vec![position];
+        for command in self.commands.pending() {
+            let next = speed + command * self.dt_s;
+            at += (speed + next) * (self.dt_s / 2.0);
+            speed = next;
+            positions.push(at);
+        }
+        positions
+    }
+
     /// Accepts a command and returns the one that takes effect now, m/s².
     pub(crate) fn push(&mut self, command: Vec2) -> Vec2 {
         self.commands.push(command)
@@ -83,6 +109,22 @@ mod tests {
                 assert!((p - position).norm() < 1e-12 && (v - velocity).norm() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn a_drone_that_missed_ticks_goes_on_braking() {
+        let mut delay = ReactionDelay::new(0.1, 0.02);
+        for _ in 0..9 {
+            delay.push(Vec2::new(3.0, 0.0));
+        }
+        delay.brake(Vec2::new(0.0, 1.0), 5.0);
+        let motion = delay.pending_motion(Vec2::new(0.0, 1.0));
+        assert!((motion.velocity - Vec2::new(0.0, 0.5)).norm() < 1e-12, "{motion:?}");
+        delay.brake(Vec2::new(0.0, 0.15), 5.0);
+        assert!(
+            delay.pending_motion(Vec2::new(0.0, 0.15)).velocity.norm() < 1e-12,
+            "it stops, and does not turn round"
+        );
     }
 
     #[test]

@@ -16,6 +16,8 @@ use crate::reaction::ReactionDelay;
 use crate::rollout::{Rollout, RolloutDrone, RolloutInput, RolloutPilot};
 use crate::route_follower::RouteFollower;
 use crate::safety::{NearObstacle, Safety};
+use crate::separation::Separations;
+use crate::separation::own_path::OwnPath;
 use crate::silent_drones::SilentDrones;
 use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
@@ -51,6 +53,8 @@ pub struct SwarmPilot {
     /// The end of the planned route, while a known obstacle blocks it (world frame, m).
     detour_to: Option<Vec2>,
     reaction: ReactionDelay,
+    /// When the drone was stepped last.
+    stepped: Option<SimTime>,
     predictor: StatePredictor,
     escape: Escape,
     straggler: Straggler,
@@ -58,6 +62,8 @@ pub struct SwarmPilot {
     lone_flight: LoneFlight,
     silent: SilentDrones,
     neighbours: NeighbourTable,
+    /// The lines that separate it from the others, if it senses no neighbours. Boxed, because most drones do.
+    separations: Option<Box<Separations>>,
     /// Boxed: only a leader that looks ahead has one, and the others would carry the memory for it through every tick.
     rollout: Option<Box<Rollout<Self>>>,
 }
@@ -81,6 +87,7 @@ impl SwarmPilot {
             navigator: Navigator::new(params.safety.clearance_m, params.planner.routes.planning_distance_m),
             detour_to: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
+            stepped: None,
             predictor: StatePredictor::default(),
             escape: Escape::default(),
             straggler: Straggler::default(),
@@ -88,6 +95,7 @@ impl SwarmPilot {
             lone_flight: LoneFlight::new(params.drones, &params.planner),
             silent: SilentDrones::default(),
             neighbours: NeighbourTable::new(params.neighbours()),
+            separations: params.separation().map(|lines| Box::new(Separations::new(lines, params.start))),
             rollout: None,
             params,
         }
@@ -189,6 +197,8 @@ impl SwarmPilot {
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // A simulated leader does not look ahead itself.
         params.planner.strategy = Strategy::PaperRule;
+        // Simulated drones sense each other.
+        params.ranging = true;
         let leading = self.leading.rollout_member(&params.leading(), now, ledger.of_member(me));
         Self::with_leading(params, leading)
     }
@@ -328,12 +338,10 @@ impl SwarmPilot {
             .obstacles
             .iter()
             .map(|o| NearObstacle { nearest_m: o.nearest() - senses.position(), distance_m: o.distance_m });
-        let smooth = self.safety.filter(
-            (wanted - senses.velocity()) * gain,
-            senses.velocity(),
-            obstacles,
-            self.neighbours.iter(),
-        );
+        // Drones that sense no neighbours keep to the lines between them instead.
+        let neighbours = self.neighbours.iter().filter(|_| self.separations.is_none());
+        let wanted = (wanted - senses.velocity()) * gain;
+        let smooth = self.safety.filter(wanted, senses.velocity(), obstacles, neighbours);
         self.keep_braking_path(smooth, now, senses)
     }
 
@@ -343,6 +351,7 @@ impl SwarmPilot {
         let lag = (self.reaction.delay_s() / self.params.dt_s).round() as u32;
         let own = OwnMotion {
             tick: now.tick,
+            now: now.now,
             sensed_position: now.position(),
             sensed_velocity: now.velocity(),
             position: then.position(),
@@ -355,7 +364,12 @@ impl SwarmPilot {
             .neighbours
             .iter()
             .map(|n| Moving { position_m: n.position(), velocity_mps: n.velocity() + now.velocity() });
-        self.braking_filter.filter(&own, wanted, obstacles, neighbours)
+        let wanted = match &self.separations {
+            Some(separations) if separations.must_hover() => -then.velocity() / self.params.dt_s,
+            _ => wanted,
+        };
+        let lines = self.separations.iter().flat_map(|separations| separations.lines());
+        self.braking_filter.filter(&own, wanted, obstacles, neighbours, lines)
     }
 
     /// The acceleration to command now, m/s², computed for the moment at which it takes effect.
@@ -384,6 +398,40 @@ impl SwarmPilot {
         safe
     }
 
+    /// The path of this drone with the commands that it has given and full braking after them.
+    fn own_path(&self, senses: &Senses<'_>) -> OwnPath {
+        let given = self.reaction.pending_positions(senses.position(), senses.velocity());
+        let velocity = self.reaction.pending_motion(senses.velocity()).velocity;
+        let filter = self.braking_filter.params();
+        OwnPath::new((senses.tick, senses.now), given, velocity, filter.law(), filter.stride())
+    }
+
+    /// After ticks without a step, and after a restart, the drone has been braked by its failsafe. Its pending commands are void.
+    fn brake_after_a_gap(&mut self, senses: &Senses<'_>) {
+        let missed = match self.stepped.replace(senses.now) {
+            Some(before) => senses.now.since(before) > 1.5 * self.params.dt_s,
+            None => self.params.incarnation > 1,
+        };
+        if missed {
+            self.reaction.brake(senses.velocity(), self.params.safety.braking_mps2);
+        }
+    }
+
+    fn hear_separation(&mut self, source: DroneId, message: MessageRef<'_>, path: Option<&OwnPath>) {
+        let (Some(separations), Some(path)) = (&mut self.separations, path) else { return };
+        match message {
+            MessageRef::Separation(lines) => separations.hear(source, lines, path),
+            MessageRef::Pose(pose) => separations.hear_incarnation(source, pose.incarnation),
+            _ => {}
+        }
+    }
+
+    fn speak_separation(&mut self, path: Option<&OwnPath>, say: &mut Vec<Message>) {
+        if let (Some(separations), Some(path)) = (&mut self.separations, path) {
+            separations.speak(self.leading.peers(), path, say);
+        }
+    }
+
     fn command(&self, acceleration_mps2: [f64; 3], open: &[QueuePlace; MAX_PLACES]) -> Command {
         let first = open.iter().find(|place| place.set != 0);
         Command::acceleration(acceleration_mps2).with_status(Status {
@@ -402,6 +450,7 @@ impl SwarmPilot {
         let say = out.messages_mut();
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
+        self.brake_after_a_gap(senses);
         let own = OwnState {
             tick: senses.tick,
             position: senses.position(),
@@ -409,7 +458,9 @@ impl SwarmPilot {
             altitude_m: senses.position_m[2],
             climb_mps: senses.velocity_mps[2],
         };
+        let path = self.separations.as_ref().map(|_| self.own_path(senses));
         for &Heard { source, message } in inbox.heard() {
+            self.hear_separation(source, message, path.as_ref());
             if matches!(message, MessageRef::Obstacle(obstacle) if !self.altitude.is_blocked_by(&obstacle.shape)) {
                 continue;
             }
@@ -427,6 +478,7 @@ impl SwarmPilot {
         self.leading.note_passed(senses.position());
         let places = self.route.places(senses.position());
         let open = self.route.open_places(places);
+        self.speak_separation(path.as_ref(), say);
         let safe = self.steer(senses, &open);
         let acceleration = self.reaction.push(safe);
         let climb_mps2 = self.altitude.climb_mps2(senses, acceleration, safety.acceleration_max_mps2);

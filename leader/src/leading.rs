@@ -232,8 +232,8 @@ impl Leading {
             MessageRef::Arrivals(row) => self.planner.hear(now, row),
             MessageRef::Passed(passed) => self.knowledge.hear_passed(source, passed),
             MessageRef::Presence(presence) => self.hear_presence(now, source, presence),
-            // A message of the pilot's own says nothing about leading.
-            MessageRef::User(_) => {}
+            // Neither lines between drones nor a message of the pilot's own say anything about leading.
+            MessageRef::Separation(_) | MessageRef::User(_) => {}
         }
         let is_fact = !matches!(message, MessageRef::Leadership(_) | MessageRef::Pose(_) | MessageRef::Presence(_));
         if is_fact && self.relays.is_wide() {

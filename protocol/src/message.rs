@@ -5,7 +5,7 @@
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
-use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose, Presence};
+use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose, Presence, Separation};
 use crate::topic_name::OWN_TOPIC;
 use crate::user_message::UserMessage;
 use crate::wire::{ArrivalsKind, LeadershipKind, Phase, UnknownCode};
@@ -32,6 +32,8 @@ pub enum Message {
     Arrivals(Arrivals),
     /// A drone's notice that it has passed an obstacle set.
     Passed(Passed),
+    /// The lines that separate a drone from others, and that it is bound to.
+    Separation(Separation),
     /// The states of drones that the source has heard of.
     Presence(Presence),
     /// A message of a pilot's own.
@@ -50,6 +52,7 @@ impl Message {
             Self::Assignment(_) => Topic::Assignment,
             Self::Arrivals(_) => Topic::Arrivals,
             Self::Passed(_) => Topic::Passed,
+            Self::Separation(_) => Topic::Separation,
             Self::Presence(_) => Topic::Presence,
             Self::User(message) => return message.topic().kind(),
         };
@@ -68,6 +71,7 @@ impl Message {
             Self::Assignment(payload) => bytemuck::bytes_of(payload),
             Self::Arrivals(payload) => bytemuck::bytes_of(payload),
             Self::Passed(payload) => bytemuck::bytes_of(payload),
+            Self::Separation(payload) => bytemuck::bytes_of(payload),
             Self::Presence(payload) => bytemuck::bytes_of(payload),
             Self::User(message) => message.payload(),
         };
@@ -107,6 +111,8 @@ pub enum MessageRef<'a> {
     Arrivals(&'a Arrivals),
     /// See [`Message::Passed`].
     Passed(&'a Passed),
+    /// See [`Message::Separation`].
+    Separation(&'a Separation),
     /// See [`Message::Presence`].
     Presence(&'a Presence),
     /// See [`Message::User`].
@@ -123,6 +129,7 @@ impl<'a> From<&'a Message> for MessageRef<'a> {
             Message::Assignment(payload) => Self::Assignment(payload),
             Message::Arrivals(payload) => Self::Arrivals(payload),
             Message::Passed(payload) => Self::Passed(payload),
+            Message::Separation(payload) => Self::Separation(payload),
             Message::Presence(payload) => Self::Presence(payload),
             Message::User(message) => Self::User(message),
         }
@@ -150,6 +157,7 @@ impl<'a> MessageRef<'a> {
             Topic::Assignment => Self::Assignment(read(frame)?),
             Topic::Arrivals => Self::Arrivals(read(frame)?),
             Topic::Passed => Self::Passed(read(frame)?),
+            Topic::Separation => Self::Separation(read(frame)?),
             Topic::Presence => Self::Presence(read(frame)?),
         };
         message.check()?;
@@ -167,6 +175,7 @@ impl<'a> MessageRef<'a> {
             Self::Assignment(payload) => Message::Assignment(*payload),
             Self::Arrivals(payload) => Message::Arrivals(*payload),
             Self::Passed(payload) => Message::Passed(*payload),
+            Self::Separation(payload) => Message::Separation(*payload),
             Self::Presence(payload) => Message::Presence(*payload),
             Self::User(message) => Message::User(*message),
         }
@@ -227,6 +236,14 @@ impl<'a> MessageRef<'a> {
                 p.poses().try_for_each(|(_, pose)| {
                     finite(&pose.position_m, "position")?;
                     finite(&pose.velocity_mps, "velocity")
+                })
+            }
+            Self::Separation(s) => {
+                below(s.count, payload::MAX_SEPARATORS as u32 + 1, "separator count")?;
+                s.separators().iter().try_for_each(|separator| {
+                    let motion = [separator.angle_rad, separator.speed_mps, separator.deceleration_mps2].map(f64::from);
+                    finite(&[separator.stop_m], "separator")?;
+                    finite(&motion, "separator")
                 })
             }
             // Checked when it is read: only the name has rules.

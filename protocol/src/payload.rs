@@ -25,6 +25,9 @@ pub const MAX_ROUTES: usize = MAX_SET + 1;
 /// the next set.
 pub const MAX_PLACES: usize = 2;
 
+/// Maximum number of separators in one message.
+pub const MAX_SEPARATORS: usize = 7;
+
 /// [`Pose::flags`]: the drone believes that it leads, in the term [`Pose::term`].
 pub const POSE_LEADS: u32 = 1;
 /// [`Pose::flags`]: a sensor of the drone is broken; another drone should lead if possible.
@@ -396,5 +399,50 @@ impl Passed {
     #[must_use]
     pub fn drone(&self, source: DroneId) -> DroneId {
         self.of.checked_sub(1).map_or(source, DroneId)
+    }
+}
+
+/// A line between the source of a message and one other drone. The source is bound to stay on its side of it
+/// (docs/safety.md, "By word alone"). The line moves along its normal, brakes and stops.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Separator {
+    /// The time at which `speed_mps` is valid.
+    pub stamp: SimTime,
+    /// Where the line stops: the component of its points along the normal, world frame, m.
+    pub stop_m: f64,
+    /// Direction of the normal in the world frame, rad. The normal points to the side of the drone with the lower id.
+    pub angle_rad: f32,
+    /// Speed of the line along the normal, m/s. It is positive if the line moves to the side of the drone with the lower id.
+    pub speed_mps: f32,
+    /// Deceleration of the line until it stops, m/s², > 0 if the speed is not 0.
+    pub deceleration_mps2: f32,
+    /// The other drone.
+    pub peer: DroneId,
+    /// Number of the line among the lines of the two drones. Later lines have higher numbers.
+    pub number: u32,
+    /// The incarnation of the source, from 1.
+    pub incarnation: u16,
+    /// The incarnation of the other drone for which the line is meant, from 1.
+    pub peer_incarnation: u16,
+}
+
+/// Lines that the source is bound to, each between the source and one other drone.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Separation {
+    /// Number of entries of `separators` in use, at most [`MAX_SEPARATORS`].
+    pub count: u32,
+    /// Always 0.
+    pub reserved: u32,
+    /// The lines.
+    pub separators: [Separator; MAX_SEPARATORS],
+}
+
+impl Separation {
+    /// The entries in use.
+    #[must_use]
+    pub fn separators(&self) -> &[Separator] {
+        &self.separators[..(self.count as usize).min(MAX_SEPARATORS)]
     }
 }

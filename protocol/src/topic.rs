@@ -22,13 +22,15 @@ pub enum Topic {
     Arrivals = 6,
     /// Carries a [`Passed`](crate::payload::Passed).
     Passed = 7,
+    /// Carries a [`Separation`](crate::payload::Separation).
+    Separation = 8,
     /// Carries a [`Presence`](crate::payload::Presence).
     Presence = 9,
 }
 
 impl Topic {
     /// All topics, in the order of their numbers on the wire.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Pose,
         Self::Obstacle,
         Self::Leadership,
@@ -36,6 +38,7 @@ impl Topic {
         Self::Assignment,
         Self::Arrivals,
         Self::Passed,
+        Self::Separation,
         Self::Presence,
     ];
 
@@ -56,6 +59,7 @@ impl Topic {
             Self::Assignment => "assignment",
             Self::Arrivals => "arrivals",
             Self::Passed => "passed",
+            Self::Separation => "separation",
             Self::Presence => "presence",
         }
     }

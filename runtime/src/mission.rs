@@ -129,6 +129,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         detection_range_m: scenario.sensors.detection_range_m,
         speed_max_mps: drone.speed_max_mps,
         ranging: scenario.sensors.ranging,
+        starts_m: if scenario.sensors.ranging { [].into() } else { scenario.starts().into() },
         braking: Braking { deceleration_mps2: scenario.braking_mps2(), reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
         election: ElectionParams {
@@ -140,6 +141,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         precedence_share: scenario.guidance.precedence_share,
         queue: scenario.guidance.queue,
         beacon_period_s: scenario.beacon_period_s(),
+        separation_period_s: scenario.separation_period_s(skein_agent::separation::messages(drones(scenario))),
         repeat_period_s: protocol.repeat_period_s,
         peer_timeout_s: protocol.peer_timeout_s,
     }

@@ -298,6 +298,7 @@ pub struct Sensors {
     #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
     pub detection_range_m: f64,
     /// Whether drones sense their neighbours (id, relative position and velocity) within `sensors.ranging_m`.
+    /// Without it they keep their distances by messages alone (docs/safety.md).
     pub ranging: bool,
     /// Greatest distance at which drones sense neighbours. Absent: enough for two drones that fly at each other at the greatest
     /// speed of the mission to stop at the safe distance (the safe distance plus v²/a, and what they fly until they brake), and

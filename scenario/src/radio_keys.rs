@@ -153,8 +153,8 @@ pub struct RuleKeys {
     /// Condition: the frame has one of these topics; absent: any topic. The built-in topics are `"pose"` (the position of a drone
     /// and what it obeys), `"obstacle"` (one that a drone sensed), `"leadership"` (a claim to lead, or a heartbeat), `"plan"`
     /// (of a leader), `"assignment"` (one drone's part in a plan), `"arrivals"` (when one member of a group can reach the next
-    /// gate), `"passed"` (which drones are past which obstacle set) and `"presence"` (the states of drones that others heard of).
-    /// All others are those that a `[[pilot]]` declares.
+    /// gate), `"passed"` (which drones are past which obstacle set), `"separation"` (lines that keep drones apart, without
+    /// ranging) and `"presence"` (the states of drones that others heard of). All others are those that a `[[pilot]]` declares.
     #[schemars(length(min = 1, max = 16))]
     pub topics: Option<Vec<String>>,
     /// Condition: one of these drones sends the frame; absent: any drone.

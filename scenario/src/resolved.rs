@@ -9,7 +9,7 @@ use crate::pilots::DEFAULT_PILOT;
 use crate::radio;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
-use skein_protocol::payload::Pose;
+use skein_protocol::payload::{Pose, Separation};
 use skein_protocol::radio::{HEAD_BYTES, Radio, SharedChannel};
 use skein_protocol::shape::{ConvexShape, ShapeError};
 
@@ -26,6 +26,8 @@ const ALTITUDE_M: f64 = 50.0;
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
 const BEACON_SHARE: f64 = 0.25;
+/// Longest time between two statements of separating lines, s.
+const SEPARATION_PERIOD_MAX_S: f64 = 2.0;
 
 impl Scenario {
     /// A checked scenario from TOML. `overrides` are key paths and values as in `--set obstacle.0.centre_m=[1,2]`. They
@@ -201,11 +203,25 @@ impl Scenario {
     /// would take more than a quarter of the bandwidth.
     #[must_use]
     pub fn beacon_period_s(&self) -> f64 {
-        let frame_bits = 8.0 * (HEAD_BYTES as f64 + size_of::<Pose>() as f64);
-        let share_bps = self.radio.rate_bps.map_or(f64::INFINITY, |rate_bps| BEACON_SHARE * rate_bps);
-        let least_s = f64::from(self.formation.drones) * frame_bits / share_bps;
+        let least_s = self.period_within_share_s(size_of::<Pose>());
         let longest_s = BEACON_PERIOD_S.max(self.protocol.peer_timeout_s / 3.0);
         self.protocol.beacon_period_s.unwrap_or_else(|| least_s.clamp(BEACON_PERIOD_S, longest_s))
+    }
+
+    /// Time between two statements of a drone's separating lines, s. They are said with the beacons, or less often where those of
+    /// all drones would take more than a quarter of the bandwidth. `messages`: number of messages of one statement.
+    #[must_use]
+    pub fn separation_period_s(&self, messages: usize) -> f64 {
+        let least_s = messages as f64 * self.period_within_share_s(size_of::<Separation>());
+        least_s.clamp(self.beacon_period_s(), self.beacon_period_s().max(SEPARATION_PERIOD_MAX_S))
+    }
+
+    /// The time in which all drones say one message each, if the messages take a quarter of the bandwidth, s. `bytes`: size of
+    /// the payload.
+    fn period_within_share_s(&self, bytes: usize) -> f64 {
+        let frame_bits = 8.0 * (HEAD_BYTES as f64 + bytes as f64);
+        let share_bps = self.radio.rate_bps.map_or(f64::INFINITY, |rate_bps| BEACON_SHARE * rate_bps);
+        f64::from(self.formation.drones) * frame_bits / share_bps
     }
 
     /// The radio of the scenario: delay, loss, range and copies, keyed by the seed.

@@ -12,6 +12,7 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
     };
     let own = OwnMotion {
         tick: 7,
+        now: SimTime::ZERO,
         sensed_position: Vec2::zeros(),
         sensed_velocity: own,
         position: Vec2::zeros(),
@@ -20,7 +21,7 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
         lag: 0,
     };
     let neighbour = Moving { position_m: Vec2::new(distance_m, 0.0), velocity_mps: other };
-    BrakingFilter::new(params).filter(&own, wanted, std::iter::empty(), std::iter::once(neighbour))
+    BrakingFilter::new(params).filter(&own, wanted, std::iter::empty(), std::iter::once(neighbour), std::iter::empty())
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Crowds of drones that all follow the safety rule of `skein_agent::braking_filter`, for any commands that they want.
 #![allow(clippy::unwrap_used, dead_code)]
 
+pub(crate) mod words;
+
 use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
 use skein_agent::braking_path::{BrakingLaw, BrakingPath};
 use skein_leader::geometry::nearest;
-use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{SimTime, Vec2};
 use std::collections::VecDeque;
 
 fn law(params: &BrakingFilterParams) -> BrakingLaw {
@@ -177,6 +179,7 @@ impl Crowd {
             }
             let own = OwnMotion {
                 tick: self.tick,
+                now: SimTime::ZERO,
                 sensed_position: before[i].0,
                 sensed_velocity: before[i].1,
                 position,
@@ -188,7 +191,7 @@ impl Crowd {
             let neighbours = before.iter().enumerate().filter(|(j, _)| *j != i);
             let neighbours = neighbours.map(|(_, b)| Moving { position_m: b.0 - before[i].0, velocity_mps: b.1 });
             let wanted = self.wish(i, wish, random);
-            let acceleration = filter.filter(&own, wanted, obstacles, neighbours);
+            let acceleration = filter.filter(&own, wanted, obstacles, neighbours, std::iter::empty());
             assert!(acceleration.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
             self.pending[i].push_back(acceleration);
             let command = self.pending[i].pop_front().unwrap();

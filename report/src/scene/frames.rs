@@ -86,6 +86,7 @@ pub(super) fn content(frame: &AirFrame) -> String {
             None => format!("passed {} obstacles", passed.set_count),
         },
         Ok(Message::Presence(presence)) => format!("passes on the states of {} drones", presence.count),
+        Ok(Message::Separation(separation)) => format!("bound to {} separators", separation.separators().len()),
         Ok(Message::User(message)) => format!("{} bytes", message.bytes().len()),
         Err(error) => error.to_string(),
     }

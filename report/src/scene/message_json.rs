@@ -5,7 +5,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use skein_protocol::payload::{
-    Arrivals, Assignment, Leadership, MAX_ROUTES, MAX_SET, NO_ROUTE, Obstacle, Passed, Plan, Pose, Presence, QueuePlace,
+    Arrivals, Assignment, Leadership, MAX_ROUTES, MAX_SET, NO_ROUTE, Obstacle, Passed, Plan, Pose, Presence,
+    QueuePlace, Separation, Separator,
 };
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, PlanStamp, UserMessage};
 
@@ -21,6 +22,7 @@ pub fn message_json(message: &Message) -> Value {
         Message::Arrivals(arrivals) => of_arrivals(arrivals),
         Message::Passed(passed) => of_passed(passed),
         Message::Presence(presence) => of_presence(presence),
+        Message::Separation(separation) => of_separation(separation),
         Message::User(message) => of_user(message),
     }
 }
@@ -79,6 +81,23 @@ fn of_arrivals(arrivals: &Arrivals) -> Value {
         "stamp_s": arrivals.stamp.secs(), "ballot": ballot(arrivals.ballot), "drone": arrivals.drone,
         "group": arrivals.group.to_string(), "set": arrivals.set, "kind": arrivals.kind(), "gate_s": gates,
     })
+}
+
+fn of_separation(separation: &Separation) -> Value {
+    let entry = |s: &Separator| {
+        json!({
+            "peer": s.peer.0,
+            "number": s.number,
+            "stamp_s": s.stamp.secs(),
+            "angle_rad": s.angle_rad,
+            "stop_m": s.stop_m,
+            "speed_mps": s.speed_mps,
+            "deceleration_mps2": s.deceleration_mps2,
+            "incarnation": s.incarnation,
+            "peer_incarnation": s.peer_incarnation,
+        })
+    };
+    json!({ "separators": separation.separators().iter().map(entry).collect::<Vec<_>>() })
 }
 
 fn of_passed(passed: &Passed) -> Value {

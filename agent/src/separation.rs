@@ -1,0 +1,310 @@
+//! Safety by word alone: for drones that sense no neighbours. Each pair of drones is separated by a line, and each of the two drones
+//! keeps its braking path half of the distance to keep away from it. The two drones change the line by messages that may be
+//! late, lost, doubled or reordered. `docs/safety.md`, "By word alone", states and proves the rule.
+
+pub mod own_path;
+pub mod separating_line;
+pub mod separation_pair;
+
+use own_path::OwnPath;
+use separating_line::{SeparatingLine, Side};
+use separation_pair::{NumberedLine, SeparationPair, Statement};
+use skein_leader::peers::Peers;
+use skein_protocol::payload::{MAX_SEPARATORS, Pose, Separation, Separator};
+use skein_protocol::{DroneId, Message, SimTime, Vec2};
+use std::sync::Arc;
+
+/// Greatest number of messages in which a drone states its lines at one time. A larger swarm states the lines of near pairs more
+/// often.
+const MAX_MESSAGES: usize = 2;
+/// A new line is stated only if it differs from the present one by this much, m, or if it turned.
+const SHIFT_M: f64 = 0.25;
+/// A line keeps its normal while the wanted normal differs by less than this, as the sine of the angle.
+const TURN: f64 = 0.1;
+/// Two drones fly side by side if their mean speed along the line between them is below this, m/s.
+const ABREAST_MPS: f64 = 0.5;
+/// Silence of the drone whose turn it is to make lines, in times of the round trip, after which the other one makes a line.
+const PATIENCE_ROUND_TRIPS: f64 = 1.0;
+/// The same as a time, s. It is added.
+const PATIENCE_S: f64 = 0.5;
+/// A path is kept this far beyond what a new line demands, m, so that rounding does not matter.
+const ROUNDING_M: f64 = 1e-6;
+
+/// A line that moves for longer than this is no line that a drone makes, s.
+const LONGEST_MOTION_S: f64 = 300.0;
+
+/// Constants of the exchange.
+#[derive(Clone, Debug)]
+pub struct SeparationParams {
+    /// This drone.
+    pub me: DroneId,
+    /// Incarnation of its process, from 1.
+    pub incarnation: u32,
+    /// Where each drone starts, world frame, m. All drones know it.
+    pub starts_m: Arc<[Vec2]>,
+    /// The velocity at the start, world frame, m/s.
+    pub start_velocity: Vec2,
+    /// Distance that two drones keep, m.
+    pub keep_m: f64,
+    /// Deceleration of full braking, m/s².
+    pub braking_mps2: f64,
+    /// Time between two statements, s.
+    pub period_s: f64,
+    /// Length of a tick, s.
+    pub dt_s: f64,
+}
+
+/// Number of messages in which each drone of a swarm states its lines at one time.
+#[must_use]
+pub fn messages(drones: usize) -> usize {
+    drones.saturating_sub(1).div_ceil(MAX_SEPARATORS).min(MAX_MESSAGES)
+}
+
+/// What a drone knows of its lines with one other drone.
+#[derive(Clone, Debug)]
+struct Known {
+    pair: SeparationPair,
+    peer: DroneId,
+    /// The newest line that the other drone has stated.
+    heard: Option<NumberedLine>,
+    /// When this drone last stated its line.
+    said: SimTime,
+    /// When the line last changed.
+    changed: SimTime,
+}
+
+/// The lines between one drone and all others.
+#[derive(Clone, Debug)]
+pub struct Separations {
+    params: SeparationParams,
+    known: Vec<Known>,
+    /// Order in which lines are stated: scratch memory.
+    order: Vec<(f64, usize)>,
+}
+
+impl Separations {
+    /// The lines at the start, which follow from where the drones start. A restarted drone knows no lines.
+    #[must_use]
+    pub fn new(params: SeparationParams, now: SimTime) -> Self {
+        let me = params.me;
+        let others = (0..params.starts_m.len() as u32).map(DroneId).filter(|&peer| peer != me);
+        let known = others.map(|peer| {
+            let side = if me < peer { Side::Front } else { Side::Back };
+            let pair = match params.incarnation {
+                0 | 1 => SeparationPair::new(side, params.first_line(me.min(peer), me.max(peer))),
+                incarnation => SeparationPair::restarted(side, incarnation),
+            };
+            Known { pair, peer, heard: None, said: SimTime::ZERO, changed: now }
+        });
+        Self { known: known.collect(), params, order: Vec::new() }
+    }
+
+    /// Whether there is another drone of which no line is known. Such a drone has been restarted; it hovers.
+    #[must_use]
+    pub fn must_hover(&self) -> bool {
+        self.known.iter().any(|known| known.pair.lines().is_empty())
+    }
+
+    /// The lines to which this drone is bound, and its side of each.
+    pub fn lines(&self) -> impl Iterator<Item = (&SeparatingLine, Side)> {
+        self.known
+            .iter()
+            .flat_map(|known| known.pair.lines().iter().map(|numbered| (&numbered.line, known.pair.side())))
+    }
+
+    /// Hears the lines of another drone. `path`: this drone's path with full braking from now on.
+    pub fn hear(&mut self, source: DroneId, separation: &Separation, path: &OwnPath) {
+        let (me, half_m) = (self.params.me, self.params.keep_m / 2.0);
+        let Some(known) = self.find(source) else { return };
+        for separator in separation.separators().iter().filter(|s| s.peer == me) {
+            let heard = statement(separator);
+            let motion_s = heard.bound_to.line.rests_after_s(path.now());
+            if !known.pair.counts(&heard) || motion_s > LONGEST_MOTION_S {
+                continue;
+            }
+            if known.heard.is_none_or(|before| before.number < heard.bound_to.number) {
+                known.heard = Some(heard.bound_to);
+                known.changed = path.now();
+            }
+            let side = known.pair.side();
+            known.pair.hear(&heard, |line| path.distance_m(line, side) >= half_m);
+        }
+    }
+
+    /// Hears which incarnation of another drone speaks.
+    pub fn hear_incarnation(&mut self, source: DroneId, incarnation: u32) {
+        if let Some(known) = self.find(source) {
+            known.pair.hear_incarnation(incarnation);
+        }
+    }
+
+    /// Makes new lines and states them, if that is due. Call once per tick, before the command of the tick is computed.
+    pub fn speak(&mut self, peers: &Peers, path: &OwnPath, say: &mut Vec<Message>) {
+        if !self.params.is_due(path.tick()) {
+            return;
+        }
+        let now = path.now();
+        self.order.clear();
+        for (index, known) in self.known.iter().enumerate() {
+            let distance_m = peers.last(known.peer).map_or(0.0, |pose| (pose.position() - path.end()).norm());
+            let urgency = now.since(known.said) / (self.params.keep_m + distance_m);
+            self.order.push((-urgency, index));
+        }
+        self.order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.order.truncate(messages(self.params.starts_m.len()) * MAX_SEPARATORS);
+        let mut separators = Vec::with_capacity(self.order.len());
+        for &(_, index) in &self.order {
+            let known = &mut self.known[index];
+            known.said = now;
+            if let Some(pose) = peers.last(known.peer) {
+                self.params.propose(known, pose, peers.delay_s(), path);
+            }
+            separators.extend(known.pair.statement().map(|said| separator(known.peer, &said)));
+        }
+        say.extend(separators.chunks(MAX_SEPARATORS).map(message));
+    }
+
+    fn find(&mut self, peer: DroneId) -> Option<&mut Known> {
+        let index = peer.index() - usize::from(peer > self.params.me);
+        self.known.get_mut(index).filter(|known| known.peer == peer)
+    }
+}
+
+fn statement(separator: &Separator) -> Statement {
+    let line = SeparatingLine::of_message(separator);
+    Statement {
+        bound_to: NumberedLine { number: separator.number, line },
+        incarnation: separator.incarnation.into(),
+        addressed: separator.peer_incarnation.into(),
+    }
+}
+
+fn separator(peer: DroneId, said: &Statement) -> Separator {
+    Separator {
+        peer,
+        number: said.bound_to.number,
+        incarnation: said.incarnation as u16,
+        peer_incarnation: said.addressed as u16,
+        ..said.bound_to.line.to_message()
+    }
+}
+
+fn message(separators: &[Separator]) -> Message {
+    let mut message = Separation { count: separators.len() as u32, reserved: 0, separators: Default::default() };
+    message.separators[..separators.len()].copy_from_slice(separators);
+    Message::Separation(message)
+}
+
+/// Where a drone would stop, as far as this drone knows, and how it moves.
+#[derive(Clone, Copy, Debug)]
+struct Stop {
+    at: Vec2,
+    velocity: Vec2,
+}
+
+impl SeparationParams {
+    /// Whether a statement is due. Those of different drones fall into different ticks.
+    fn is_due(&self, tick: u64) -> bool {
+        let period = ((self.period_s / self.dt_s).round() as u64).max(1);
+        tick % period == u64::from(self.me.0) % period
+    }
+
+    /// The line between two drones at the start. `front` has the lower id.
+    fn first_line(&self, front: DroneId, back: DroneId) -> SeparatingLine {
+        let start = |drone: DroneId| self.starts_m.get(drone.index()).copied().unwrap_or_default();
+        let (velocity, braking) = (self.start_velocity, self.braking_mps2);
+        let normal = (start(front) - start(back)).try_normalize(1e-9).unwrap_or(Vec2::x());
+        let line = SeparatingLine::resting(SimTime::ZERO, normal, 0.0);
+        let speed = velocity.norm();
+        let middle = (start(front) + start(back)) / 2.0 + velocity * (speed / (2.0 * braking));
+        let along = line.normal().dot(&velocity);
+        let way_m = along * speed / (2.0 * braking);
+        let moving = line.shifted(line.normal().dot(&middle));
+        if speed > 0.0 { moving.arriving(way_m, braking * along.abs() / speed, braking) } else { moving }
+    }
+
+    /// Makes a new line, if it is this drone's turn and the new line is better than the present one.
+    fn propose(&self, known: &mut Known, pose: &Pose, delay_s: f64, path: &OwnPath) {
+        let now = path.now();
+        let age_s = now.since(pose.stamp).max(0.0);
+        let late_s = age_s.max(delay_s);
+        let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else { return };
+        let peer = self.peer_stop(known, pose, age_s);
+        let own = Stop { at: path.end(), velocity: path.velocity() };
+        let Some(towards_me) = (own.at - peer.at).try_normalize(1e-9) else { return };
+        let side = known.pair.side();
+        let along_mps = towards_me.dot(&(own.velocity + peer.velocity)) / 2.0;
+        let ahead = along_mps > ABREAST_MPS || (along_mps >= -ABREAST_MPS && side == Side::Front);
+        let patience_s = PATIENCE_S + PATIENCE_ROUND_TRIPS * 2.0 * late_s + self.period_s;
+        if !ahead && now.since(known.changed) < patience_s {
+            return;
+        }
+        let Some(line) = self.line(&stated.line, side, &own, &peer, late_s, path) else { return };
+        let turned = line.normal() != stated.line.normal();
+        let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
+        if (turned || shifted_m >= SHIFT_M) && known.pair.propose(line, now) {
+            known.changed = now;
+        }
+    }
+
+    /// Where the other drone would stop now. It is taken to have flown on since its beacon, as far as the line allows that it
+    /// stated last.
+    fn peer_stop(&self, known: &Known, pose: &Pose, age_s: f64) -> Stop {
+        let velocity = pose.velocity();
+        let at = pose.position() + velocity * (velocity.norm() / (2.0 * self.braking_mps2));
+        let mut flown_s = age_s;
+        if let Some(NumberedLine { line, .. }) = known.heard.or(known.pair.statement().map(|said| said.bound_to)) {
+            let side = known.pair.side().opposite().sign();
+            let room_m = side * (line.normal().dot(&at) - line.stop_m()) - self.keep_m / 2.0;
+            let closing_mps = -side * line.normal().dot(&velocity);
+            if closing_mps > 0.0 {
+                flown_s = flown_s.min((room_m / closing_mps).max(0.0));
+            }
+        }
+        Stop { at: at + velocity * flown_s, velocity }
+    }
+
+    /// The best line between this drone and another one, to which this drone's path keeps; `None` if there is none. When the
+    /// other drone hears of it, both will have flown on for `late_s`. The line is in the middle of where they would stop then, as
+    /// far as this drone's path now and the other's path then allow.
+    fn line(
+        &self,
+        present: &SeparatingLine,
+        side: Side,
+        own: &Stop,
+        peer: &Stop,
+        late_s: f64,
+        path: &OwnPath,
+    ) -> Option<SeparatingLine> {
+        let now = path.now();
+        let half_m = self.keep_m / 2.0;
+        let wanted = (own.at - peer.at).try_normalize(1e-9)? * side.sign();
+        let keeps_normal = present.normal().perp(&wanted).abs() < TURN && present.normal().dot(&wanted) > 0.0;
+        let resting = if keeps_normal {
+            SeparatingLine::resting(now, present.normal(), 0.0).with_normal_of(present)
+        } else {
+            SeparatingLine::resting(now, wanted, 0.0)
+        };
+        // From here on along the direction from the other drone to this one.
+        let n = resting.normal() * side.sign();
+        let (own_m, peer_m) = (n.dot(&own.at), n.dot(&peer.at));
+        let (own_mps, peer_mps) = (n.dot(&own.velocity), n.dot(&peer.velocity));
+        let middle_m = (own_m + peer_m + (own_mps + peer_mps) * late_s) / 2.0;
+        let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
+        let stop_m = middle_m.max(peer_needs_m).min(own_m - half_m);
+        // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.
+        let speed = own.velocity.norm();
+        let spare_m = own_m - half_m - stop_m;
+        let way_m = own_mps * speed / (2.0 * self.braking_mps2) - spare_m;
+        let mut line = resting.shifted(side.sign() * stop_m);
+        if own_mps > 0.0 && way_m > 0.0 {
+            line = line.arriving(side.sign() * way_m, self.braking_mps2 * own_mps / speed, self.braking_mps2);
+        }
+        let missing_m = half_m + ROUNDING_M - path.distance_m(&line, side);
+        let line = if missing_m > 0.0 { line.shifted(-side.sign() * missing_m) } else { line };
+        (path.distance_m(&line, side) >= half_m).then_some(line)
+    }
+}
+
+#[cfg(test)]
+mod tests;

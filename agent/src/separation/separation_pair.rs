@@ -1,0 +1,220 @@
+//! The lines between this drone and one other, and the rules by which they change (docs/safety.md, "By word alone").
+
+use super::separating_line::{SeparatingLine, Side};
+use skein_protocol::SimTime;
+
+/// Greatest number of lines that do not imply each other. A drone that is bound to that many makes no further line.
+const MAX_LINES: usize = 6;
+
+/// A line with its number.
+#[derive(Clone, Copy, Debug, PartialEq, Hash)]
+pub struct NumberedLine {
+    /// Its number among the lines of the two drones.
+    pub number: u32,
+    /// The line.
+    pub line: SeparatingLine,
+}
+
+/// What a drone says of one other drone: a line to which it is bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statement {
+    /// The line.
+    pub bound_to: NumberedLine,
+    /// Incarnation of the drone that says it, from 1.
+    pub incarnation: u32,
+    /// Incarnation of the drone that it is said to, from 1.
+    pub addressed: u32,
+}
+
+/// The lines between this drone and one other to which this drone is bound. The two drones are always bound to at least one
+/// common line.
+#[derive(Clone, Debug, PartialEq, Hash)]
+pub struct SeparationPair {
+    side: Side,
+    /// This drone's incarnation.
+    incarnation: u32,
+    /// The incarnation of the other drone that this drone listens to, and addresses.
+    peer_incarnation: u32,
+    /// Lines to which this drone is bound, by ascending numbers.
+    bound: Vec<NumberedLine>,
+    /// Numbers of further lines to which it is bound. A line in `bound` with a higher number implies each of them.
+    implied: Vec<u32>,
+    /// The highest number seen.
+    newest: u32,
+}
+
+impl SeparationPair {
+    /// A drone on `side` in its first incarnation. It is bound to `first`, which both drones know from the start.
+    #[must_use]
+    pub fn new(side: Side, first: SeparatingLine) -> Self {
+        let bound = vec![NumberedLine { number: 0, line: first }];
+        Self { side, incarnation: 1, peer_incarnation: 1, bound, implied: Vec::new(), newest: 0 }
+    }
+
+    /// A drone on `side` that has been restarted and knows no line. It hovers until it hears one.
+    #[must_use]
+    pub fn restarted(side: Side, incarnation: u32) -> Self {
+        Self { side, incarnation, peer_incarnation: 1, bound: Vec::new(), implied: Vec::new(), newest: 0 }
+    }
+
+    /// The drone's side.
+    #[must_use]
+    pub fn side(&self) -> Side {
+        self.side
+    }
+
+    /// The lines that bind the drone; none if it knows no line.
+    #[must_use]
+    pub fn lines(&self) -> &[NumberedLine] {
+        &self.bound
+    }
+
+    /// What the drone says: the line with the highest number to which it is bound.
+    #[must_use]
+    pub fn statement(&self) -> Option<Statement> {
+        let &bound_to = self.bound.last()?;
+        Some(Statement { bound_to, incarnation: self.incarnation, addressed: self.peer_incarnation })
+    }
+
+    /// Hears which incarnation of the other drone speaks. From a new one on, what an older one said no longer counts.
+    pub fn hear_incarnation(&mut self, incarnation: u32) {
+        self.peer_incarnation = self.peer_incarnation.max(incarnation);
+    }
+
+    /// Whether a statement counts: it is said by the incarnation that this drone listens to, and to this drone's incarnation.
+    #[must_use]
+    pub fn counts(&self, heard: &Statement) -> bool {
+        heard.incarnation == self.peer_incarnation && heard.addressed == self.incarnation
+    }
+
+    /// Hears that the other drone is, or was, bound to a line. `keeps`: whether this drone's path, with the commands that it has
+    /// given and full braking after them, keeps to the line. The drone binds itself to the line if it can and if that frees it from an
+    /// older line. It is then free of all lines with lower numbers.
+    pub fn hear(&mut self, heard: &Statement, keeps: impl FnOnce(&SeparatingLine) -> bool) {
+        if !self.counts(heard) {
+            return;
+        }
+        let heard = heard.bound_to;
+        self.newest = self.newest.max(heard.number);
+        if self.is_bound_to(heard.number) {
+            self.forget_below(heard.number);
+            return;
+        }
+        let useful = self.bound.first().is_none_or(|oldest| oldest.number < heard.number);
+        if useful && keeps(&heard.line) {
+            let place = self.bound.partition_point(|known| known.number < heard.number);
+            self.bound.insert(place, heard);
+            self.forget_below(heard.number);
+        }
+    }
+
+    /// Binds the drone to a new line, to which its path keeps. Returns whether it did: a drone that is bound to many lines that
+    /// the other drone has not heard of makes no further one.
+    pub fn propose(&mut self, line: SeparatingLine, now: SimTime) -> bool {
+        let Some(number) = self.next_number() else { return false };
+        if self.bound.is_empty() {
+            return false;
+        }
+        let (side, bound) = (self.side, self.bound.iter());
+        if bound.filter(|known| !line.implies(&known.line, side, now)).count() >= MAX_LINES {
+            return false;
+        }
+        let implied = &mut self.implied;
+        self.bound.retain(|known| {
+            let keep = !line.implies(&known.line, side, now);
+            if !keep {
+                implied.push(known.number);
+            }
+            keep
+        });
+        self.bound.push(NumberedLine { number, line });
+        self.newest = number;
+        true
+    }
+
+    /// The next number that no drone has used. Drones in front use even numbers, and drones at the back odd ones.
+    fn next_number(&self) -> Option<u32> {
+        let parity = u32::from(self.side == Side::Back);
+        let next = self.newest.checked_add(1)?;
+        if next % 2 == parity { Some(next) } else { next.checked_add(1) }
+    }
+
+    fn is_bound_to(&self, number: u32) -> bool {
+        self.bound.iter().any(|known| known.number == number) || self.implied.contains(&number)
+    }
+
+    fn forget_below(&mut self, number: u32) {
+        self.bound.retain(|known| known.number >= number);
+        self.implied.retain(|&known| known >= number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_protocol::Vec2;
+
+    const NOW: SimTime = SimTime::ZERO;
+
+    fn line(stop_m: f64) -> SeparatingLine {
+        SeparatingLine::resting(NOW, Vec2::x(), stop_m)
+    }
+
+    fn numbers(pair: &SeparationPair) -> Vec<u32> {
+        pair.lines().iter().map(|known| known.number).collect()
+    }
+
+    #[test]
+    fn a_drone_is_bound_to_its_own_line_and_the_old_one_until_the_other_is_bound_to_the_new_one() {
+        let (mut front, mut back) =
+            (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
+        assert!(front.propose(line(-5.0), NOW), "it asks for room");
+        assert_eq!(numbers(&front), [0, 2]);
+        back.hear(&front.statement().unwrap(), |_| false);
+        assert_eq!(numbers(&back), [0], "its path does not keep to the line");
+        back.hear(&front.statement().unwrap(), |_| true);
+        assert_eq!(numbers(&back), [2]);
+        front.hear(&back.statement().unwrap(), |_| true);
+        assert_eq!(numbers(&front), [2]);
+    }
+
+    #[test]
+    fn a_line_that_gives_room_needs_no_answer() {
+        let (mut front, mut back) =
+            (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
+        for step in 1..=20 {
+            assert!(front.propose(line(f64::from(step)), NOW));
+            assert_eq!(front.lines().len(), 1);
+        }
+        back.hear(&front.statement().unwrap(), |_| true);
+        assert_eq!(numbers(&back), [40]);
+    }
+
+    #[test]
+    fn two_lines_at_the_same_time_both_bind_until_one_is_superseded() {
+        let (mut front, mut back) =
+            (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
+        assert!(front.propose(line(-2.0), NOW) && back.propose(line(2.0), NOW));
+        let (said, answered) = (front.statement().unwrap(), back.statement().unwrap());
+        front.hear(&answered, |_| true);
+        back.hear(&said, |_| true);
+        assert_eq!((numbers(&front), numbers(&back)), (vec![1, 2], vec![2]));
+        front.hear(&back.statement().unwrap(), |_| true);
+        assert_eq!(numbers(&front), [2]);
+    }
+
+    #[test]
+    fn a_drone_makes_a_bounded_number_of_lines() {
+        let mut front = SeparationPair::new(Side::Front, line(0.0));
+        let made = (1..50).filter(|step| front.propose(line(-f64::from(*step)), NOW)).count();
+        assert_eq!(made, MAX_LINES - 1);
+        let mut restarted = SeparationPair::restarted(Side::Front, 2);
+        assert!(!restarted.propose(line(0.0), NOW));
+        let bound_to = NumberedLine { number: u32::MAX, line: line(0.0) };
+        restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 1 }, |_| true);
+        assert!(restarted.lines().is_empty(), "it was said to the incarnation before");
+        restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 2 }, |_| true);
+        assert_eq!(restarted.lines().len(), 1);
+        assert!(!restarted.propose(line(0.0), NOW), "there are no more numbers");
+    }
+}

@@ -1,0 +1,130 @@
+use super::*;
+use crate::braking_filter::{BrakingFilter, BrakingFilterParams, OwnMotion};
+use bytemuck::Zeroable;
+use proptest::prelude::*;
+use skein_protocol::raised;
+
+const FILTER: BrakingFilterParams = BrakingFilterParams {
+    safe_distance_m: 25.0,
+    clearance_m: 15.0,
+    acceleration_max_mps2: 5.0,
+    braking_mps2: 5.0,
+    speed_max_mps: 20.0,
+    dt_s: 0.02,
+};
+
+/// Three drones in line at rest, 60 m apart. Drone 0 is in front.
+fn separations(me: u32, incarnation: u32) -> Separations {
+    let params = SeparationParams {
+        me: DroneId(me),
+        incarnation,
+        starts_m: [0.0, -60.0, -120.0].map(|x| Vec2::new(x, 0.0)).into(),
+        start_velocity: Vec2::zeros(),
+        keep_m: FILTER.keep_m(),
+        braking_mps2: FILTER.braking_mps2,
+        period_s: 0.1,
+        dt_s: FILTER.dt_s,
+    };
+    Separations::new(params, SimTime::ZERO)
+}
+
+fn path(tick: u64, position: Vec2, velocity: Vec2) -> OwnPath {
+    let now = SimTime::from_secs(tick as f64 * FILTER.dt_s);
+    OwnPath::new((tick, now), vec![position], velocity, FILTER.law(), FILTER.stride())
+}
+
+fn pose(at: SimTime, position: Vec2, velocity: Vec2) -> Pose {
+    Pose { stamp: at, position_m: raised(position, 0.0), velocity_mps: raised(velocity, 0.0), ..Pose::zeroed() }
+}
+
+/// The command of a drone at `position` that wants to fly along x.
+fn command(separations: &Separations, position: Vec2, velocity: Vec2) -> Vec2 {
+    let own = OwnMotion {
+        tick: 0,
+        now: SimTime::ZERO,
+        sensed_position: position,
+        sensed_velocity: velocity,
+        position,
+        velocity,
+        speed_limit_mps: 20.0,
+        lag: 0,
+    };
+    BrakingFilter::new(FILTER).filter(&own, Vec2::new(5.0, 0.0), [].into_iter(), [].into_iter(), separations.lines())
+}
+
+#[test]
+fn a_drone_stops_half_of_the_distance_before_its_line() {
+    let follower = separations(1, 1);
+    let stop_x = -30.0 - FILTER.keep_m() / 2.0;
+    assert_eq!(command(&follower, Vec2::new(stop_x - 12.0, 0.0), Vec2::new(10.0, 0.0)), Vec2::new(5.0, 0.0));
+    assert!(command(&follower, Vec2::new(stop_x - 10.05, 0.0), Vec2::new(10.0, 0.0)).x < -3.0);
+}
+
+#[test]
+fn the_drone_ahead_gives_room_to_its_follower() {
+    let (mut leader, mut follower) = (separations(0, 1), separations(1, 1));
+    let (tick, velocity) = (50, Vec2::new(10.0, 0.0));
+    let now = SimTime::from_secs(tick as f64 * FILTER.dt_s);
+    let mut peers = Peers::new(3, 2.0);
+    peers.hear(now, DroneId(1), pose(now, Vec2::new(-60.0, 0.0), velocity));
+    let mut say = Vec::new();
+    leader.speak(&peers, &path(tick, Vec2::new(40.0, 0.0), velocity), &mut say);
+    let [Message::Separation(said)] = say[..] else { panic!("{say:?}") };
+    let at = Vec2::new(-30.0 - FILTER.keep_m() / 2.0 - 1e-6, 0.0);
+    assert!(command(&follower, at, Vec2::zeros()).x < 0.2, "it is at its line");
+    follower.hear(DroneId(0), &said, &path(tick, at, Vec2::zeros()));
+    assert_eq!(command(&follower, at, Vec2::zeros()), Vec2::new(5.0, 0.0));
+}
+
+#[test]
+fn a_restarted_drone_hovers_until_all_others_have_addressed_it() {
+    let (mut restarted, mut others) = (separations(1, 2), [separations(0, 1), separations(2, 1)]);
+    let here = path(0, Vec2::new(-60.0, 0.0), Vec2::zeros());
+    assert!(restarted.must_hover() && restarted.lines().count() == 0);
+    for (other, source) in others.iter_mut().zip([0, 2].map(DroneId)) {
+        for knows in [false, true] {
+            assert!(restarted.must_hover(), "drone {source:?} has not addressed it");
+            if knows {
+                other.hear_incarnation(DroneId(1), 2);
+            }
+            let mut say = Vec::new();
+            let tick = 50 + u64::from(source.0);
+            other.speak(
+                &Peers::new(3, 2.0),
+                &path(tick, Vec2::new(-60.0 * f64::from(source.0), 0.0), Vec2::zeros()),
+                &mut say,
+            );
+            let [Message::Separation(said)] = say[..] else { panic!("{say:?}") };
+            restarted.hear(source, &said, &here);
+        }
+    }
+    assert!(!restarted.must_hover());
+}
+
+proptest! {
+    #[test]
+    fn no_message_stops_a_drone_from_commanding(
+        lines in prop::collection::vec((any::<(i64, u32, u16, u16)>(), -1e12f64..1e12, any::<(i32, i32, i32)>(), 0u32..4), 1..30)
+    ) {
+        let mut drone = separations(1, 1);
+        let here = path(0, Vec2::new(-60.0, 0.0), Vec2::new(3.0, 1.0));
+        for ((stamp, number, incarnation, addressed), stop_m, (angle, speed, deceleration), source) in lines {
+            let separator = Separator {
+                stamp: SimTime::from_secs(stamp as f64 * 1e-12),
+                stop_m,
+                angle_rad: angle as f32 * 1e-6,
+                speed_mps: speed as f32 * 1e-6,
+                deceleration_mps2: deceleration as f32 * 1e-6,
+                peer: DroneId(1),
+                number,
+                incarnation: incarnation % 3,
+                peer_incarnation: addressed % 3,
+            };
+            let mut separators = [Separator::default(); MAX_SEPARATORS];
+            separators[0] = separator;
+            drone.hear(DroneId(source), &Separation { count: 1, reserved: 0, separators }, &here);
+            let acceleration = command(&drone, Vec2::new(-60.0, 0.0), Vec2::new(3.0, 1.0));
+            prop_assert!(acceleration.norm() <= FILTER.acceleration_max_mps2 * (1.0 + 1e-9));
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Crowds that sense no neighbours. Their drones keep apart by the lines of `skein_agent::separation`, over an adverse radio.
+
+use super::{Crowd, Keyed, Wish, braking, law, shape_distance_m};
+use bytemuck::Zeroable;
+use skein_agent::braking_filter::{BrakingFilter, OwnMotion};
+use skein_agent::separation::own_path::OwnPath;
+use skein_agent::separation::{SeparationParams, Separations};
+use skein_leader::peers::Peers;
+use skein_protocol::payload::Pose;
+use skein_protocol::{DroneId, Message, SimTime, Vec2, raised};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Time between two beacons, s.
+const BEACON_S: f64 = 0.1;
+/// Share of the messages that arrive twice.
+const DOUBLED: f64 = 0.1;
+
+/// What the adversary does.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Adversary {
+    /// Greatest delay of a message, s. Each message has a delay of its own, so that messages overtake each other.
+    pub(crate) delay_s: f64,
+    /// Share of the messages that are lost.
+    pub(crate) loss: f64,
+    /// Share of the drones that die for a while and are restarted with empty memory.
+    pub(crate) restarts: f64,
+}
+
+/// A message on its way.
+struct Sent {
+    arrives: u64,
+    from: usize,
+    message: Message,
+}
+
+/// A crowd and its radio.
+struct Talk {
+    adversary: Adversary,
+    incarnations: Vec<u32>,
+    /// What each drone knows of the lines; `None` while it is dead.
+    separations: Vec<Option<Separations>>,
+    peers: Vec<Peers>,
+    /// For each drone, the messages on their way to it.
+    air: Vec<Vec<Sent>>,
+    starts_m: Arc<[Vec2]>,
+    start_velocity: Vec2,
+}
+
+impl Crowd {
+    /// Starts anew: all drones of the crowd fly with one velocity, and their braking paths keep all distances.
+    fn with_one_velocity(&mut self, random: &mut Keyed) -> Vec2 {
+        let velocity = random.disc(self.params.speed_max_mps);
+        let bodies = std::mem::take(&mut self.bodies);
+        self.pending.clear();
+        self.tick = 0;
+        for (position, _) in bodies {
+            if self.admits((position, velocity)) {
+                self.bodies.push((position, velocity));
+                self.pending.push(self.braking_commands(velocity));
+            }
+        }
+        velocity
+    }
+
+    /// The first `lag` commands of a drone: full braking.
+    fn braking_commands(&self, mut velocity: Vec2) -> VecDeque<Vec2> {
+        let next = |_| {
+            let braking = braking(&self.params, velocity);
+            velocity += braking * self.params.dt_s;
+            braking
+        };
+        (0..self.lag).map(next).collect()
+    }
+
+    fn now(&self) -> SimTime {
+        SimTime::from_secs(self.tick as f64 * self.params.dt_s)
+    }
+
+    /// The positions of a drone after each of its pending commands, from its present position on, and its velocity then.
+    fn given(&self, i: usize) -> (Vec<Vec2>, Vec2) {
+        let (mut body, mut given) = (self.bodies[i], vec![self.bodies[i].0]);
+        for command in &self.pending[i] {
+            body = self.fly(body, *command);
+            given.push(body.0);
+        }
+        (given, body.1)
+    }
+
+    fn own_path(&self, i: usize) -> OwnPath {
+        let (given, velocity) = self.given(i);
+        OwnPath::new((self.tick, self.now()), given, velocity, law(&self.params), self.params.stride())
+    }
+
+    /// One tick of drone `i`, which hears, makes lines, and gives a command.
+    fn step_by_words(&mut self, i: usize, filter: &mut BrakingFilter, wish: Wish, talk: &mut Talk, random: &mut Keyed) {
+        let (given, velocity) = self.given(i);
+        let braking = braking(&self.params, velocity);
+        let acceleration = match talk.exchange(self, i, random) {
+            None => braking,
+            Some(lines) if lines.must_hover() => braking,
+            Some(lines) => {
+                let position = given.last().copied().unwrap();
+                let own = OwnMotion {
+                    tick: self.tick,
+                    now: self.now(),
+                    sensed_position: self.bodies[i].0,
+                    sensed_velocity: self.bodies[i].1,
+                    position,
+                    velocity,
+                    speed_limit_mps: f64::INFINITY,
+                    lag: self.lag,
+                };
+                let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
+                let wanted = self.wish(i, wish, random);
+                filter.filter(&own, wanted, obstacles, std::iter::empty(), lines.lines())
+            }
+        };
+        self.pending[i].push_back(acceleration);
+    }
+}
+
+impl Talk {
+    fn new(crowd: &Crowd, adversary: Adversary, start_velocity: Vec2) -> Self {
+        let n = crowd.bodies.len();
+        let starts_m: Arc<[Vec2]> = crowd.bodies.iter().map(|body| body.0).collect();
+        let mut talk = Self {
+            adversary,
+            incarnations: vec![1; n],
+            separations: Vec::new(),
+            peers: (0..n).map(|_| Peers::new(n as u32, 2.0)).collect(),
+            air: (0..n).map(|_| Vec::new()).collect(),
+            starts_m,
+            start_velocity,
+        };
+        talk.separations = (0..n).map(|i| Some(talk.born(crowd, i))).collect();
+        talk
+    }
+
+    fn born(&self, crowd: &Crowd, i: usize) -> Separations {
+        let params = SeparationParams {
+            me: DroneId(i as u32),
+            incarnation: self.incarnations[i],
+            starts_m: Arc::clone(&self.starts_m),
+            start_velocity: self.start_velocity,
+            keep_m: crowd.params.keep_m(),
+            braking_mps2: crowd.params.braking_mps2,
+            period_s: BEACON_S,
+            dt_s: crowd.params.dt_s,
+        };
+        Separations::new(params, crowd.now())
+    }
+
+    /// Hears what has arrived, says what is due, and returns the lines; `None` if the drone is dead.
+    fn exchange(&mut self, crowd: &Crowd, i: usize, random: &mut Keyed) -> Option<&Separations> {
+        let path = crowd.own_path(i);
+        let heard: Vec<Sent> = self.air[i].extract_if(.., |sent| sent.arrives <= crowd.tick).collect();
+        let separations = self.separations[i].as_mut()?;
+        let peers = &mut self.peers[i];
+        for Sent { from, message, .. } in heard {
+            let source = DroneId(from as u32);
+            match message {
+                Message::Pose(pose) => {
+                    separations.hear_incarnation(source, pose.incarnation);
+                    peers.hear(crowd.now(), source, pose);
+                }
+                Message::Separation(lines) => separations.hear(source, &lines, &path),
+                _ => {}
+            }
+        }
+        let period = ((BEACON_S / crowd.params.dt_s).round() as u64).max(1);
+        if crowd.tick % period == i as u64 % period {
+            let (position, velocity) = crowd.bodies[i];
+            let pose = Pose {
+                stamp: crowd.now(),
+                position_m: raised(position, 0.0),
+                velocity_mps: raised(velocity, 0.0),
+                incarnation: self.incarnations[i],
+                ..Pose::zeroed()
+            };
+            let mut said = vec![Message::Pose(pose)];
+            separations.speak(peers, &path, &mut said);
+            for message in said {
+                for to in (0..crowd.bodies.len()).filter(|&to| to != i) {
+                    self.air[to].extend(self.adversary.transmit(crowd, i, message, random));
+                }
+            }
+        }
+        self.separations[i].as_ref()
+    }
+
+    /// Kills drones and restarts them.
+    fn restart(&mut self, crowd: &Crowd, random: &mut Keyed) {
+        for i in 0..crowd.bodies.len() {
+            if random.unit() >= self.adversary.restarts * crowd.params.dt_s {
+                continue;
+            }
+            if self.separations[i].take().is_none() {
+                self.incarnations[i] += 1;
+                self.peers[i] = Peers::new(crowd.bodies.len() as u32, 2.0);
+                self.separations[i] = Some(self.born(crowd, i));
+            }
+        }
+    }
+}
+
+impl Adversary {
+    fn transmit(&self, crowd: &Crowd, from: usize, message: Message, random: &mut Keyed) -> Vec<Sent> {
+        let copies = if random.unit() < self.loss { 0 } else { 1 + usize::from(random.unit() < DOUBLED) };
+        let mut arrives = || crowd.tick + 1 + (random.within(0.0, self.delay_s) / crowd.params.dt_s) as u64;
+        (0..copies).map(|_| Sent { arrives: arrives(), from, message }).collect()
+    }
+}
+
+/// Flies a crowd by word alone. Returns the least distance beyond the distance to keep, m, the number of drone-ticks flown, and
+/// the mean distance that a drone has flown, m.
+pub(crate) fn fly_by_words(
+    seed: u64,
+    drones: usize,
+    density: f64,
+    ticks: usize,
+    (wish, lag): (Wish, u32),
+    adversary: Adversary,
+) -> (f64, usize, f64) {
+    let mut crowd = Crowd::random(seed, drones, density, lag);
+    let mut random = Keyed(seed ^ 0xabcdef);
+    let velocity = crowd.with_one_velocity(&mut random);
+    let mut talk = Talk::new(&crowd, adversary, velocity);
+    let mut filters = vec![BrakingFilter::new(crowd.params); crowd.bodies.len()];
+    let (mut least_m, mut flown_m) = (crowd.least_m(), 0.0);
+    for _ in 0..ticks {
+        talk.restart(&crowd, &mut random);
+        for (i, filter) in filters.iter_mut().enumerate() {
+            crowd.step_by_words(i, filter, wish, &mut talk, &mut random);
+        }
+        for i in 0..crowd.bodies.len() {
+            let command = crowd.pending[i].pop_front().unwrap();
+            let next = crowd.fly(crowd.bodies[i], command);
+            flown_m += (next.0 - crowd.bodies[i].0).norm();
+            crowd.bodies[i] = next;
+        }
+        crowd.tick += 1;
+        least_m = least_m.min(crowd.least_m());
+    }
+    let n = crowd.bodies.len();
+    (least_m, ticks * n, flown_m / n.max(1) as f64)
+}
