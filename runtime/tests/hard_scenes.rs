@@ -55,6 +55,19 @@ fn a_reaction_time_breaks_no_distance() {
     }
 }
 
+/// Drones that sense no neighbours, over a radio that delays messages by 2 s and loses 70 % of them.
+#[test]
+fn words_alone_keep_every_distance() {
+    let far = [("sensors.ranging", "false"), ("radio.delay_s", "2"), ("radio.loss", "0.7"), ("time.timeout_s", "900")];
+    for name in ["paper/s2-right", "paper/forest", "narrow/gap"] {
+        let scenario = scenario(name, &far);
+        let world = fly_to_the_end(&scenario, None);
+        assert_eq!(world.ended(), Some(Outcome::Reached), "{name}");
+        let separation_m = world.min_separation_m();
+        assert!(separation_m >= scenario.drone.safe_distance_m, "{name}: {separation_m} m between drones");
+    }
+}
+
 /// A member that nobody hears, or that hears nobody, once stood in the way of others or shut one out of the formation.
 #[test]
 fn a_silent_member_does_not_hold_up_the_forest() {
