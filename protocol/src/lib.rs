@@ -25,9 +25,9 @@
 //! use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec3};
 //!
 //! let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(3) };
-//! let kind = LeadershipKind::Claim.to_wire();
+//! let kind = LeadershipKind::Claim.to_wire() as u16;
 //! let claim =
-//!     Leadership { stamp: SimTime::ZERO, ballot, kind, group: GroupId::ALL, epoch: 0, heir: DroneId::NONE };
+//!     Leadership { stamp: SimTime::ZERO, ballot, kind, hops: 0, group: GroupId::ALL, epoch: 0, heir: DroneId::NONE };
 //! let frame = Message::Leadership(claim).encode();
 //! let Ok(Message::Leadership(heard)) = Message::decode(&frame) else { panic!("a valid frame is decoded") };
 //! assert_eq!(heard.kind(), LeadershipKind::Claim);

@@ -42,6 +42,9 @@ impl Topic {
         Self::Presence,
     ];
 
+    /// The topic with the highest number on the wire.
+    pub const LAST: Self = Self::Presence;
+
     /// The topic with this number on the wire; `None` if no topic has it.
     #[must_use]
     pub fn from_wire(kind: u16) -> Option<Self> {

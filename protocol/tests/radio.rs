@@ -423,12 +423,12 @@ fn topics_of_pilots_are_local_if_all_of_them_are_heard_no_farther_than_beacons()
 proptest! {
     #[test]
     fn channels_looked_up_beforehand_give_the_same_delivery(
-        conditions in prop::collection::vec((any::<u8>(), 0u8..16, 0u8..16), 0..5),
-        kind in prop_oneof![0u16..9, Just(gossip().kind()), Just(gossip().kind() ^ 1)],
+        conditions in prop::collection::vec((any::<u16>(), 0u8..16, 0u8..16), 0..5),
+        kind in prop_oneof![0u16..11, Just(gossip().kind()), Just(gossip().kind() ^ 1)],
         (source, destination) in (0u32..4, 0u32..4),
     ) {
         let drones = |bits: u8| (bits > 7).then(|| (0..3).filter(|i| bits >> i & 1 == 1).map(DroneId).collect());
-        let topics = |bits: u8| (bits > 15).then(|| {
+        let topics = |bits: u16| (bits > 15).then(|| {
             let mut set: TopicSet = Topic::ALL.into_iter().filter(|&t| bits >> t as u16 & 1 == 1).collect();
             if bits & 1 == 1 {
                 set.insert_own(gossip());
@@ -440,7 +440,7 @@ proptest! {
             let delay = Delay { mean_s: 1.0 + s as f64, ..Delay::default() };
             ChannelModel { delay, ..ChannelModel::default() }
         };
-        let rule = |(i, &(t, from, to)): (usize, &(u8, u8, u8))| Rule {
+        let rule = |(i, &(t, from, to)): (usize, &(u16, u8, u8))| Rule {
             topics: topics(t),
             from: drones(from),
             to: drones(to),

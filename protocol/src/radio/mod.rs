@@ -60,8 +60,8 @@ const GENERAL: u16 = u16::MAX;
 #[derive(Clone, Copy, Debug)]
 pub struct ReceiverChannels {
     receiver: DroneId,
-    /// For each topic, the index of the rule that applies. `None`: the rule depends on the sender.
-    places: [Option<u16>; Topic::ALL.len()],
+    /// For each number of a topic from 1, the index of the rule that applies. `None`: the rule depends on the sender.
+    places: [Option<u16>; Topic::LAST as usize],
     /// The same for all topics that pilots define. `None`: it depends on the sender or on the topic.
     own: Option<u16>,
 }
@@ -154,7 +154,7 @@ impl Radio {
         };
         let (named, other) = self.own_kinds();
         let own = if named.is_empty() { place(other) } else { None };
-        ReceiverChannels { receiver, places: Topic::ALL.map(|topic| place(topic as u16)), own }
+        ReceiverChannels { receiver, places: std::array::from_fn(|index| place(index as u16 + 1)), own }
     }
 
     /// Recomputes the outcome of every frame in a tick's record at every other drone that was alive at the end of the tick.
