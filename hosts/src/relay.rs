@@ -280,11 +280,12 @@ impl Relay {
     fn fly(&mut self) -> Result<(), HostsError> {
         while let TickSignal::Tick(tick) = self.watch.wait() {
             let opened = Instant::now();
-            let mut any = false;
-            for seat in &mut self.seats {
-                any |= seat.join(tick);
+            if !self.join(tick) {
+                // The world does not wait for any of these drones: they are dead or frozen.
+                continue;
             }
-            if let Some(message) = self.message(tick)?.filter(|_| any) {
+            if let Some((tick, message)) = self.message(tick)? {
+                self.join(tick);
                 self.send(message)?;
                 self.take_answers(tick)?;
                 self.lateness.note(opened.elapsed());
@@ -293,19 +294,29 @@ impl Relay {
         Ok(())
     }
 
-    /// The message that opens a tick; `None` if its downlink has not come.
-    fn message(&self, tick: Tick) -> Result<Option<Vec<u8>>, HostsError> {
+    /// Begins a tick in all seats. False if no drone may answer it.
+    fn join(&mut self, tick: Tick) -> bool {
+        // All of them, not only up to the first that may answer.
+        self.seats.iter_mut().filter_map(|seat| seat.join(tick).then_some(())).count() > 0
+    }
+
+    /// The message that opens a tick, or by the wall clock a newer one that has been sent meanwhile; `None` if no downlink has come.
+    fn message(&self, tick: Tick) -> Result<Option<(Tick, Vec<u8>)>, HostsError> {
         let first = self.range.first.index();
         let mut message = TickMessage::new(first..first + self.range.count as usize, self.limit);
         while let Some(sample) = self.downlink.receive()? {
+            // The world sends a downlink before it opens the tick.
+            let newest = self.seats.first().map_or(tick, |seat| seat.newest_tick().saturating_add(1));
             match DownlinkView::parse(sample.bytes()) {
                 // The world sends no others, and what others send is skipped.
                 Err(error) => tracing::warn!(%error, "a downlink is skipped"),
-                Ok(_) if sample.tick() > tick => {}
-                Ok(down) => message.push(sample.tick(), &down),
-            }
-            if sample.tick() == tick {
-                return Ok(Some(message.finish()));
+                Ok(_) if sample.tick() > newest => tracing::warn!("a downlink of tick {} is skipped", sample.tick()),
+                Ok(down) => {
+                    message.push(sample.tick(), &down);
+                    if sample.tick() >= tick {
+                        return Ok(Some((sample.tick(), message.finish())));
+                    }
+                }
             }
         }
         Ok(None)

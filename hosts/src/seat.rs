@@ -5,6 +5,7 @@ use crate::up::{Answer, Standing};
 use skein_bus::{BusError, Control, DroneEndpoint, SHARD_DRONES, TickOutcome, UplinkHeader, UplinkPublisher};
 use skein_protocol::slot::LinkStats;
 use skein_protocol::{DroneId, Tick};
+use std::process::ExitStatus;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -39,9 +40,14 @@ impl Seat {
         self.drone.index() / SHARD_DRONES
     }
 
-    /// Begins a tick. False if the drone may not answer it.
+    /// The newest tick that the world has opened.
+    pub(crate) fn newest_tick(&self) -> Tick {
+        self.endpoint.newest_tick()
+    }
+
+    /// Begins a tick. False if the drone is dead or may not answer it: then the world does not wait for it.
     pub(crate) fn join(&mut self, tick: Tick) -> bool {
-        self.endpoint.join_tick(tick)
+        !self.control.is_dead(self.drone.index()) && self.endpoint.join_tick(tick)
     }
 
     /// Does what the drone did on its host: it speaks and answers, or is dead.
@@ -54,16 +60,23 @@ impl Seat {
                 *self.endpoint.stats_mut() = stats;
                 self.endpoint.finish(tick, &self.standing.slot);
             }
-            TickOutcome::Dead if !self.control.is_dead(self.drone.index()) => {
-                if let Some(end) = answer.end {
-                    self.control.set_end(self.drone.index(), end);
-                }
-                self.control.mark_dead(self.drone.index());
-            }
+            TickOutcome::Dead => self.die(tick, answer.end),
             // Late and hung drones do not answer: the world decides what becomes of them.
             _ => {}
         }
         Ok(())
+    }
+
+    /// Notes that the drone was dead in a tick. The supervisor may have started it again since: then it is no longer.
+    fn die(&self, tick: Tick, end: Option<ExitStatus>) {
+        let drone = self.drone.index();
+        if tick < self.endpoint.resume_from() || self.control.is_dead(drone) {
+            return;
+        }
+        if let Some(end) = end {
+            self.control.set_end(drone, end);
+        }
+        self.control.mark_dead(drone);
     }
 
     fn speak(&self, tick: Tick, answer: &Answer, uplink: &UplinkPublisher) -> Result<(), HostsError> {
@@ -77,5 +90,28 @@ impl Seat {
             Err(BusError::Full { .. }) => Ok(()),
             sent => Ok(sent?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_bus::{ControlSpec, WaitMode};
+
+    #[test]
+    fn a_late_word_of_a_death_does_not_kill_the_drone_that_was_started_again() {
+        let spec = ControlSpec { drones: 1, cores: 1, per_process: 1, wait: WaitMode::Block };
+        let control = Arc::new(Control::create(spec).unwrap());
+        let mut seat = Seat::new(&control, DroneId(0), Arc::default()).unwrap();
+        assert!(seat.join(0));
+        seat.die(0, None);
+        assert!(control.is_dead(0));
+        assert!(!seat.join(1), "the world does not wait for it");
+        control.revive(0, 5);
+        seat.die(4, None);
+        assert!(!control.is_dead(0), "it was dead in tick 4, and flies from tick 5 on");
+        assert!(!seat.join(4) && seat.join(5));
+        seat.die(5, None);
+        assert!(control.is_dead(0));
     }
 }

@@ -141,6 +141,14 @@ impl Place {
     }
 }
 
+/// A host that is killed leaves shared memory behind: it goes with the folder that names it.
+impl Drop for Place {
+    fn drop(&mut self) {
+        let cleaned = self.command(&["clean"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        assert!(std::thread::panicking() || cleaned.is_ok_and(|status| status.success()), "`clean` failed");
+    }
+}
+
 /// A host. Dropping it ends it.
 pub(crate) struct Host {
     child: Child,
