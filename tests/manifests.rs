@@ -20,7 +20,7 @@ fn rules() -> toml::Table {
 /// The workspace and every package that it needs on this platform.
 fn metadata() -> Metadata {
     let platform = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
-    let options = ["--locked", "--offline", "--filter-platform", &platform].map(str::to_owned);
+    let options = ["--locked", "--filter-platform", &platform].map(str::to_owned);
     let mut command = MetadataCommand::new();
     command.manifest_path(root().join("Cargo.toml")).features(CargoOpt::AllFeatures).other_options(options);
     command.exec().unwrap()
