@@ -177,7 +177,7 @@ fn rows_are_tidy_and_their_commands_repeat_them_by_processes() {
     assert_eq!(done.summary()["cells"].as_array().unwrap().len(), 2);
     assert_eq!(done.summary()["cells"][1]["n"], 2);
     for row in [&rows[1], &rows[2]] {
-        assert_eq!((field(row, "strategy"), field(row, "radio.loss")), ("congestion-aware", "0.2"));
+        assert_eq!((field(row, "strategy"), field(row, "radio.loss")), ("congestion-aware-paper", "0.2"));
         let ratio: f64 = field(row, "separation_ratio").parse().unwrap();
         assert!((0.5..3.0).contains(&ratio), "{row:?}");
         let mut command = Command::new("sh");
