@@ -268,3 +268,64 @@ fn a_stopped_drone_does_not_delay_the_others_by_the_wall_clock() {
     assert!(number(&summary, "/deadline_misses") > 100.0, "{done:?}");
     assert_eq!(summary["faults"], json!([]), "by the wall clock it is late, not hung: {done:?}");
 }
+
+/// A file in shared memory, as a run of `launcher` would have it.
+fn stray(launcher: &str, name: &str, content: &[u8]) -> std::path::PathBuf {
+    let path = std::path::PathBuf::from(format!("/dev/shm/skein_{launcher}_18ea000000000000_0_{name}"));
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+#[test]
+fn files_of_runs_whose_folder_is_gone_are_removed_when_no_process_uses_them() {
+    let place = Place::new();
+    // No process has such a number.
+    let (left, used, homeless) = ("4194305", "4194306", "4194307");
+    let gone = stray(left, "ab_node.0_10_0.global_mgmt", b"");
+    let held = [stray(used, "ab.dynamic", b""), stray(used, "ab.data", b"")];
+    let open = std::fs::File::open(&held[0]).unwrap();
+    let nowhere = place.join("nowhere");
+    let home = stray(homeless, "home", nowhere.to_str().unwrap().as_bytes());
+    let beside = stray(homeless, "ab.data", b"");
+    let lock = std::fs::File::open(&home).unwrap();
+    lock.lock().unwrap();
+    let no_run = [stray("x", "y", b""), "/dev/shm/skein_notes".into()];
+    std::fs::write(&no_run[1], "mine").unwrap();
+    let there = |paths: &[&std::path::PathBuf]| paths.iter().map(|path| path.exists()).collect::<Vec<_>>();
+
+    let done = place.run(&["clean"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_eq!(there(&[&gone]), [false], "nobody uses it: {done:?}");
+    assert_eq!(there(&[&held[0], &held[1]]), [true; 2], "one of them is open: {done:?}");
+    assert_eq!(there(&[&home, &beside]), [true; 2], "their launcher lives: {done:?}");
+    assert_eq!(there(&[&no_run[0], &no_run[1]]), [true; 2], "they are of no run: {done:?}");
+
+    // A run has a folder that this command does not look into.
+    drop((open, lock));
+    std::fs::create_dir(&nowhere).unwrap();
+    assert_eq!(place.run(&["clean"]).code, Some(0));
+    assert_eq!(there(&[&held[0], &held[1], &home, &beside]), [false, false, true, true]);
+    std::fs::remove_dir(&nowhere).unwrap();
+    assert_eq!(place.run(&["clean"]).code, Some(0));
+    assert_eq!(there(&[&home, &beside]), [false; 2], "its folder and its launcher are gone");
+    no_run.iter().for_each(|path| std::fs::remove_file(path).unwrap());
+}
+
+#[test]
+fn the_files_of_a_living_run_stay_though_others_clean() {
+    let (place, other) = (Place::new(), Place::new());
+    let (mut flight, _) = take_off(&place, &REALTIME);
+    flight.wait_until(1.0);
+    let before = support::process::shared_files(flight.pid());
+    assert_eq!(other.run(&["clean"]).code, Some(0));
+    assert_eq!(support::process::shared_files(flight.pid()), before);
+    // What the processes of a killed run leave for good, another run removes when the folder is gone.
+    signal("KILL", flight.pid());
+    let pid = flight.pid();
+    assert_eq!(flight.end().code, None);
+    std::fs::remove_dir_all(place.join("x/skein")).unwrap();
+    eventually("all of it is removed", || {
+        assert_eq!(other.run(&["clean"]).code, Some(0));
+        support::process::shared_files(pid).is_empty()
+    });
+}

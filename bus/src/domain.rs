@@ -1,19 +1,19 @@
 //! Where a run keeps its shared files: a folder, a lock that the launcher holds, and a prefix of its own in shared memory.
 
 use crate::error::BusError;
+use crate::home_file::HomeFile;
+use crate::run_tag::RunTag;
+use crate::shared_memory::{SHARED_MEMORY, shared_files};
+use crate::strays::Strays;
 use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
 use rustix::fs::{FlockOperation, flock};
-use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File, OpenOptions, Permissions};
 use std::io::ErrorKind;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
-/// Where POSIX shared memory has its files.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 /// File that is locked: in the root while runs are made or removed, in a run's folder while its launcher is alive.
 const LOCK: &str = "lock";
 /// Maximum number of attempts to make the root, which another process may remove at any time.
@@ -31,12 +31,14 @@ pub struct Domain {
     config: Config,
     /// Held by the launcher as long as it is alive; the system releases it however the launcher ends.
     lock: Option<File>,
+    /// In the launcher.
+    _home: Option<HomeFile>,
 }
 
 /// What [`clean`] removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cleaned {
-    /// Folders of dead runs.
+    /// Dead runs of which a folder or a file was left.
     pub runs: usize,
     /// Their files in shared memory.
     pub files: usize,
@@ -56,15 +58,18 @@ pub fn root() -> PathBuf {
     }
 }
 
-/// Removes what dead runs of this user left behind, and nothing else. Safe while other runs fly and other processes clean.
+/// Removes what dead runs of this user left behind, and nothing else: their folders with their files in shared memory, and files of
+/// runs whose folder is gone, if no process uses one of them. Safe while other runs fly and other processes clean.
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
 pub fn clean() -> Result<Cleaned, BusError> {
-    clean_in(&root())
+    let cleaned = clean_in(&root())?;
+    let (runs, files) = Strays::find()?.remove()?;
+    Ok(Cleaned { runs: cleaned.runs + runs, files: cleaned.files + files })
 }
 
-/// As [`clean`], with another root.
+/// As [`clean`], with another root, and only what has a folder there.
 ///
 /// # Errors
 /// [`BusError::Io`], [`BusError::Folder`].
@@ -75,8 +80,15 @@ pub fn clean_in(root: &Path) -> Result<Cleaned, BusError> {
         // The lock is held until the folder is gone. A run without a lock file died before it had one: a launcher holds the
         // root's lock, which this process holds now, until its run has a lock file.
         let Some(_lock) = take_lock(&path.join(LOCK))? else { continue };
-        cleaned.files += remove_run(&path, &prefix)?;
-        cleaned.runs += 1;
+        match remove_run(&path, &prefix) {
+            Ok(files) => {
+                cleaned.files += files;
+                cleaned.runs += 1;
+            }
+            // A process that was just started outlives its launcher for a moment and makes files. The next cleaning removes them.
+            Err(BusError::Io { source, .. }) if source.kind() == ErrorKind::DirectoryNotEmpty => {}
+            Err(error) => return Err(error),
+        }
     }
     leave(root, guard);
     Ok(cleaned)
@@ -120,14 +132,19 @@ impl Domain {
     /// # Errors
     /// [`BusError::Io`], [`BusError::Folder`].
     pub fn create_in(root: &Path, label: &str) -> Result<Self, BusError> {
-        let _guard = lock_root(root)?;
+        let guard = lock_root(root)?;
         let label: String = label.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(MAX_LABEL).collect();
-        let path = root.join(format!("{label}.{}", unique_tag()));
+        let tag = RunTag::unique();
+        let path = root.join(format!("{label}.{}", tag.text()));
         let (prefix, config) = settings(&path)?;
         DirBuilder::new().mode(0o700).create(&path).map_err(BusError::io("create", &path))?;
         let lock = open_lock(&path.join(LOCK))?;
         flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(BusError::io("lock", &path))?;
-        Ok(Self { path, prefix, config, lock: Some(lock) })
+        let mut domain = Self { path, prefix, config, lock: Some(lock), _home: None };
+        // If this fails, the folder is removed.
+        drop(guard);
+        domain._home = Some(HomeFile::create(&tag, &domain.path)?);
+        Ok(domain)
     }
 
     /// Joins the run in this folder. For every process but the launcher. Dropping it removes nothing.
@@ -137,7 +154,7 @@ impl Domain {
     pub fn join(path: &Path) -> Result<Self, BusError> {
         check_private(path)?;
         let (prefix, config) = settings(path)?;
-        Ok(Self { path: path.to_owned(), prefix, config, lock: None })
+        Ok(Self { path: path.to_owned(), prefix, config, lock: None, _home: None })
     }
 
     /// The run's folder.
@@ -187,20 +204,10 @@ impl Drop for Domain {
     }
 }
 
-/// `<pid>_<time>_<count>`: unique, and with a `_` appended never the beginning of another tag.
-fn unique_tag() -> String {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO);
-    format!("{}_{:x}_{count}", std::process::id(), since.as_nanos() as u64)
-}
-
 /// The tag in a run folder's name; `None` for a folder that is not a run's.
-fn tag_of(path: &Path) -> Option<&str> {
+fn tag_of(path: &Path) -> Option<RunTag> {
     let (_, tag) = path.file_name()?.to_str()?.rsplit_once('.')?;
-    let mut parts = tag.split('_');
-    let mut part = |radix| parts.next().is_some_and(|text| u64::from_str_radix(text, radix).is_ok());
-    (part(10) && part(16) && part(10) && parts.next().is_none()).then_some(tag)
+    RunTag::parse(tag)
 }
 
 /// A run's prefix in shared memory and its iceoryx2 configuration, from its folder.
@@ -212,7 +219,7 @@ fn settings(path: &Path) -> Result<(String, Config), BusError> {
         return Err(folder(&why));
     }
     let tag = tag_of(path).ok_or_else(|| folder("its name is not a run's, `<label>.<pid>_<time>_<count>`"))?;
-    let prefix = format!("skein_{tag}_");
+    let prefix = tag.prefix();
     let mut config = Config::default();
     let global = &mut config.global;
     global.prefix =
@@ -319,8 +326,7 @@ fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
         if entry.file_type().is_ok_and(|kind| kind.is_dir())
             && let Some(tag) = tag_of(&path)
         {
-            let prefix = format!("skein_{tag}_");
-            found.push((path, prefix));
+            found.push((path, tag.prefix()));
         }
     }
     found.sort();
@@ -329,30 +335,14 @@ fn runs(root: &Path) -> Result<Vec<(PathBuf, String)>, BusError> {
 
 /// Removes a run's files in shared memory, then its folder. If this is interrupted, the folder still tells the prefix.
 fn remove_run(path: &Path, prefix: &str) -> Result<usize, BusError> {
-    let files = shared_files(prefix)?;
+    let mut files = shared_files(prefix)?;
+    // Its home goes last: without it, what is left is nobody's.
+    files.sort_by_key(|file| *file == HomeFile::path(prefix));
     for file in &files {
         gone(fs::remove_file(file)).map_err(BusError::io("remove", file))?;
     }
     gone(fs::remove_dir_all(path)).map_err(BusError::io("remove", path))?;
     Ok(files.len())
-}
-
-/// The files of this user in shared memory whose names begin with `prefix`.
-pub(crate) fn shared_files(prefix: &str) -> Result<Vec<PathBuf>, BusError> {
-    let shared = Path::new(SHARED_MEMORY);
-    let uid = rustix::process::geteuid().as_raw();
-    let mut files = Vec::new();
-    for entry in fs::read_dir(shared).map_err(BusError::io("list", shared))? {
-        let entry = entry.map_err(BusError::io("list", shared))?;
-        if begins_with(&entry.file_name(), prefix) && entry.metadata().is_ok_and(|meta| meta.uid() == uid) {
-            files.push(entry.path());
-        }
-    }
-    Ok(files)
-}
-
-fn begins_with(name: &OsStr, prefix: &str) -> bool {
-    name.as_bytes().starts_with(prefix.as_bytes())
 }
 
 /// Success also if the file was already gone.

@@ -8,7 +8,8 @@
 
 use crate::error::BusError;
 use crate::payload::{DownWord, RecordWord, StreamHeader, UplinkHeader, WireFrame, Word};
-use crate::room::{Room, require};
+use crate::room::Room;
+use crate::shared_memory::require;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;

@@ -1,9 +1,10 @@
 //! Space in shared memory. A page is taken when it is first written, and a process that finds no page is ended by SIGBUS. So a
 //! run reserves all pages of its files before its first tick: then files of others that fill /dev/shm do not end it.
 
-use crate::domain::{Domain, SHARED_MEMORY, shared_files};
+use crate::domain::Domain;
 use crate::error::BusError;
-use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use crate::shared_memory::{free, require, shared_files};
+use rustix::fs::{FallocateFlags, fallocate};
 use rustix::io::{Errno, retry_on_intr};
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -13,7 +14,7 @@ use std::path::Path;
 /// Unit of `st_blocks`, bytes.
 const BLOCK: u64 = 512;
 /// Free space that a process needs to join a run: its ports, and its part of their connections. Measured: 0.1 MiB.
-const JOIN_BYTES: u64 = 1 << 20;
+pub(crate) const JOIN_BYTES: u64 = 1 << 20;
 
 /// The files of a run in shared memory.
 #[derive(Clone, Debug)]
@@ -63,22 +64,6 @@ impl Room {
 /// [`BusError::NoRoom`], [`BusError::Io`].
 pub(crate) fn check_join() -> Result<(), BusError> {
     require(JOIN_BYTES)
-}
-
-/// Checks that so many bytes are free.
-///
-/// # Errors
-/// [`BusError::NoRoom`], [`BusError::Io`].
-pub(crate) fn require(needed: u64) -> Result<(), BusError> {
-    let free = free()?;
-    if needed > free { Err(BusError::NoRoom { needed, free }) } else { Ok(()) }
-}
-
-fn free() -> Result<u64, BusError> {
-    let shared = Path::new(SHARED_MEMORY);
-    let about = statvfs(shared).map_err(BusError::io("look at", shared))?;
-    // A file system without a limit has no blocks at all.
-    Ok(if about.f_blocks == 0 { u64::MAX } else { about.f_bavail * about.f_frsize })
 }
 
 /// `None` if the file is gone, is a folder, or is one that nobody may write.
