@@ -281,6 +281,32 @@ fn a_full_shared_memory_does_not_end_a_run_that_has_started() {
     }
 }
 
+/// The run keeps what a restarted drone needs. Drone 4 is killed at 20 s and 35 s and gets a new process 5 s later, while files of
+/// others fill all that is free.
+#[test]
+fn a_full_shared_memory_does_not_keep_a_drone_from_its_restart() {
+    let faults = "fault=[{kind=\"restart\", at_s=20, drone=4, for_s=5}, {kind=\"restart\", at_s=35, drone=4, for_s=5}]";
+    // Little is free, so that it is filled long before the first restart.
+    for (clock, dt_s) in [("realtime:5", "0.01"), ("lockstep", "0.0005")] {
+        let place = Place::new();
+        let script = format!(
+            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} --set '{faults}' & \
+             while [ ! -e out/processes.json ]; do sleep 0.01; done; \
+             dd if=/dev/zero of=/dev/shm/others bs=4k 2>dd.txt; cp dd.txt filled.txt; wait $!"
+        );
+        let Some(done) = with_shared_memory(&place, "20m", &script) else { return };
+        assert!(matches!(done.status.code(), Some(0 | 1)), "{clock}: {done:?}");
+        let told = support::faults(&place.join("out"));
+        let kinds: Vec<_> = told.iter().map(|fault| (fault["kind"].as_str().unwrap(), &fault["scheduled"])).collect();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(kinds, [("restart", &Value::Bool(true)); 2], "{clock}: {told:?}, {said}");
+        let filled = fs::read_to_string(place.join("filled.txt")).unwrap();
+        assert!(filled.contains("No space left"), "{clock}: {filled}");
+        let lived = fs::read_to_string(place.join("out/processes.json")).unwrap();
+        assert_eq!(lived.matches("\"id\": 4,").count(), 3, "{clock}: three processes flew drone 4: {lived}");
+    }
+}
+
 #[test]
 fn a_start_that_fails_leaves_no_folder() {
     let place = Place::new();

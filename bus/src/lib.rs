@@ -64,6 +64,7 @@ mod run_tag;
 mod segment;
 pub mod services;
 mod shared_memory;
+mod spare_room;
 mod spec;
 mod stopwatch;
 mod strays;
@@ -87,6 +88,7 @@ pub use ports::{
 };
 pub use process_request::{ProcessRequest, RequestKind};
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};
+pub use spare_room::SpareRoom;
 pub use spec::{ControlSpec, WaitMode};
 pub use stopwatch::{Lap, Stopwatch};
 pub use tick_watch::TickWatch;

@@ -44,7 +44,7 @@ const BORROWED: usize = 2;
 /// drones. Services that do not overflow get that worst case, because their buffers hold different samples.
 const HELD_CHUNKS: usize = 120;
 /// Frames that fit into an uplink sample before its segment grows.
-const UPLINK_FRAMES: usize = 16;
+pub(crate) const UPLINK_FRAMES: usize = 16;
 /// Space for the neighbours, obstacles and frames of one drone in the first downlink segment, bytes.
 const DOWNLINK_ROOM: usize = 448;
 /// Frames of a tick that fit into the first segments of downlink and record: per drone, and the number of drones that counts. A run
@@ -136,8 +136,8 @@ impl Services {
     }
 
     /// Reserves all memory that the services have now. Call it before the first tick, when all ports are made: from then on,
-    /// what others do in /dev/shm does not end these processes. The ports of a process that joins later, such as a restarted
-    /// drone, are not reserved. Such a process only makes sure that there is room when it joins.
+    /// what others do in /dev/shm does not end these processes. Call it again when a process has joined that was started in flight;
+    /// [`SpareRoom`](crate::SpareRoom) keeps the space for it.
     ///
     /// # Errors
     /// [`BusError::NoRoom`]; then nothing is reserved. [`BusError::Io`].
@@ -311,8 +311,13 @@ fn downlink_limits(drones: usize) -> Limits {
 /// Only the world subscribes: a subscriber that does not read would hold up the drones.
 fn uplink_limits(per_process: usize) -> Limits {
     let publishers = SHARD_DRONES + SPARE;
-    let buffer = BUFFER * per_process.clamp(1, SHARD_DRONES);
+    let buffer = uplink_buffer(per_process);
     Limits { publishers, subscribers: 1, nodes: publishers + 2, buffer, overflow: false }
+}
+
+/// Size of the uplink's buffer for a process that sends for so many drones, samples.
+pub(crate) fn uplink_buffer(senders: usize) -> usize {
+    BUFFER * senders.clamp(1, SHARD_DRONES)
 }
 
 /// Only the launcher subscribes: in lockstep, a subscriber that does not read would hold up the swarm.

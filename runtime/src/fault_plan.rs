@@ -19,6 +19,18 @@ pub(crate) fn fault_plan(scenario: &Scenario) -> FaultPlan {
     FaultPlan { seed: scenario.seed, faults: scenario.fault_plan.iter().map(fault).collect() }
 }
 
+/// How many new processes drones may get in flight.
+pub(crate) fn restarts(scenario: &Scenario) -> usize {
+    let plan = fault_plan(scenario);
+    let restarts = plan.faults.iter().filter(|fault| fault.effect == FaultEffect::Restart);
+    let targets = restarts.map(|fault| match &fault.targets {
+        FaultTargets::Drones(ids) => ids.len(),
+        FaultTargets::All => scenario.formation.drones as usize,
+        _ => 1,
+    });
+    targets.sum()
+}
+
 fn effect(keys: &Keys, drones: u32) -> FaultEffect {
     let vector = |key: Option<[f64; 2]>| key.map_or_else(Vec2::zeros, Vec2::from);
     match keys.kind {

@@ -14,10 +14,10 @@ use crate::tuning::{
     START_LIMIT_PER_DRONE, STOPPED_POLL, SUPERVISOR_POLL,
 };
 use crate::world_process::DISMISSED;
-use crate::{mission, scenario_file};
+use crate::{fault_plan, mission, scenario_file};
 use skein_bus::{
-    Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, WorldState,
-    allowed_cores, clean_dead_nodes, raise_file_limit,
+    Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, SpareRoom,
+    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
 };
 use skein_protocol::record::{RecordSink, RecordView};
 use skein_protocol::{DroneId, Tick};
@@ -58,6 +58,8 @@ struct Supervisor<'l, 's, 'd> {
     /// Since when the world has been stopped.
     stopped_since: Option<Instant>,
     end: RunEnd,
+    /// Shared memory for restarted processes, if the scenario restarts any.
+    spare: Option<SpareRoom>,
     /// Keeps the services open for as long as the run lasts.
     services: Services,
 }
@@ -76,6 +78,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         let senders = launch.hosts.iter().map(|host| host.count as usize).fold(per_process, usize::max);
         let services = Services::create(domain, drones, senders, "launcher")?;
         let record = services.record_subscriber()?;
+        let restarts = fault_plan::restarts(launch.scenario);
+        let spare = (restarts > 0).then(|| SpareRoom::keep(domain, senders, restarts)).transpose()?;
         scenario_file::write(domain.path(), launch.scenario)?;
         let args = ChildArgs {
             domain: domain.path().to_owned(),
@@ -102,6 +106,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
             looked: Instant::now(),
             stopped_since: None,
             end: RunEnd::default(),
+            spare,
             services,
         })
     }
@@ -308,12 +313,16 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
 
     /// Starts a new process for a dead drone. Returns its incarnation, or 0 if the drone is dead again.
     fn try_restart(&mut self, drone: DroneId, tick: Tick) -> u32 {
-        self.restart(drone, tick).unwrap_or_else(|error| {
+        let restarted = self.restart(drone, tick).unwrap_or_else(|error| {
             tracing::warn!(%error, "drone {drone} is dead again");
             self.kill(drone);
             self.control.mark_dead(drone.index());
             0
-        })
+        });
+        if let Some(Err(error)) = self.spare.as_ref().map(SpareRoom::keep_rest) {
+            tracing::warn!(%error, "there may be no room for the next restart");
+        }
+        restarted
     }
 
     /// Ends a drone: its process, unless others fly in it.
@@ -345,6 +354,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         self.incarnations[drone] = incarnation;
         // The ended process still holds its places in the services.
         clean_dead_nodes(self.domain)?;
+        self.spare.as_ref().map_or(Ok(()), SpareRoom::give)?;
         self.control.revive(drone, first_tick);
         let range = DroneRange { first: id, count: 1, incarnation, first_tick };
         self.start_again(range)?;
@@ -357,6 +367,8 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
                 return Err(failed());
             }
         }
+        // The world connects to the new ports next.
+        self.services.reserve()?;
         self.processes.extend(self.children.list().filter(|process| process.id == Some(id.0)));
         if let Err(error) = (self.launch.on_ready)(&self.processes) {
             // The drone flies nevertheless.
