@@ -190,3 +190,77 @@ impl DroneHandle {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_run::TestRun;
+    use skein_bus::{ControlSpec, DownlinkPublisher, Patience, TickOutcome, WaitMode};
+    use skein_world::World;
+    use std::time::Duration;
+
+    /// The process of the only drone of a run, and what the world would have.
+    struct OneDrone {
+        process: DroneProcess,
+        downlink: DownlinkPublisher,
+        world: World,
+        control: Arc<Control>,
+    }
+
+    impl OneDrone {
+        fn of(run: &TestRun) -> Self {
+            let spec = ControlSpec { drones: 1, cores: 1, per_process: 1, wait: WaitMode::Block };
+            let control = Arc::new(Control::create(spec).unwrap());
+            let pilots = PilotRegistry::built_in().unwrap();
+            let (id, barrier) = (DroneId(0), DroneEndpoint::new(Arc::clone(&control), 0).unwrap());
+            let pilot_host = DroneFactory::new(run.scenario(), &pilots).pilot_host(id, 1, SimTime(0)).unwrap();
+            let drone = DroneHandle { id, pilot_host, barrier, slot: Slot::default(), ended: false };
+            let downlink = run.services().downlink_publisher().unwrap();
+            let process = DroneProcess::new(run.services(), 1, vec![drone]).unwrap();
+            Self { process, downlink, world: mission::world(run.scenario()).unwrap(), control }
+        }
+
+        fn publish(&self, tick: Tick, bytes: &[u8]) {
+            assert_eq!(self.downlink.send(tick, bytes.len(), |place| place.copy_from_slice(bytes)).unwrap(), 1);
+        }
+
+        /// Opens a tick and lets the drone answer. What the world then has of it.
+        fn answer(&mut self, tick: Tick) -> TickOutcome {
+            self.control.open_tick(tick).unwrap();
+            let drone = &mut self.process.drones[0].barrier;
+            assert_eq!(drone.wait_tick(|| true), TickSignal::Tick(tick));
+            self.process.answer(tick).unwrap();
+            let mut outcomes = [TickOutcome::Pending];
+            self.control.wait_done(tick, Patience::For(Duration::from_millis(50)), &mut outcomes).unwrap();
+            outcomes[0]
+        }
+    }
+
+    #[test]
+    fn malformed_and_foreign_downlinks_are_skipped_and_counted() {
+        let run = TestRun::new("[formation]\ndrones = 1\n");
+        let mut one = OneDrone::of(&run);
+        let mut honest = vec![0; one.world.downlink().byte_len().next_multiple_of(8)];
+        let len = one.world.downlink().byte_len();
+        one.world.downlink().write_to(&mut honest[..len]);
+        let honest = honest[..len].to_vec();
+        let hostile = [&honest[..40], &[0xff; 512], &[][..]];
+        for bytes in hostile {
+            one.publish(0, bytes);
+        }
+        // Well-formed, and of a tick that has not come.
+        one.publish(1 << 40, &honest);
+        one.publish(0, &honest);
+        assert_eq!(one.answer(0), TickOutcome::Done, "the honest one is answered");
+        assert_eq!(one.process.skipped, 4);
+    }
+
+    #[test]
+    fn a_drone_without_an_honest_downlink_does_not_answer_and_lives() {
+        let run = TestRun::new("[formation]\ndrones = 1\n");
+        let mut one = OneDrone::of(&run);
+        one.publish(0, &[0xff; 64]);
+        assert_eq!(one.answer(0), TickOutcome::Hung, "it has nothing to answer to");
+        assert_eq!(one.process.skipped, 1);
+    }
+}

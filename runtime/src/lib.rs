@@ -88,6 +88,7 @@ mod process_state;
 mod program;
 mod programs;
 mod radio_receiver;
+mod record_wait;
 mod relay_line;
 mod reported_panic;
 mod run_end;
@@ -97,6 +98,8 @@ pub mod scenario_file;
 mod steered_swarm;
 pub mod supervisor;
 mod talker;
+#[cfg(test)]
+mod test_run;
 mod tuning;
 mod uplinks;
 mod wing;

@@ -5,7 +5,8 @@ use crate::clock::Clock;
 use crate::error::RuntimeError;
 use crate::mission;
 use crate::pacer::Pacer;
-use crate::tuning::{DISMISSAL_POLL, RECORD_LIMIT, RECORD_PATIENCE, RECORD_WARNING, REQUEST_LIMIT, RESTART_LIMIT};
+use crate::record_wait::{NextOffer, RecordLimits, RecordWait};
+use crate::tuning::{DISMISSAL_POLL, REQUEST_LIMIT, RESTART_LIMIT};
 use crate::uplinks::Uplinks;
 use skein_bus::{
     Control, Domain, DownlinkPublisher, Patience, ProcessRequest, RecordPolicy, RecordPublisher, RequestKind, Services,
@@ -40,7 +41,7 @@ pub fn run(args: &ChildArgs, clock: Clock, patience: Duration) -> Result<(), Run
     pin_to_core(0, args.pin)?;
     let domain = Domain::join(&args.domain)?;
     let services = Services::open(&domain, mission::drones(&scenario), "world")?;
-    let pace = Pace { clock, patience };
+    let pace = Pace { clock, patience, record: RecordLimits::default() };
     let mut server = WorldServer::new(&scenario, pace, &services, Arc::clone(&control), domain, args.clone())?;
     control.set_world_state(WorldState::Ready);
     if control.wait_go(|| true) {
@@ -79,6 +80,8 @@ struct WorldServer {
     wall_clock: bool,
     /// How long a drone may take to answer in lockstep.
     patience: Duration,
+    /// How long the recorder may take.
+    record_limits: RecordLimits,
     /// The host of each drone that flies on another machine.
     hosts: Vec<Option<String>>,
 }
@@ -87,12 +90,13 @@ struct WorldServer {
 struct Pace {
     clock: Clock,
     patience: Duration,
+    record: RecordLimits,
 }
 
 impl WorldServer {
     fn new(
         scenario: &Scenario,
-        Pace { clock, patience }: Pace,
+        Pace { clock, patience, record: record_limits }: Pace,
         services: &Services,
         control: Arc<Control>,
         domain: Domain,
@@ -101,7 +105,7 @@ impl WorldServer {
         let drones = mission::drones(scenario);
         let policy = match clock {
             // The launcher reads the records. If it dies, the kernel kills this process.
-            Clock::Lockstep => RecordPolicy::Wait(Box::new(|waited| waited < RECORD_PATIENCE)),
+            Clock::Lockstep => RecordPolicy::Wait(Box::new(move |waited| waited < record_limits.patience)),
             Clock::Realtime { .. } => RecordPolicy::Drop,
         };
         Ok(Self {
@@ -117,6 +121,7 @@ impl WorldServer {
             lost_records: 0,
             unsent_events: Vec::new(),
             patience,
+            record_limits,
             hosts: scenario.hosts_of_drones(),
             wall_clock: clock != Clock::Lockstep,
         })
@@ -289,19 +294,19 @@ impl WorldServer {
     /// Offers the record until the launcher takes it. Returns false if the launcher asked to stop meanwhile. A launcher that
     /// is stopped is waited for.
     fn insist(&self) -> Result<bool, RuntimeError> {
-        let (since, mut warned) = (Instant::now(), false);
+        let (since, mut wait) = (Instant::now(), RecordWait::new(self.record_limits));
         while !self.send_record()? {
             if self.control.stop_requested().is_some() {
                 return Ok(false);
             }
             clean_dead_nodes(&self.domain)?;
-            let waited = since.elapsed() + RECORD_PATIENCE;
-            if waited > RECORD_WARNING && !warned {
-                warned = true;
-                tracing::warn!("the launcher has taken no record for {waited:.0?}: the swarm waits");
-            }
-            if waited > RECORD_LIMIT && !self.args.launcher_is_stopped() {
-                return Err(RuntimeError::RecordNotTaken { waited });
+            let waited = since.elapsed() + self.record_limits.patience;
+            match wait.after(waited, || self.args.launcher_is_stopped()) {
+                NextOffer::Offer => {}
+                NextOffer::Warn => {
+                    tracing::warn!("the launcher has taken no record for {waited:.0?}: the swarm waits");
+                }
+                NextOffer::GiveUp => return Err(RuntimeError::RecordNotTaken { waited }),
             }
             std::thread::sleep(DISMISSAL_POLL);
         }
@@ -336,11 +341,82 @@ impl WorldServer {
         let since = Instant::now();
         while !self.send_record()? {
             let waited = since.elapsed();
-            if waited > RECORD_LIMIT && !self.args.launcher_is_stopped() {
+            if waited > self.record_limits.limit && !self.args.launcher_is_stopped() {
                 return Err(RuntimeError::RecordNotTaken { waited });
             }
             std::thread::sleep(DISMISSAL_POLL);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_run::TestRun;
+    use skein_bus::{ControlSpec, PinMode, WaitMode};
+
+    /// The limits, each much shorter.
+    const SHORT: RecordLimits = RecordLimits {
+        patience: Duration::from_millis(5),
+        warning: Duration::from_millis(20),
+        limit: Duration::from_millis(100),
+    };
+
+    /// A world in lockstep without drones that answer.
+    fn server(run: &TestRun) -> WorldServer {
+        let spec = ControlSpec { drones: run.drones(), cores: 1, per_process: 1, wait: WaitMode::Block };
+        let control = Arc::new(Control::create(spec).unwrap());
+        let (path, parent) = (run.domain().path().to_owned(), std::process::id());
+        let args = ChildArgs { domain: path.clone(), control: -1, parent, pin: PinMode::Off };
+        let pace = Pace { clock: Clock::Lockstep, patience: Duration::from_secs(5), record: SHORT };
+        let services = Services::open(run.domain(), run.drones(), "world").unwrap();
+        WorldServer::new(run.scenario(), pace, &services, control, Domain::join(&path).unwrap(), args).unwrap()
+    }
+
+    #[test]
+    fn a_recorder_that_never_reads_ends_the_run_after_the_limit() {
+        let run = TestRun::new("[formation]\ndrones = 2\n");
+        let _unread = run.services().record_subscriber().unwrap();
+        let mut server = server(&run);
+        // Fill its buffer.
+        let began = loop {
+            let began = Instant::now();
+            if let Err(error) = server.send_tick_record() {
+                assert!(matches!(error, RuntimeError::RecordNotTaken { waited } if waited > SHORT.limit), "{error}");
+                break began;
+            }
+            assert!(began.elapsed() < SHORT.limit, "a record that was not taken counts as taken");
+        };
+        assert!(began.elapsed() + SHORT.patience >= SHORT.limit);
+    }
+
+    #[test]
+    fn a_recorder_that_reads_again_gets_every_record() {
+        let run = TestRun::new("[formation]\ndrones = 2\n");
+        let reader = run.services().record_subscriber().unwrap();
+        let mut server = server(&run);
+        let mut sent = 0;
+        while server.send_record().unwrap() {
+            sent += 1;
+        }
+        assert!(reader.receive().unwrap().is_some());
+        server.send_tick_record().unwrap();
+        let mut left = 0;
+        while reader.receive().unwrap().is_some() {
+            left += 1;
+        }
+        assert_eq!((left, server.lost_records), (sent, 0));
+    }
+
+    #[test]
+    fn a_launcher_that_asks_to_stop_is_not_waited_for() {
+        let run = TestRun::new("[formation]\ndrones = 2\n");
+        let _unread = run.services().record_subscriber().unwrap();
+        let mut server = server(&run);
+        server.control.request_stop(15);
+        while server.send_record().unwrap() {}
+        server.send_tick_record().unwrap();
+        assert_eq!(server.lost_records, 1);
     }
 }
