@@ -77,7 +77,10 @@ fn request() -> impl Strategy<Value = (Vec<String>, Vec<u8>)> {
 #[test]
 fn views() {
     let place = Place::new();
-    let mut flight = place.take_off("s2-right", &["--clock", "realtime", "--set", "time.timeout_s=1000"]);
+    // A mission that outlasts every number of clients.
+    let long =
+        ["mission.end=\"time\"", "mission.duration_s=35000", "time.timeout_s=36000"].map(|key| ["--set", key]).concat();
+    let mut flight = place.take_off("s2-right", &[&["--clock", "realtime"], &long[..]].concat());
     flight.processes();
     let mut view = place.command(&["view"]).stderr(Stdio::null()).spawn().unwrap();
     let mut url = String::new();

@@ -118,6 +118,44 @@ fn a_clock_that_is_too_fast_misses_ticks_and_reports_them() {
     assert_eq!(recorded.len() as f64, told, "what the recorder lost is counted: {summary}");
 }
 
+/// How long the machine is made busy.
+const LOAD: std::time::Duration = std::time::Duration::from_secs(10);
+
+/// Processes that take all time they can get, until this is dropped.
+struct Hogs(Vec<std::process::Child>);
+
+impl Hogs {
+    fn new(count: usize) -> Self {
+        let hog = || std::process::Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap();
+        Self((0..count).map(|_| hog()).collect())
+    }
+}
+
+impl Drop for Hogs {
+    fn drop(&mut self) {
+        self.0.iter_mut().for_each(|hog| drop(hog.kill()));
+        self.0.iter_mut().for_each(|hog| drop(hog.wait()));
+    }
+}
+
+/// Two hundred processes want the cores for ten seconds, while the swarm flies by a wall clock that is too fast for them. Commands come
+/// late, by any time, and all distances are kept.
+#[test]
+fn commands_that_come_late_on_a_busy_machine_are_safe() {
+    let place = Place::new();
+    let mut flight = place.take_off("s2-right", &["--clock", "realtime:50"]);
+    flight.processes();
+    let hogs = Hogs::new(200);
+    std::thread::sleep(LOAD);
+    drop(hogs);
+    let done = flight.finish();
+    let summary = done.summary();
+    assert!(number(&summary, "/deadline_misses") > 100.0, "no load: {done:?}");
+    assert_eq!(summary["violations"], serde_json::json!([]), "{done:?}");
+    assert!(matches!(done.code, Some(0 | 1)), "{done:?}");
+    assert_eq!(summary["faults"], serde_json::json!([]), "to be late is no reason to die: {done:?}");
+}
+
 #[test]
 fn five_swarms_at_once_do_not_see_each_other() {
     let place = Place::new();
