@@ -78,6 +78,7 @@ mod markup;
 mod mcap;
 mod messages;
 mod metrics;
+pub mod number_text;
 mod own_metrics;
 pub mod page;
 mod palette;

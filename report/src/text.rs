@@ -1,5 +1,6 @@
 //! The summary as text for a terminal: the outcome first, then the details.
 
+use crate::number_text::{brief, fixed};
 use crate::summary::{FailureEntry, OwnMetric, Stage, StageGroup, Summary};
 use skein_protocol::record::{Outcome, Percentiles};
 use std::borrow::Cow;
@@ -78,7 +79,7 @@ fn violations(summary: &Summary) -> String {
         let kind = serde_json::to_value(violation.kind).ok();
         let kind = kind.as_ref().and_then(|kind| kind.as_str()).unwrap_or("violation").replace('-', " ");
         let distance = violation.kind.is_distance();
-        let value = if distance { format!(", {:.2} m", violation.value_m) } else { String::new() };
+        let value = if distance { format!(", {} m", fixed(violation.value_m, 2)) } else { String::new() };
         format!(", first at {:.2} s: {kind} of drones {}{value}", violation.t_s, list(&violation.drones))
     });
     let number = if count == 1 {
@@ -117,7 +118,9 @@ pub(crate) fn lines(summary: &Summary) -> Vec<(String, String)> {
     }
     for (name, figure) in &summary.metrics_own {
         let OwnMetric { mean, last, min, max } = figure;
-        line("figure", Some(format!("{name}: mean {mean:.4}, last {last:.4}, from {min:.4} to {max:.4}")));
+        let shown = [mean, last, min, max].map(|&value| brief(value, min.abs().max(max.abs())));
+        let [mean, last, min, max] = shown;
+        line("figure", Some(format!("{name}: mean {mean}, last {last}, from {min} to {max}")));
     }
     for failure in &summary.failures {
         let FailureEntry { t_s, drone, pilot, reason } = failure;
@@ -189,7 +192,7 @@ fn energy(summary: &Summary) -> String {
 
 fn distances(summary: &Summary) -> Option<String> {
     let separation = summary.min_separation_m.map(|m| format!("{m:.2} m between drones"));
-    let clearance = summary.min_clearance_m.map(|m| format!("{m:.2} m to obstacles"));
+    let clearance = summary.min_clearance_m.map(|m| format!("{} m to obstacles", fixed(m, 2)));
     let both: Vec<String> = separation.into_iter().chain(clearance).collect();
     (!both.is_empty()).then(|| format!("minimum: {}", both.join(", ")))
 }

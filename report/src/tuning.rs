@@ -49,6 +49,12 @@ pub(crate) const PLOT_SLOT_ERROR_DRONES_MAX: usize = 100;
 pub(crate) const OWN_PANELS_MAX: usize = 24;
 /// Largest number of drones in the animated flight: more would make the file too large. Chosen by hand.
 pub(crate) const ANIMATION_DRONES_MAX: usize = 64;
+/// Time between two frames of the marks and lines in the animated flight, s. Chosen by hand.
+pub(crate) const ANIMATION_SIGN_PERIOD_S: f64 = 0.5;
+/// Largest number of marks and lines in all frames of the animated flight; beyond it, frames become longer. Chosen by hand.
+pub(crate) const ANIMATION_SIGNS_MAX: usize = 20_000;
+/// Largest number of marks and lines in a frame of the animated flight that have labels. Chosen by hand.
+pub(crate) const ANIMATION_LABELS_MAX: usize = 60;
 /// Largest product of drones and samples in report.html; beyond it, samples are left out evenly. Chosen by hand.
 pub(crate) const PAGE_POSITIONS_MAX: usize = 300_000;
 

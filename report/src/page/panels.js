@@ -12,6 +12,12 @@ function element(tag, text, name) {
   return made;
 }
 
+// A number with so many digits after the point, and without the sign of zero.
+function fixed(value, digits) {
+  const text = value.toFixed(digits);
+  return /^-[0.]+$/.test(text) ? text.slice(1) : text;
+}
+
 class Panels {
   constructor(story, scene) {
     this.story = story;
@@ -80,8 +86,8 @@ class Panels {
     const row = (name, value) => list.append(element("dt", name), element("dd", value));
     const speed = Math.hypot(moment.vx[i], moment.vy[i]);
     row("state", state.alive[i] ? (state.late[i] ? "alive, late" : "alive") : "dead");
-    row("position", `${moment.x[i].toFixed(1)}, ${moment.y[i].toFixed(1)} m`);
-    if (moment.z) row("altitude", `${moment.z[i].toFixed(1)} m${state.vz_mps[i] ? `, climbs at ${state.vz_mps[i].toFixed(2)} m/s` : ""}`);
+    row("position", `${fixed(moment.x[i], 1)}, ${fixed(moment.y[i], 1)} m`);
+    if (moment.z) row("altitude", `${fixed(moment.z[i], 1)} m${Math.abs(state.vz_mps[i]) >= 0.005 ? `, climbs at ${fixed(state.vz_mps[i], 2)} m/s` : ""}`);
     row("speed", `${speed.toFixed(2)} m/s`);
     row("group", state.group[i] + (state.leads[i] ? `, leads ${state.leads[i]}` : ""));
     row("obeys", state.leader[i] === null ? "no leader" : `drone ${state.leader[i]}, round ${state.plan[i][0]} epoch ${state.plan[i][1]}`);

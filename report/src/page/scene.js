@@ -409,7 +409,7 @@ class Scene {
     for (let i = 0; i < moment.x.length; i++) {
       // The altitude stands beside a drone that is not at the formation's.
       const off = moment.z && Math.abs(moment.z[i] - this.facts.scene.altitude_m) > 0.5;
-      const name = off ? `${i}: ${moment.z[i].toFixed(0)} m` : i;
+      const name = off ? `${i}: ${fixed(moment.z[i], 0)} m` : i;
       pen.fillText(name, this.px(moment.x[i]) + size * 1.3 + 2, this.py(moment.y[i]) - size);
     }
   }

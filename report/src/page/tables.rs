@@ -1,6 +1,7 @@
 //! The tables of the page: summary, messages, faults and violations.
 
 use crate::markup::escaped;
+use crate::number_text::fixed;
 use crate::summary::Summary;
 use crate::text;
 use skein_protocol::record::Percentiles;
@@ -89,7 +90,7 @@ fn violations(summary: &Summary) -> Vec<Vec<String>> {
             format!("{:.2}", violation.t_s),
             name(&violation.kind),
             drones.join(", "),
-            if violation.kind.is_distance() { format!("{:.2}", violation.value_m) } else { "–".to_owned() },
+            if violation.kind.is_distance() { fixed(violation.value_m, 2) } else { "–".to_owned() },
         ]
     };
     summary.violations.iter().map(line).collect()

@@ -1,13 +1,14 @@
 //! The flight as an animated SVG, for pages that show pictures but run no script.
 
+use super::recording::Recording;
 use super::samples::{Samples, Track, TrackPoint};
-use super::style::{hex, px};
+use super::shown_sign::FrameTimes;
+use super::style::{hex, px, rgb};
 use super::tracks::{colours, frame};
 use crate::facts::RunFacts;
 use crate::geometry::outline;
-use crate::group_order::GroupOrder;
 use crate::markup::escaped;
-use crate::tuning::ANIMATION_DRONES_MAX;
+use crate::tuning::{ANIMATION_DRONES_MAX, ANIMATION_LABELS_MAX};
 use skein_protocol::Vec2;
 use std::fmt::Write;
 
@@ -24,9 +25,9 @@ const SPEED: f64 = 8.0;
 /// The symbol of a drone, which points along the flight direction, px.
 const ARROW: &str = "M9 0L-7 6L-3 0L-7 -6Z";
 
-/// Draws the animation. `None` without drones, and for a swarm that is too large. A viewer that does not animate shows the
-/// drones in the middle of the flight.
-pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts) -> Option<String> {
+/// Draws the animation: the drones, and the marks and lines of their pilots. `None` without drones, and for a swarm that is too
+/// large. A viewer that does not animate shows the middle of the flight.
+pub(super) fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -> Option<String> {
     if samples.tracks.is_empty() || samples.tracks.len() > ANIMATION_DRONES_MAX {
         return None;
     }
@@ -35,7 +36,7 @@ pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts) -> O
     let height = height / units_per_pixel;
     let scale = WIDTH / (high.x - low.x);
     let place = |at: Vec2| [(at.x - low.x) * scale, TITLE + (high.y - at.y) * scale];
-    let colours: Vec<String> = colours(samples, order).into_iter().map(hex).collect();
+    let colours: Vec<String> = colours(samples, recording.groups()).into_iter().map(hex).collect();
     let mut svg = head(facts, height + TITLE);
     legend(&mut svg, &samples.groups, &colours);
     // Writing to a string cannot fail.
@@ -55,11 +56,22 @@ pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts) -> O
             );
         }
     }
+    signs(&mut svg, recording, samples.end_s, place);
     for track in samples.tracks.values() {
         drone(&mut svg, &key_frames(track, longest), place, &colours, samples.end_s / SPEED);
     }
     svg.push_str("</svg>\n");
     Some(svg)
+}
+
+/// The marks and lines of pilots, in the colours of the groups of their drones.
+fn signs(svg: &mut String, recording: &Recording, end_s: f64, place: impl Fn(Vec2) -> [f64; 2]) {
+    let (shown, mut order) = (recording.shown(), recording.groups().clone());
+    let times = FrameTimes { end_s, period_s: shown.period_s(), seconds: end_s / SPEED };
+    let labelled = shown.most() <= ANIMATION_LABELS_MAX;
+    for sign in shown.signs() {
+        sign.draw(svg, times, labelled, &place, |group| hex(rgb(order.colour(group))));
+    }
 }
 
 /// The beginning of the drawing: its size, its background and its title.
@@ -176,7 +188,7 @@ mod tests {
             let points = (0..count).map(|i| TrackPoint { at_m: at_m(i), group: usize::from(i > 60) }).collect();
             samples.tracks.insert(drone, Track { points, ..Track::default() });
         }
-        let svg = draw(&samples, &GroupOrder::default(), &facts(2)).unwrap();
+        let svg = draw(&samples, &Recording::default(), &facts(2)).unwrap();
         let keys: Vec<usize> = svg
             .split("translate\" dur")
             .skip(1)

@@ -10,6 +10,8 @@ mod recording;
 pub mod reproduce;
 mod samples;
 mod series;
+mod shown_frames;
+mod shown_sign;
 mod style;
 pub mod surface;
 pub mod sweep;
@@ -101,7 +103,7 @@ const DRAWINGS: [fn(&Samples, &Recording, &RunFacts) -> Drawn; FILES.len()] = [
     |samples, _, facts| curve(slot_error(samples, facts)),
     draw_leaders,
     draw_messages,
-    |samples, recording, facts| flight::draw(samples, recording.groups(), facts).map(Ok),
+    |samples, recording, facts| flight::draw(samples, recording, facts).map(Ok),
     |samples, _, facts| curve(disturbance(samples, facts)),
     |samples, _, facts| curve(bending(samples, facts)),
     |samples, _, facts| own::draw(samples, &run(facts)),

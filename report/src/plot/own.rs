@@ -4,6 +4,7 @@ use super::samples::{OwnBand, Samples};
 use super::series::Series;
 use super::style::{BLUE, EDGE, GRID, INK, WIDTH, number, pixels, px, text};
 use crate::error::DrawError;
+use crate::number_text::on_axis;
 use crate::tuning::OWN_PANELS_MAX;
 use plotters::prelude::*;
 
@@ -59,7 +60,11 @@ fn panel(area: &Area<'_>, name: &str, bands: &[OwnBand], end_s: f64) -> Result<(
     area.draw(&Text::new(name.to_owned(), (LEFT as i32, (NAME - px(12)) as i32), text(14))).map_err(DrawError::new)?;
     let low = bands.iter().map(|band| band.low).fold(f64::INFINITY, f64::min);
     let high = bands.iter().map(|band| band.high).fold(f64::NEG_INFINITY, f64::max);
-    let edge = if high > low { (high - low) * 0.06 } else { high.abs().max(1.0) * 0.06 };
+    // What differs by the residue of arithmetic alone is constant.
+    let largest = low.abs().max(high.abs());
+    let width = if high - low > largest * 1e-9 { high - low } else { largest.max(1.0) };
+    let edge = width * 0.06;
+    let value = |value: &f64| on_axis(*value, width);
     let mut chart = ChartBuilder::on(area)
         .margin_top(NAME)
         .margin_right(EDGE)
@@ -69,7 +74,7 @@ fn panel(area: &Area<'_>, name: &str, bands: &[OwnBand], end_s: f64) -> Result<(
         .map_err(DrawError::new)?;
     let (grid, axis) = (GRID.stroke_width(px(1)), INK.stroke_width(px(1)));
     let mut mesh = chart.configure_mesh();
-    mesh.label_style(text(12)).x_labels(6).y_labels(4).x_label_formatter(&number).y_label_formatter(&number);
+    mesh.label_style(text(12)).x_labels(6).y_labels(4).x_label_formatter(&number).y_label_formatter(&value);
     mesh.bold_line_style(grid).light_line_style(TRANSPARENT).axis_style(axis).draw().map_err(DrawError::new)?;
     let upper = bands.iter().map(|band| (band.t_s, band.high));
     let lower = bands.iter().rev().map(|band| (band.t_s, band.low));
@@ -99,5 +104,24 @@ mod tests {
         assert!(svg.contains("the first 24 of 25"));
         samples.own.truncate(1);
         assert!(!draw(&samples, "run").unwrap().unwrap().contains("the first"));
+    }
+
+    #[test]
+    fn the_axis_of_a_figure_fits_its_range() {
+        let drawn = |values: [f64; 2]| {
+            let mut samples = Samples { end_s: 2.0, ..Samples::default() };
+            let mut series = Series::new(|_: &mut OwnBand, _| {});
+            series.push(OwnBand::new(0.0, values[0]));
+            series.push(OwnBand::new(1.0, values[1]));
+            samples.own.push(("figure".to_owned(), series));
+            let svg = draw(&samples, "run").unwrap().unwrap();
+            let texts = svg.split("</text>").filter_map(|part| Some(part.rsplit_once('>')?.1.trim().to_owned()));
+            texts.collect::<Vec<String>>()
+        };
+        let tiny = drawn([0.0, 3e-7]);
+        assert!(tiny.contains(&"0.0000002".to_owned()), "{tiny:?}");
+        let constant = drawn([0.1 + 0.2, 0.3]);
+        let numbers: Vec<&String> = constant.iter().filter(|text| text.parse::<f64>().is_ok()).collect();
+        assert!(constant.contains(&"0.3".to_owned()) && numbers.iter().all(|text| text.len() < 6), "{constant:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! What the plots need from run.mcap: the events, and the number of messages over time.
 
 use super::lines::Line;
+use super::shown_frames::ShownFrames;
 use crate::error::ReportError;
 use crate::folder::RunFolder;
 use crate::group_order::GroupOrder;
@@ -25,6 +26,7 @@ pub(super) struct Recording {
     events: Vec<RunEvent>,
     groups: GroupOrder,
     counts: Vec<Count>,
+    shown: ShownFrames,
     /// Time of the last sample, s.
     end_s: f64,
 }
@@ -40,6 +42,7 @@ impl Recording {
                 let sum = |counts: &mut dyn Iterator<Item = &u32>| counts.map(|&count| f64::from(count)).sum::<f64>();
                 let radio = &sample.radio;
                 recording.groups.note(&sample.state.group);
+                recording.shown.take(&sample);
                 recording.count(
                     sample.state.t_s,
                     sum(&mut radio.sent.values()),
@@ -75,6 +78,11 @@ impl Recording {
     /// The groups in the order of their colours.
     pub(super) fn groups(&self) -> &GroupOrder {
         &self.groups
+    }
+
+    /// The marks and lines of pilots.
+    pub(super) fn shown(&self) -> &ShownFrames {
+        &self.shown
     }
 
     /// Whether any message was sent.

@@ -1,5 +1,6 @@
 //! The events of a run as text for people.
 
+use crate::number_text::fixed;
 use skein_protocol::DroneId;
 use skein_protocol::record::{EventKind, RunEvent};
 
@@ -50,7 +51,7 @@ pub fn line(event: &RunEvent) -> String {
         }
         EventKind::Failure { drone, pilot, reason } => format!("the pilot {pilot} of drone {drone} failed: {reason}"),
         EventKind::Violation { kind, drones, value_m } => {
-            let value = if kind.is_distance() { format!(": {value_m:.2} m") } else { String::new() };
+            let value = if kind.is_distance() { format!(": {} m", fixed(*value_m, 2)) } else { String::new() };
             format!("{} violated by drones {}{value}", name(kind), list(drones))
         }
         EventKind::End { outcome, reason, .. } => format!("{}: {reason}", name(outcome)),
