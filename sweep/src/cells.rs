@@ -2,9 +2,11 @@
 
 use crate::grid::Grid;
 use crate::metrics::{METRICS, SUCCESS, own_name};
+use crate::own_statistic::{OwnColumn, own_columns};
 use crate::row::{Row, own_names};
 use crate::statistics::{Estimate, failures_at_most, mean, rate};
 use serde_json::{Map, Value, json};
+use skein_report::number_text::tidy;
 use std::collections::BTreeMap;
 
 /// The results of one combination of scenario, strategy and grid values.
@@ -25,13 +27,14 @@ pub struct Cell {
     pub success: Option<Estimate>,
     /// One mean for each of [`METRICS`]; `None` if no run has a value.
     pub metrics: Vec<Option<Estimate>>,
-    /// The mean of each figure that pilots reported, by its name, over all runs that have it.
+    /// The mean, over all runs that have it, of each figure that pilots reported: by its name for the figure's mean, and by
+    /// `NAME.last`, `NAME.min` and `NAME.max`.
     pub metrics_own: BTreeMap<String, Estimate>,
 }
 
 impl Cell {
     /// The estimate of the metric with this name; `None` if there is none. Figures that pilots report are called
-    /// `metric.NAME`.
+    /// `metric.NAME`, `metric.NAME.last`, `.min` and `.max`.
     #[must_use]
     pub fn estimate(&self, name: &str) -> Option<Estimate> {
         match METRICS.iter().position(|metric| metric.name == name) {
@@ -101,12 +104,12 @@ fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
         let values = rows.iter().filter(counts).filter_map(|row| row.metrics.get(i).copied().flatten());
         mean(&values.collect::<Vec<f64>>()).map(valid)
     };
-    let own = |name: &str| {
-        let values: Vec<f64> = rows.iter().filter_map(|row| row.metrics_own.get(name).copied()).collect();
-        Some((name.to_owned(), valid(mean(&values)?)))
+    let own = |(name, column): (String, OwnColumn<'_>)| {
+        let values: Vec<f64> = rows.iter().filter_map(|row| row.own(column)).collect();
+        Some((name, tidied(valid(mean(&values)?))))
     };
     Cell {
-        metrics_own: own_names(rows).into_iter().filter_map(own).collect(),
+        metrics_own: own_columns(&own_names(rows)).into_iter().filter_map(own).collect(),
         scenario: grid.scenario_name(combination),
         strategy: flown.or(combination.strategy.as_ref()).cloned().unwrap_or_default(),
         values: combination.values.clone(),
@@ -117,11 +120,18 @@ fn cell(grid: &Grid<'_>, rows: &[Row]) -> Cell {
     }
 }
 
+/// The estimate without the residue of arithmetic: people read it in summary.json.
+fn tidied(of: Estimate) -> Estimate {
+    let (low, high) = (of.low.map(tidy), of.high.map(tidy));
+    Estimate { mean: tidy(of.mean), low, high, min: tidy(of.min), max: tidy(of.max), ..of }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::experiment::{Axis, Experiment, Mission};
     use crate::random_scene::SceneBounds;
+    use skein_report::OwnMetric;
 
     /// Two values of one key, three seeds each.
     fn experiment() -> Experiment {
@@ -203,8 +213,9 @@ mod tests {
     fn figures_of_pilots_are_columns_and_have_intervals() {
         let experiment = Experiment { grid: vec![], ..experiment() };
         let grid = Grid::new(&experiment, &[]);
+        let figure = |mean: f64| OwnMetric { mean, last: mean + 1.0, min: mean - 2.0, max: mean + 3.0 };
         let row = |job: usize, own: &[(&str, f64)]| Row {
-            metrics_own: own.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
+            metrics_own: own.iter().map(|&(name, value)| (name.to_owned(), figure(value))).collect(),
             ..Row::unflown(job, "reached", "")
         };
         let rows = [row(0, &[("order", 0.5)]), row(1, &[("order", 1.0), ("gap", 3.0)]), row(2, &[])];
@@ -213,12 +224,17 @@ mod tests {
         assert!(order.mean == 0.75 && order.interval().is_some());
         assert_eq!(cells[0].estimate("metric.gap").map(|gap| gap.n), Some(1));
         assert!(cells[0].estimate("gap").is_none() && cells[0].estimate("metric.lag").is_none());
-        assert_eq!(cells[0].json(&[])["metrics_own"]["gap"]["mean"], 3.0);
+        let json = cells[0].json(&[]);
+        let means = ["gap", "gap.last", "gap.min", "gap.max"].map(|name| json["metrics_own"][name]["mean"].as_f64());
+        assert_eq!(means, [3.0, 4.0, 1.0, 6.0].map(Some));
+        assert_eq!(cells[0].estimate("metric.order.last").map(|last| (last.n, last.mean)), Some((2, 1.75)));
         let mut csv = Vec::new();
         crate::row::write_csv(&mut csv, &grid, &rows).unwrap();
         let csv = String::from_utf8(csv).unwrap();
         let lines: Vec<&str> = csv.lines().collect();
-        assert!(lines[0].contains(",metric.gap,metric.order,digest,"), "{csv}");
-        assert!(lines[1].contains(",,0.5,") && lines[2].contains(",3,1,"), "{csv}");
+        let columns = ["gap", "gap.last", "gap.max", "gap.min", "order", "order.last", "order.max", "order.min"];
+        let columns = columns.map(|name| format!("metric.{name}")).join(",");
+        assert!(lines[0].contains(&format!(",{columns},digest,")), "{csv}");
+        assert!(lines[1].contains(",,,,,0.5,1.5,3.5,-1.5,,") && lines[2].contains(",3,4,6,1,1,2,4,-1,"), "{csv}");
     }
 }

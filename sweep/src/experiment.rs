@@ -387,7 +387,10 @@ fn metrics(written: Option<Vec<String>>) -> Result<Option<Vec<String>>, Problem>
         None => Ok(Some(written)),
         Some(name) => {
             let (found, suggestion) = (name.clone(), suggestion(name, &known));
-            let expected = format!("{}, or metric.NAME for a figure that pilots report", known.join(", "));
+            let expected = format!(
+                "{}, or metric.NAME for a figure that pilots report (also metric.NAME.last, .min and .max)",
+                known.join(", ")
+            );
             Err(Problem::UnknownMetric { found, suggestion, expected })
         }
     }

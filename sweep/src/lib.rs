@@ -51,6 +51,7 @@ mod grid;
 pub mod hunt;
 mod metrics;
 mod missions;
+mod own_statistic;
 mod paired;
 mod plots;
 mod random_scene;

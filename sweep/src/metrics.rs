@@ -1,6 +1,6 @@
 //! Metrics: the numbers that each run gives.
 
-use skein_protocol::MetricName;
+use crate::own_statistic::OwnColumn;
 use skein_report::Summary;
 use skein_scenario::Scenario;
 
@@ -71,18 +71,19 @@ pub(crate) fn metric(name: &str) -> Option<&'static Metric> {
     METRICS.iter().find(|metric| metric.name == name)
 }
 
-/// The name under which pilots report a figure, if this is the name of such a figure: `metric.gap_m` gives `gap_m`.
+/// What stands behind the prefix, if this is the name of a figure that pilots report, or of one of its statistics:
+/// `metric.gap_m.last` gives `gap_m.last`.
 #[must_use]
 pub(crate) fn own_name(name: &str) -> Option<&str> {
-    name.strip_prefix(OWN_PREFIX).filter(|own| MetricName::new(own).is_ok())
+    name.strip_prefix(OWN_PREFIX).filter(|own| OwnColumn::parse(own).is_some())
 }
 
 /// Label of a metric, of the success rate, or of a figure of pilots, on a plot's axis.
 #[must_use]
 pub(crate) fn label(name: &str) -> String {
-    match (metric(name), own_name(name)) {
+    match (metric(name), name.strip_prefix(OWN_PREFIX).and_then(OwnColumn::parse)) {
         (Some(metric), _) => metric.label.to_owned(),
-        (None, Some(own)) => format!("{own}, mean over drones and time"),
+        (None, Some(own)) => own.label(),
         (None, None) => "share of runs that reached the goal safely".to_owned(),
     }
 }

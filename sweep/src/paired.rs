@@ -9,8 +9,9 @@ use crate::metrics::{METRICS, Metric, metric};
 use crate::plots::{Plot, unit};
 use crate::row::Row;
 use crate::statistics::{Estimate, mean};
-use crate::table::{MAX_LINES, brief};
+use crate::table::MAX_LINES;
 use serde_json::{Value, json};
+use skein_report::number_text::brief;
 use skein_report::plot::sweep::{Lines, Point, Series};
 use std::fmt::Write as _;
 
@@ -109,8 +110,11 @@ impl PairedDifference {
 
     /// `energy_j -1800 [-2500, -1100] (less 43, more 10)`
     fn text(&self) -> String {
-        let Estimate { mean, .. } = self.difference;
-        let signed = |value: f64| if value > 0.0 { format!("+{}", brief(value)) } else { brief(value) };
+        let Estimate { mean, min, max, .. } = self.difference;
+        let signed = |value: f64| {
+            let text = brief(value, min.abs().max(max.abs()));
+            if value > 0.0 && text != "0" { format!("+{text}") } else { text }
+        };
         let interval = self.difference.interval().map(|[low, high]| format!(" [{}, {}]", signed(low), signed(high)));
         let counts = format!("(less {}, more {})", self.lower, self.higher);
         format!("{} {}{} {counts}", self.metric, signed(mean), interval.unwrap_or_default())

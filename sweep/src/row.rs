@@ -2,10 +2,11 @@
 
 use crate::grid::Grid;
 use crate::metrics::{METRICS, OWN_PREFIX};
+use crate::own_statistic::{OwnColumn, own_columns};
 use serde::{Deserialize, Serialize};
 use skein_report::table::quoted;
 use skein_report::text::split;
-use skein_report::{Summary, Violation};
+use skein_report::{OwnMetric, Summary, Violation};
 use skein_scenario::Scenario;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
@@ -28,9 +29,9 @@ pub struct Row {
     pub splits: Vec<Option<Vec<u32>>>,
     /// One value for each of [`METRICS`]; empty if the run was not flown.
     pub metrics: Vec<Option<f64>>,
-    /// The mean of each figure that pilots reported, by its name.
+    /// The figures that pilots reported, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub metrics_own: BTreeMap<String, f64>,
+    pub metrics_own: BTreeMap<String, OwnMetric>,
     /// Digest of the run, hex.
     pub digest: Option<String>,
 }
@@ -50,7 +51,7 @@ impl Row {
             pass_times_s: summary.stages.iter().map(|stage| stage.pass_time_s).collect(),
             splits: summary.stages.iter().map(|stage| stage.split.clone()).collect(),
             metrics: METRICS.iter().map(|metric| (metric.value)(summary, scenario)).collect(),
-            metrics_own: summary.metrics_own.iter().map(|(name, found)| (name.clone(), found.mean)).collect(),
+            metrics_own: summary.metrics_own.clone(),
             digest: summary.digest.clone(),
         }
     }
@@ -69,6 +70,11 @@ impl Row {
             metrics_own: BTreeMap::new(),
             digest: None,
         }
+    }
+
+    /// A statistic of a figure that pilots reported; `None` if they did not.
+    pub(crate) fn own(&self, column: OwnColumn<'_>) -> Option<f64> {
+        self.metrics_own.get(column.figure).map(|figure| column.statistic.of(figure))
     }
 
     /// Whether the run reached its goal and kept every invariant.
@@ -92,21 +98,21 @@ pub(crate) fn own_names(rows: &[Row]) -> BTreeSet<&str> {
 
 /// Writes runs.csv: one line for each row. Rows are in the order of their jobs.
 pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> std::io::Result<()> {
-    let own = own_names(rows);
+    let own = own_columns(&own_names(rows));
     let mut head: Vec<String> = ["scenario", "strategy", "seed"].map(str::to_owned).to_vec();
     head.extend(grid.keys().into_iter().map(str::to_owned));
     head.extend(["outcome", "pass_times_s", "splits_left_to_right"].map(str::to_owned));
     head.extend(METRICS.iter().map(|metric| metric.name.to_owned()));
-    head.extend(own.iter().map(|name| format!("{OWN_PREFIX}{name}")));
+    head.extend(own.keys().map(|name| format!("{OWN_PREFIX}{name}")));
     head.extend(["digest", "reason", "command"].map(str::to_owned));
     line(out, head.into_iter())?;
     for row in rows {
-        line(out, fields(grid, row, &own).into_iter())?;
+        line(out, fields(grid, row, own.values().copied()).into_iter())?;
     }
     Ok(())
 }
 
-fn fields(grid: &Grid<'_>, row: &Row, own: &BTreeSet<&str>) -> Vec<String> {
+fn fields<'a>(grid: &Grid<'_>, row: &Row, own: impl Iterator<Item = OwnColumn<'a>>) -> Vec<String> {
     let (combination, seed) = grid.job(row.job);
     let number = |value: &Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     let strategy =
@@ -119,7 +125,7 @@ fn fields(grid: &Grid<'_>, row: &Row, own: &BTreeSet<&str>) -> Vec<String> {
         row.splits.iter().map(|drones| drones.as_deref().map(split).unwrap_or_default()).collect::<Vec<_>>().join(" "),
     );
     fields.extend((0..METRICS.len()).map(|i| row.metrics.get(i).map(number).unwrap_or_default()));
-    fields.extend(own.iter().map(|name| number(&row.metrics_own.get(*name).copied())));
+    fields.extend(own.map(|column| number(&row.own(column))));
     fields.extend([row.digest.clone(), row.reason.clone()].map(Option::unwrap_or_default));
     fields.push(grid.command(row.job));
     fields

@@ -3,6 +3,7 @@
 use crate::cells::Cell;
 use crate::metrics::SUCCESS;
 use crate::statistics::Estimate;
+use skein_report::number_text::brief;
 
 /// Greatest number of cells in the table. The others are in summary.json and the plots.
 pub(crate) const MAX_LINES: usize = 40;
@@ -70,27 +71,9 @@ fn shown(name: &str, found: Option<Estimate>) -> String {
             format!("{:.1} %{}", 100.0 * found.mean, interval.unwrap_or_default())
         }
         Some(found) => {
-            let half = found.interval().map(|[low, high]| format!(" ± {}", brief((high - low) / 2.0)));
-            brief(found.mean) + &half.unwrap_or_default()
-        }
-    }
-}
-
-/// Rounds to four significant digits; digits before the point are all kept.
-pub(crate) fn brief(value: f64) -> String {
-    let digits = if value == 0.0 { 0 } else { 3 - value.abs().log10().floor() as i32 };
-    let text = format!("{value:.*}", digits.clamp(0, 4) as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_four_digits() {
-        for (value, text) in [(0.0, "0"), (50.734_2, "50.73"), (54_113.2, "54113"), (1.0, "1"), (0.123_456, "0.1235")] {
-            assert_eq!(brief(value), text);
+            let scale = found.min.abs().max(found.max.abs());
+            let half = found.interval().map(|[low, high]| format!(" ± {}", brief((high - low) / 2.0, scale)));
+            brief(found.mean, scale) + &half.unwrap_or_default()
         }
     }
 }
