@@ -17,6 +17,7 @@ const NOT_IN_THE_REPOSITORY: &[&str] = &[
     "bytes/s",
     "false/h",
     "frames/s",
+    "frames/drone",
     // Files of the reader's own program.
     "src/main.rs",
     "swirl.toml",

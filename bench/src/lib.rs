@@ -4,6 +4,7 @@
 //!   exchanges the same bytes by raw shared memory. All cases are interleaved in rounds, and ratios are taken within a
 //!   round, because absolute figures belong to the machine.
 //! - [`failover::FailoverBench`] kills leaders again and again, and measures the time until all drones follow another one.
+//! - [`election::ElectionBench`] measures how long swarms of any size and shape take to elect a leader over a bad radio.
 //! - [`clock::ClockBench`] flies by the wall clock, and measures how late ticks open.
 //! - [`pilots::PilotBench`] flies one mission with several pilots, and compares what they cost.
 //! - [`parts::PartBench`] measures single parts of a tick: radio, grouping, sensing, recording.
@@ -28,6 +29,7 @@
 
 pub mod clock;
 mod context;
+pub mod election;
 mod error;
 pub mod failover;
 mod flown_by;

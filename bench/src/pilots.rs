@@ -38,6 +38,8 @@ pub struct PilotRow {
     pub ticks: u64,
     /// Steps of drones per second of wall time, the world's part of a tick included.
     pub drone_steps_per_s: f64,
+    /// Simulated time per wall time.
+    pub realtime_factor: f64,
     /// Drone-steps per second divided by those of the first pilot in the same round.
     pub ratio: f64,
     /// Least and greatest ratio of the rounds.
@@ -98,10 +100,12 @@ impl PilotBench {
 /// The rows as text, one line each.
 #[must_use]
 pub fn table(rows: &[PilotRow]) -> String {
-    let line = |PilotRow { pilot, ticks, drone_steps_per_s, ratio, ratio_range: [least, most] }: &PilotRow| {
+    let line = |row: &PilotRow| {
+        let PilotRow { pilot, ticks, drone_steps_per_s, realtime_factor, ratio, ratio_range: [least, most] } = row;
         let steps = drone_steps_per_s / 1e3;
         format!(
-            "{pilot:<16} {ticks:>7} ticks {steps:>9.0} thousand drone-steps/s   ratio {ratio:.3} ({least:.3} to {most:.3})\n"
+            "{pilot:<16} {ticks:>7} ticks {steps:>9.0} thousand drone-steps/s {realtime_factor:>8.1} × real time   \
+             ratio {ratio:.3} ({least:.3} to {most:.3})\n"
         )
     };
     rows.iter().map(line).collect()
@@ -113,6 +117,8 @@ struct StepCounter {
     first: Option<Instant>,
     ticks: u64,
     steps: u64,
+    /// Simulated time of the first and of the last tick, s.
+    simulated_s: [f64; 2],
     wall_s: f64,
 }
 
@@ -120,13 +126,18 @@ impl StepCounter {
     fn steps_per_s(&self) -> f64 {
         self.steps as f64 / self.wall_s.max(1e-9)
     }
+
+    fn realtime_factor(&self) -> f64 {
+        (self.simulated_s[1] - self.simulated_s[0]) / self.wall_s.max(1e-9)
+    }
 }
 
 impl RecordSink for StepCounter {
     fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
         self.ticks += 1;
+        self.simulated_s[1] = record.head.now.secs();
         match self.first {
-            None => self.first = Some(Instant::now()),
+            None => (self.first, self.simulated_s[0]) = (Some(Instant::now()), record.head.now.secs()),
             Some(first) => {
                 self.steps += record.rows.iter().filter(|row| row.alive()).count() as u64;
                 self.wall_s = first.elapsed().as_secs_f64();
@@ -144,6 +155,7 @@ fn row(name: &str, of: &[StepCounter], first: &[StepCounter]) -> PilotRow {
         pilot: name.to_owned(),
         ticks: of.first().map_or(0, |counter| counter.ticks),
         drone_steps_per_s: median(of.iter().map(StepCounter::steps_per_s)),
+        realtime_factor: median(of.iter().map(StepCounter::realtime_factor)),
         ratio: median(ratios.into_iter()),
         ratio_range: [least, most],
     }
@@ -180,6 +192,8 @@ mod tests {
         let bench = PilotBench { names, drones: 3, processes: false, rounds: 2 };
         let rows = bench.run(None, &context).unwrap().unwrap();
         assert_eq!((rows[0].pilot.as_str(), rows[0].ratio, rows[0].ticks), ("cruise", 1.0, 6001));
+        let [steps, factor] = [rows[0].drone_steps_per_s, rows[0].realtime_factor];
+        assert!((steps / (3.0 * 50.0 * factor) - 1.0).abs() < 1e-3, "three drones step 50 times a second: {rows:?}");
         assert!(rows[1].ratio > 0.0 && rows[1].ratio < 1.0, "{rows:?}");
         let wrong = PilotBench { names: vec!["cruize".to_owned()], ..bench }.run(None, &context).unwrap_err();
         assert!(wrong.is_usage() && wrong.to_string().contains("did you mean `cruise`?"), "{wrong}");

@@ -8,6 +8,7 @@ use crate::scenario_args::ScenarioArgs;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 use skein_bench::clock::{self, ClockBench};
+use skein_bench::election::ElectionBench;
 use skein_bench::failover::FailoverBench;
 use skein_bench::parts::{self, Part, PartBench};
 use skein_bench::pilots::{self, PilotBench};
@@ -24,6 +25,8 @@ pub(crate) enum BenchCommand {
     Runtime(RuntimeArgs),
     /// Kill leaders again and again; measure the time until all drones follow another one
     Failover(FailoverArgs),
+    /// Elect leaders over radios of one hop and of many; measure the time, the messages and those who led in vain
+    Election(ElectionArgs),
     /// Benchmark real-time operation: late ticks and late answers
     Clock(ClockArgs),
     /// Benchmark pilots, built-in and own: fly one mission with each and compare the drone-steps per second
@@ -81,6 +84,25 @@ pub(crate) struct FailoverArgs {
     pub(crate) out: Option<PathBuf>,
 }
 
+/// Arguments of `bench election`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "All drones start at once. Only their state machines of leadership run, in this process, over a radio that \
+is simulated: no bodies, no obstacles. A drone that dies may cut a swarm in parts: then each part has to have a leader.
+
+Examples:
+  skein bench election --drones 10 --seeds 3
+  skein bench election --topology line,grid --drones 100 --loss 0,0.5 --failing 0 --json"
+)]
+pub(crate) struct ElectionArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: ElectionBench,
+    /// Print one JSON object instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Arguments of `bench clock`.
 #[derive(Debug, Args)]
 pub(crate) struct ClockArgs {
@@ -129,6 +151,7 @@ pub(crate) fn bench(command: Option<&BenchCommand>, registry: &PilotRegistry) ->
         None => runtime(&RuntimeArgs::default(), &context),
         Some(BenchCommand::Runtime(args)) => runtime(args, &context),
         Some(BenchCommand::Failover(args)) => failover(args, &context),
+        Some(BenchCommand::Election(args)) => election(args, &context),
         Some(BenchCommand::Clock(args)) => clock(args, &context),
         Some(BenchCommand::Pilots(args)) => own_pilots(args, &context),
         Some(BenchCommand::Radio(args)) => part(Part::Radio, args, &context),
@@ -175,6 +198,16 @@ fn failover(args: &FailoverArgs, context: &Context<'_>) -> Result<Option<Exit>, 
         print(report.table())?;
     }
     Ok(Some(if report.is_unsafe() { Exit::Unsafe } else { Exit::Reached }))
+}
+
+fn election(args: &ElectionArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(report) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
+    if args.json {
+        print_line(serde_json::to_string(&report).map_err(Failure::environment)?)?;
+    } else {
+        print(report.table())?;
+    }
+    Ok(Some(Exit::Reached))
 }
 
 fn clock(args: &ClockArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {

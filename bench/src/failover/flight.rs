@@ -2,7 +2,7 @@
 
 use super::monitor::FailoverMonitor;
 use super::row::FailoverRow;
-use super::setting::{ClockChoice, DT_S, Setting};
+use super::setting::{ClockChoice, Setting};
 use crate::context::Context;
 use crate::error::BenchError;
 use skein_bus::{PinMode, WaitMode};
@@ -21,7 +21,7 @@ pub(super) fn fly(setting: &Setting, context: &Context<'_>) -> Result<FailoverRo
     };
     let facts = run_facts(&scenario, runtime, &clock.to_string()).map_err(RuntimeError::Shape)?;
     let recorder = Recorder::in_memory(facts);
-    let mut monitor = FailoverMonitor::new(recorder, DT_S, setting.clock == ClockChoice::Realtime);
+    let mut monitor = FailoverMonitor::new(recorder, setting.dt_s(), setting.clock == ClockChoice::Realtime);
     let end = match setting.clock {
         ClockChoice::Lockstep => inline::run(&scenario, context.pilots, &mut monitor, context.interrupted)?,
         ClockChoice::Realtime => fly_processes(&scenario, clock, &mut monitor, context)?,

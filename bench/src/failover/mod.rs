@@ -39,6 +39,9 @@ pub struct FailoverBench {
     /// Transmission delays of a frame, s
     #[arg(long = "delay", value_name = "S,…", value_delimiter = ',', default_values_t = [0.0, 0.1])]
     pub delays_s: Vec<f64>,
+    /// Times between two heartbeats of a leader, s; a leader is missed after three, and a tick takes half of one
+    #[arg(long = "heartbeat", value_name = "S,…", value_delimiter = ',', default_values_t = [setting::HEARTBEAT_S], value_parser = period)]
+    pub heartbeats_s: Vec<f64>,
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -51,15 +54,15 @@ pub struct FailoverReport {
     pub schema: &'static str,
     /// Size of the swarm.
     pub drones: u32,
-    /// Time between two heartbeats of a leader, s.
+    /// Time between two heartbeats of a leader, s: that of the first row. Each row has its own.
     pub heartbeat_s: f64,
-    /// Time of silence after which a leader is missed, s.
+    /// Time of silence after which a leader is missed, s: that of the first row.
     pub leader_timeout_s: f64,
-    /// Length of a tick, s.
+    /// Length of a tick, s: that of the first row.
     pub dt_s: f64,
     /// Seed of everything random.
     pub seed: u64,
-    /// One row for each clock, delay and loss.
+    /// One row for each heartbeat, clock, delay and loss.
     pub rows: Vec<FailoverRow>,
 }
 
@@ -86,26 +89,39 @@ impl FailoverBench {
         let delays_s: &[f64] = if self.quick { &[0.0] } else { &self.delays_s };
         let kills = self.kills.unwrap_or(if self.quick { QUICK_KILLS } else { KILLS });
         let clocks = self.clock.map_or(vec![ClockChoice::Lockstep, ClockChoice::Realtime], |clock| vec![clock]);
+        let setting = |heartbeat_s: f64| Setting {
+            clock: ClockChoice::Lockstep,
+            heartbeat_s,
+            loss: 0.0,
+            delay_s: 0.0,
+            kills,
+            seed: self.seed,
+        };
         let mut rows = Vec::new();
-        for clock in clocks {
-            for &delay_s in delays_s {
-                for &loss in &self.losses {
-                    let setting = Setting { clock, loss, delay_s, kills, seed: self.seed };
-                    rows.push(fly(&setting, context)?);
+        for &heartbeat_s in &self.heartbeats_s {
+            for &clock in &clocks {
+                for (&delay_s, &loss) in delays_s.iter().flat_map(|d| self.losses.iter().map(move |l| (d, l))) {
+                    rows.push(fly(&Setting { clock, loss, delay_s, ..setting(heartbeat_s) }, context)?);
                     if context.stopped() {
                         return Ok(None);
                     }
                 }
             }
         }
+        let first = setting(self.heartbeats_s.first().copied().unwrap_or(setting::HEARTBEAT_S));
         Ok(Some(FailoverReport {
             schema: "skein-bench-failover/1",
             drones: setting::DRONES,
-            heartbeat_s: setting::HEARTBEAT_S,
-            leader_timeout_s: setting::TIMEOUT_S,
-            dt_s: setting::DT_S,
+            heartbeat_s: first.heartbeat_s,
+            leader_timeout_s: first.timeout_s(),
+            dt_s: first.dt_s(),
             seed: self.seed,
             rows,
         }))
     }
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|period_s| (0.002..=1.0).contains(period_s));
+    number.ok_or_else(|| format!("expected seconds from 0.002 to 1, found {text:?}"))
 }

@@ -1,13 +1,16 @@
 //! The results of one mission of the failover benchmark: a line of its table.
 
 use super::monitor::FailoverCounts;
-use super::setting::{ClockChoice, Setting};
+use super::setting::{ClockChoice, HEARTBEAT_S, Setting};
 use serde::Serialize;
 use skein_report::Summary;
+use skein_report::number_text::brief;
 
 /// The results of one mission. Times in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailoverRow {
+    /// Time between two heartbeats of a leader.
+    heartbeat_s: f64,
     /// `lockstep` or `realtime`.
     clock: &'static str,
     /// Share of frames that are lost.
@@ -58,6 +61,7 @@ impl FailoverRow {
         let (times, on_time) = (ascending(&counts.failover_s), ascending(&counts.on_time_s));
         let rate = |count: f64, seconds: f64| if seconds > 0.0 { count / seconds } else { 0.0 };
         Self {
+            heartbeat_s: setting.heartbeat_s,
             clock: match setting.clock {
                 ClockChoice::Lockstep => "lockstep",
                 ClockChoice::Realtime => "realtime",
@@ -135,8 +139,18 @@ fn quantile(ascending: &[f64], share: f64) -> Option<f64> {
     ascending.get(rank.saturating_sub(1)).copied()
 }
 
-/// The rows as a text table.
+/// The rows as text: a table for each heartbeat. Its heading says which, unless it is the usual one alone.
 pub(super) fn table(rows: &[FailoverRow]) -> String {
+    let parts = rows.chunk_by(|a, b| a.heartbeat_s == b.heartbeat_s).map(|of| match of {
+        [FailoverRow { heartbeat_s, .. }, ..] if *heartbeat_s != HEARTBEAT_S || of.len() < rows.len() => {
+            format!("heartbeats at {} Hz\n{}", brief(1.0 / heartbeat_s, 1.0), one_table(of))
+        }
+        of => one_table(of),
+    });
+    parts.collect::<Vec<_>>().join("\n")
+}
+
+fn one_table(rows: &[FailoverRow]) -> String {
     let lines: Vec<[String; 15]> =
         std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(FailoverRow::cells)).collect();
     let width = |i: usize| lines.iter().map(|line| line[i].len()).max().unwrap_or(0);

@@ -2,16 +2,17 @@
 
 use crate::error::BenchError;
 use clap::ValueEnum;
+use skein_report::number_text::tidy;
 use skein_scenario::{Scenario, ScenarioSource};
 
 /// Size of the swarm.
 pub(super) const DRONES: u32 = 8;
-/// Time between two heartbeats of a leader, s.
+/// Usual time between two heartbeats of a leader, s.
 pub(super) const HEARTBEAT_S: f64 = 0.02;
-/// Time of silence after which a leader is missed on a link without loss, s.
-pub(super) const TIMEOUT_S: f64 = 0.06;
-/// Length of a tick, s. Two ticks fit into a heartbeat, so that the tick does not dominate the result.
-pub(super) const DT_S: f64 = 0.01;
+/// Heartbeats in the time of silence after which a leader is missed on a link without loss.
+const TIMEOUT_HEARTBEATS: f64 = 3.0;
+/// Ticks in a heartbeat: two, so that the tick does not dominate the result.
+const TICKS: f64 = 2.0;
 
 /// Distance between slots, m. It is so wide that no drone has to evade one that stops dead.
 const SPACING_M: f64 = 60.0;
@@ -39,6 +40,8 @@ pub enum ClockChoice {
 pub(super) struct Setting {
     /// What paces the ticks.
     pub(super) clock: ClockChoice,
+    /// Time between two heartbeats of a leader, s.
+    pub(super) heartbeat_s: f64,
     /// Share of frames that are lost.
     pub(super) loss: f64,
     /// Transmission delay of a frame besides its tick, s.
@@ -56,6 +59,16 @@ impl Setting {
         Ok(Scenario::parse(&self.toml(), source, &[])?)
     }
 
+    /// Time of silence after which a leader is missed on a link without loss, s.
+    pub(super) fn timeout_s(&self) -> f64 {
+        tidy(self.heartbeat_s * TIMEOUT_HEARTBEATS)
+    }
+
+    /// Length of a tick, s.
+    pub(super) fn dt_s(&self) -> f64 {
+        tidy(self.heartbeat_s / TICKS)
+    }
+
     fn interval_s(&self) -> f64 {
         INTERVAL_S + PER_LOSS_S * self.loss + PER_DELAY * self.delay_s
     }
@@ -63,21 +76,22 @@ impl Setting {
     /// The current leader is killed again and again. It is restarted halfway between two kills, when another drone leads.
     /// Each kill is one tick later in the heartbeat than the one before, over seven ticks.
     fn toml(&self) -> String {
-        let interval_s = self.interval_s();
+        let (interval_s, heartbeat_s, dt_s) = (self.interval_s(), self.heartbeat_s, self.dt_s());
         let kill = |number: u32| {
-            let at_s = SETTLE_S + f64::from(number) * interval_s + f64::from(number % 7) * DT_S;
+            let at_s = SETTLE_S + f64::from(number) * interval_s + f64::from(number % 7) * dt_s;
             format!(
                 "[[fault]]\nkind = \"restart\"\ntarget = \"leader\"\nat_s = {at_s:.3}\nfor_s = {:.3}\n",
                 interval_s / 2.0
             )
         };
         let faults: String = (0..self.kills).map(kill).collect();
+        let leader_timeout_s = self.timeout_s();
         let timeout_s = SETTLE_S + f64::from(self.kills) * interval_s + 1.0;
         format!(
-            "name = \"failover\"\nseed = {}\n[time]\ndt_s = {DT_S}\ntimeout_s = {timeout_s:.3}\n\
+            "name = \"failover\"\nseed = {}\n[time]\ndt_s = {dt_s}\ntimeout_s = {timeout_s:.3}\n\
              [formation]\nshape = \"v\"\ndrones = {DRONES}\nspacing_m = {SPACING_M}\n[mission]\nend = \"hold\"\nstop_x_m = 1e6\n\
-             [protocol]\nheartbeat_period_s = {HEARTBEAT_S}\nleader_timeout_s = {TIMEOUT_S}\n\
-             election_wait_s = {HEARTBEAT_S}\n[radio]\nloss = {:?}\ndelay_s = {:?}\n{faults}",
+             [protocol]\nheartbeat_period_s = {heartbeat_s}\nleader_timeout_s = {leader_timeout_s}\n\
+             election_wait_s = {heartbeat_s}\n[radio]\nloss = {:?}\ndelay_s = {:?}\n{faults}",
             self.seed, self.loss, self.delay_s
         )
     }
