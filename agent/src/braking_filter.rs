@@ -7,8 +7,8 @@
 //! n(t) · (B'(t) − B(t)) ≥ −s (D(t) − d). If both drones obey this with s = ½, their new braking paths are at least d apart.
 //! Full braking leaves B unchanged and is therefore always allowed.
 //!
-//! If commands take effect late, the rule starts from what both drones sense now, and covers all commands that the other drone
-//! cannot see yet: see `docs/safety.md`, "Reaction time".
+//! If commands take effect late, the filter remembers what it has sensed, and keeps to lines that both drones compute from it: see
+//! `docs/safety.md`, "Reaction time". It is then called once per tick.
 //!
 //! Braking paths are compared at ticks whose number is a multiple of a stride. These ticks are the same for all drones, so the
 //! invariant is exact there. [`BrakingFilterParams::margin_m`] covers the loss of distance between the compared ticks.
@@ -21,7 +21,7 @@
 //!
 //! ```
 //! use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
-//! use skein_protocol::{SimTime, Vec2};
+//! use skein_protocol::{DroneId, SimTime, Vec2};
 //!
 //! let mut filter = BrakingFilter::new(BrakingFilterParams {
 //!     safe_distance_m: 10.0,
@@ -44,7 +44,7 @@
 //! };
 //! let wish = Vec2::new(5.0, 0.0);
 //! let mut command = |ahead_m: f64| {
-//!     let other = Moving { position_m: Vec2::new(ahead_m, 0.0), velocity_mps: -velocity };
+//!     let other = Moving { id: DroneId(1), position_m: Vec2::new(ahead_m, 0.0), velocity_mps: -velocity };
 //!     filter.filter(&own, wish, [].into_iter(), [other].into_iter(), [].into_iter())
 //! };
 //! assert_eq!(command(500.0), wish, "there is room");
@@ -54,8 +54,9 @@
 use crate::braking_path::{BrakingLaw, BrakingPath};
 use crate::program::{HalfPlane, Program};
 use crate::separation::separating_line::{SeparatingLine, Side};
+use crate::sights::Sights;
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
-use skein_protocol::{SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// Constants of the rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +78,8 @@ pub struct BrakingFilterParams {
 /// A neighbour as sensed now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moving {
+    /// Which drone it is. Only drones whose commands take effect late need to know.
+    pub id: DroneId,
     /// Position relative to the drone's present position, m.
     pub position_m: Vec2,
     /// Velocity in the world frame, m/s.
@@ -106,9 +109,6 @@ pub struct OwnMotion {
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
-/// The same if the drone's commands take effect late. It leaves half of its share unused, because the direction to the neighbour
-/// turns until the drone's last commands are seen.
-const SHARE_LATE: f64 = 0.25;
 /// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
 /// Added to the clearance, m, so that rounding errors do not break it.
@@ -165,11 +165,16 @@ impl BrakingFilterParams {
         let speed_mps = speed_squared.sqrt() + self.acceleration_max_mps2 * span_s;
         speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s
     }
-}
 
-/// The share of the room that a drone may use if its commands take effect `lag` ticks late.
-fn share(lag: u32) -> f64 {
-    if lag == 0 { SHARE } else { SHARE_LATE }
+    /// The same for a drone at `speed_mps` that obeys the speed limit of `own`, m.
+    pub(crate) fn late_reach_m(&self, own: &OwnMotion, speed_mps: f64, ticks: u32) -> f64 {
+        let span_s = f64::from(ticks) * self.dt_s;
+        let limit_mps = own.speed_limit_mps.min(self.speed_max_mps).max(speed_mps);
+        let speed_mps = (speed_mps + self.acceleration_max_mps2 * span_s).min(limit_mps);
+        // The last tick of full braking brakes less.
+        let last_m = self.braking_mps2 * self.dt_s * self.dt_s / 8.0;
+        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s + last_m
+    }
 }
 
 /// Two braking paths at one compared tick.
@@ -195,6 +200,8 @@ pub struct BrakingFilter {
     ends: Vec<usize>,
     planes: Vec<HalfPlane>,
     program: Program,
+    /// Only used while commands take effect late.
+    sights: Sights,
 }
 
 /// A command, and the braking path after its tick.
@@ -210,7 +217,15 @@ impl BrakingFilter {
     #[must_use]
     pub fn new(params: BrakingFilterParams) -> Self {
         let stride = params.stride();
-        Self { params, stride, samples: Vec::new(), ends: Vec::new(), planes: Vec::new(), program: Program::default() }
+        Self {
+            params,
+            stride,
+            samples: Vec::new(),
+            ends: Vec::new(),
+            planes: Vec::new(),
+            program: Program::default(),
+            sights: Sights::default(),
+        }
     }
 
     /// The constants of the filter.
@@ -231,7 +246,13 @@ impl BrakingFilter {
         neighbours: impl Iterator<Item = Moving>,
         lines: impl Iterator<Item = (&'a SeparatingLine, Side)>,
     ) -> Vec2 {
-        self.compare(own, neighbours);
+        self.samples.clear();
+        self.ends.clear();
+        if own.lag == 0 {
+            self.compare(own, neighbours);
+        } else if self.remember(own, neighbours) {
+            return self.params.law().braking(own.velocity);
+        }
         self.keep_to(own, lines);
         let reach_m =
             self.params.reach_m(own.velocity.norm_squared(), 1) + self.params.clearance_m + CLEARANCE_ROUNDING_M;
@@ -259,36 +280,24 @@ impl BrakingFilter {
         Candidate { acceleration, path: BrakingPath::new(start, velocity, self.params.law()) }
     }
 
-    /// Acceleration of full braking, m/s². It stops the drone exactly in the last tick.
-    fn braking(&self, velocity: Vec2) -> Vec2 {
-        let (speed, step) = (velocity.norm(), self.params.braking_mps2 * self.params.dt_s);
-        if speed > step { velocity * (-self.params.braking_mps2 / speed) } else { -velocity / self.params.dt_s }
-    }
-
     /// Samples the braking paths of this drone and of each neighbour that some command could bring too close.
     fn compare(&mut self, own: &OwnMotion, neighbours: impl Iterator<Item = Moving>) {
         let params = self.params;
-        self.samples.clear();
-        self.ends.clear();
         let keep_m = params.keep_m();
-        // Neighbours do not know the commands of this drone that have not taken effect yet, and this drone does not know
-        // theirs. So the room is that between the braking paths from the present, sensed states.
-        let hidden = own.lag + 1;
-        let hidden_s = f64::from(hidden) * params.dt_s;
-        let (own_speed2, limit) = (own.sensed_velocity.norm_squared(), params.acceleration_max_mps2);
-        let own_reach_m = params.reach_m(own_speed2, hidden);
-        let path = BrakingPath::new(Vec2::zeros(), own.sensed_velocity, params.law());
+        let (own_speed2, limit) = (own.velocity.norm_squared(), params.acceleration_max_mps2);
+        let own_reach_m = params.reach_m(own_speed2, 1);
+        let path = BrakingPath::new(Vec2::zeros(), own.velocity, params.law());
         for other in neighbours {
             let (distance2, speed2) = (other.position_m.norm_squared(), other.velocity_mps.norm_squared());
-            let apart_m = keep_m + own_reach_m + params.reach_m(speed2, hidden);
+            let apart_m = keep_m + own_reach_m + params.reach_m(speed2, 1);
             if distance2 > apart_m * apart_m {
                 continue;
             }
             // Full braking is a projection, and projections do not increase distances. So the distance of two braking
             // paths changes by at most the relative speed times the time until both drones are at rest.
-            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * hidden_s;
-            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.sensed_velocity).norm() * stop_s;
-            if share(own.lag) * room_m >= 2.0 * limit * hidden_s * stop_s {
+            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
+            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.velocity).norm() * stop_s;
+            if SHARE * room_m >= 2.0 * limit * params.dt_s * stop_s {
                 continue;
             }
             let other_path = BrakingPath::new(other.position_m, other.velocity_mps, params.law());
@@ -297,16 +306,41 @@ impl BrakingFilter {
     }
 
     fn sample(&mut self, own: &OwnMotion, own_path: &BrakingPath, other_path: &BrakingPath, keep_m: f64) {
-        let flown_m = own.position - own.sensed_position;
-        // Each command can lengthen this drone's path by one tick.
-        let last = own_path.ticks().max(other_path.ticks()) + own.lag + 2;
+        // A command can lengthen this drone's path by one tick.
+        let last = own_path.ticks().max(other_path.ticks()) + 2;
         self.sample_ticks(own, last, |ticks| {
-            let (here, there) = (own_path.at(ticks), other_path.at(ticks));
-            let (offset, distance_m) = (here - there, (here - there).norm());
+            let (own_m, there) = (own_path.at(ticks), other_path.at(ticks));
+            let (offset, distance_m) = (own_m - there, (own_m - there).norm());
             let normal = if distance_m > 1e-9 { offset / distance_m } else { Vec2::x() };
-            let room_m = share(own.lag) * (distance_m - keep_m).max(0.0);
-            Sample { ticks: ticks - own.lag, normal, own_m: here - flown_m, room_m }
+            Sample { ticks, normal, own_m, room_m: SHARE * (distance_m - keep_m).max(0.0) }
         });
+    }
+
+    /// Commands take effect late: samples the braking path of this drone for each line between it and a near neighbour. Returns
+    /// whether there is a neighbour with which no line is common. The drone brakes then.
+    fn remember(&mut self, own: &OwnMotion, neighbours: impl Iterator<Item = Moving>) -> bool {
+        let mut sights = std::mem::take(&mut self.sights);
+        sights.look(own, neighbours, &self.params, self.stride);
+        let here_m = sights.flown_m() + own.position - own.sensed_position;
+        let path = BrakingPath::new(Vec2::zeros(), own.velocity, self.params.law());
+        for line in sights.lines() {
+            let rests = line.rests().saturating_sub(own.tick) as u32;
+            // A command can lengthen this drone's path by one tick.
+            let last = (path.ticks() + own.lag + 2).max(rests);
+            self.sample_ticks(own, last, |ticks| {
+                let (own_m, line) = (path.at(ticks - own.lag), line.bisector(own.tick + u64::from(ticks)));
+                let room_m = line.normal.dot(&(here_m + own_m)) - line.offset_m - line.keep_m;
+                Sample { ticks: ticks - own.lag, normal: line.normal, own_m, room_m: room_m.max(0.0) }
+            });
+        }
+        let must_brake = sights.must_brake();
+        self.sights = sights;
+        must_brake
+    }
+
+    /// Forgets what it knows of the neighbours. Call it after ticks in which the drone did not fly as commanded.
+    pub fn forget(&mut self) {
+        self.sights.forget();
     }
 
     /// Samples the braking path of this drone for each line that some command could bring too near.
@@ -394,7 +428,7 @@ impl BrakingFilter {
         found: Vec2,
         obstacles: impl Iterator<Item = &'a ConvexShape> + Clone,
     ) -> Vec2 {
-        let braking = self.braking(own.velocity);
+        let braking = self.params.law().braking(own.velocity);
         let (mut allowed, mut forbidden) = (0.0, 1.0);
         let mut share = 1.0;
         for _ in 0..HALVINGS {

@@ -11,6 +11,15 @@ pub struct BrakingLaw {
     pub dt_s: f64,
 }
 
+impl BrakingLaw {
+    /// Acceleration of full braking at `velocity` (m/s), m/s². It stops the drone exactly in the last tick.
+    #[must_use]
+    pub fn braking(&self, velocity: Vec2) -> Vec2 {
+        let (speed, step) = (velocity.norm(), self.deceleration_mps2 * self.dt_s);
+        if speed > step { velocity * (-self.deceleration_mps2 / speed) } else { -velocity / self.dt_s }
+    }
+}
+
 /// Positions of a drone at the end of each tick if it brakes fully from now on. In each tick its speed falls by
 /// `deceleration · dt`; in the last tick it falls to zero. Within a tick the speed changes linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +48,12 @@ impl BrakingPath {
         let rest_mps = speed_mps - law.deceleration_mps2 * full_s;
         path.length_m = path.along_m(full_s) + rest_mps * law.dt_s / 2.0;
         path
+    }
+
+    /// The path of a drone at rest at the start of this one.
+    #[must_use]
+    pub fn resting(&self) -> Self {
+        Self::new(self.start, Vec2::zeros(), self.law)
     }
 
     /// Distance flown in the first `span_s` of full deceleration, m.

@@ -37,6 +37,7 @@ pub mod rollout;
 pub mod route_follower;
 pub mod safety;
 pub mod separation;
+mod sights;
 mod silent_drones;
 mod stale_formation;
 mod state_predictor;

@@ -41,6 +41,8 @@ pub struct PilotParams {
     pub speed_max_mps: f64,
     /// Whether it has a sensor that ranges neighbours.
     pub ranging: bool,
+    /// Greatest distance at which a drone senses its neighbours, m, if it does.
+    pub ranging_m: f64,
     /// Where each drone starts, world frame, m. A drone that senses no neighbours keeps its first distances by it.
     pub starts_m: Arc<[Vec2]>,
     /// Stopping distances.
@@ -92,7 +94,7 @@ impl PilotParams {
             clearance_m: self.safety.clearance_m,
             acceleration_max_mps2: self.safety.acceleration_max_mps2,
             detection_range_m: self.detection_range_m,
-            ranging_m: self.safety.ranging_m,
+            ranging_m: self.ranging_m,
             speed_mps: self.guidance.speed_mps,
             reform_speed_max_mps: self.guidance.reform_speed_max_mps,
             planner: self.planner.clone(),
@@ -127,7 +129,7 @@ impl PilotParams {
         if !self.ranging || self.drones < 2 {
             return obstacles_mps;
         }
-        let room_m = self.safety.ranging_m - self.safety.safe_distance_m - filter.margin_m();
+        let room_m = self.ranging_m - self.safety.safe_distance_m - filter.margin_m();
         obstacles_mps.min(filter.speed_within_mps(room_m / 2.0, lag))
     }
 
@@ -156,7 +158,7 @@ impl PilotParams {
     pub(crate) fn neighbours(&self) -> NeighbourParams {
         NeighbourParams {
             safe_distance_m: self.safety.safe_distance_m,
-            ranging_m: self.ranging.then_some(self.safety.ranging_m),
+            ranging_m: self.ranging.then_some(self.ranging_m),
             precedence_share: self.precedence_share,
         }
     }

@@ -1,5 +1,6 @@
 //! The reaction time t_c of a drone: a command takes effect that long after it was given.
 
+use crate::braking_path::BrakingLaw;
 use crate::command_delay::CommandDelay;
 use skein_protocol::Vec2;
 
@@ -41,41 +42,32 @@ impl ReactionDelay {
         self.commands.ticks() as f64 * self.dt_s
     }
 
-    /// The motion of a drone with `velocity` (m/s) under the pending commands.
-    pub(crate) fn pending_motion(&self, velocity: Vec2) -> PendingMotion {
-        let mut motion = PendingMotion { offset: Vec2::zeros(), velocity };
-        for command in self.commands.pending() {
-            let next = motion.velocity + command * self.dt_s;
-            motion.offset += (motion.velocity + next) * (self.dt_s / 2.0);
+    /// The motions of a drone with `velocity` (m/s) up to the end of each tick whose command is pending.
+    pub(crate) fn pending_motions(&self, velocity: Vec2) -> impl Iterator<Item = PendingMotion> {
+        let dt_s = self.dt_s;
+        let start = PendingMotion { offset: Vec2::zeros(), velocity };
+        self.commands.pending().scan(start, move |motion, command| {
+            let next = motion.velocity + command * dt_s;
+            motion.offset += (motion.velocity + next) * (dt_s / 2.0);
             motion.velocity = next;
-        }
-        motion
+            Some(*motion)
+        })
     }
 
-    /// Replaces all pending commands by full braking from `velocity` (m/s) with `braking_mps2`. A drone that missed ticks was braked
-    /// by its failsafe, and goes on braking until its next command takes effect.
-    pub(crate) fn brake(&mut self, mut velocity: Vec2, braking_mps2: f64) {
-        let dt_s = self.dt_s;
+    /// The motion of a drone with `velocity` (m/s) under all pending commands.
+    pub(crate) fn pending_motion(&self, velocity: Vec2) -> PendingMotion {
+        let none = PendingMotion { offset: Vec2::zeros(), velocity };
+        self.pending_motions(velocity).last().unwrap_or(none)
+    }
+
+    /// Replaces all pending commands by full braking from `velocity` (m/s). A drone that missed ticks was braked by its failsafe, and
+    /// goes on braking until its next command takes effect.
+    pub(crate) fn brake(&mut self, mut velocity: Vec2, law: BrakingLaw) {
         self.commands.replace(|| {
-            let (speed, step) = (velocity.norm(), braking_mps2 * dt_s);
-            let braking = if speed > step { velocity * (-braking_mps2 / speed) } else { -velocity / dt_s };
-            velocity += braking * dt_s;
+            let braking = law.braking(velocity);
+            velocity += braking * law.dt_s;
             braking
         });
-    }
-
-    /// The positions of a drone at `position` (m) with `velocity` (m/s) at the end of each tick whose command is pending, m. The first
-    /// entry is `position`.
-    pub(crate) fn pending_positions(&self, position: Vec2, velocity: Vec2) -> Vec<Vec2> {
-        let (mut at, mut speed) = (position, velocity);
-        let mut positions = vec![position];
-        for command in self.commands.pending() {
-            let next = speed + command * self.dt_s;
-            at += (speed + next) * (self.dt_s / 2.0);
-            speed = next;
-            positions.push(at);
-        }
-        positions
     }
 
     /// Accepts a command and returns the one that takes effect now, m/s².
@@ -117,10 +109,11 @@ mod tests {
         for _ in 0..9 {
             delay.push(Vec2::new(3.0, 0.0));
         }
-        delay.brake(Vec2::new(0.0, 1.0), 5.0);
+        let law = BrakingLaw { deceleration_mps2: 5.0, dt_s: 0.02 };
+        delay.brake(Vec2::new(0.0, 1.0), law);
         let motion = delay.pending_motion(Vec2::new(0.0, 1.0));
         assert!((motion.velocity - Vec2::new(0.0, 0.5)).norm() < 1e-12, "{motion:?}");
-        delay.brake(Vec2::new(0.0, 0.15), 5.0);
+        delay.brake(Vec2::new(0.0, 0.15), law);
         assert!(
             delay.pending_motion(Vec2::new(0.0, 0.15)).velocity.norm() < 1e-12,
             "it stops, and does not turn round"

@@ -6,6 +6,8 @@
 //! deceleration. Each barrier bounds the acceleration along the line of sight: a half-plane for [`Program`].
 
 use crate::program::{HalfPlane, Program};
+use skein_leader::geometry::nearest;
+use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, Vec2};
 use std::collections::VecDeque;
 
@@ -28,8 +30,6 @@ pub struct SafetyParams {
     pub reaction_time_s: f64,
     /// Time between two calls of the filter, s.
     pub dt_s: f64,
-    /// Ranging distance, m. Neighbours within it are sensed.
-    pub ranging_m: f64,
 }
 
 /// Obstacles farther away than the clearance plus this distance are ignored, m.
@@ -63,6 +63,15 @@ pub struct NearObstacle {
 }
 
 impl NearObstacle {
+    /// The obstacle of this shape, as seen from `position`. Both in the world frame, m.
+    #[must_use]
+    pub fn seen_from(position: Vec2, shape: &ConvexShape) -> Self {
+        let core: Vec<Vec2> = shape.vertices().collect();
+        let to_core = nearest(&core, position) - position;
+        let distance_m = to_core.norm() - shape.radius_m;
+        Self { nearest_m: to_core * (distance_m / to_core.norm().max(1e-9)), distance_m }
+    }
+
     /// Unit vector from the obstacle to the drone.
     fn normal(&self) -> Vec2 {
         let away = -self.nearest_m / self.distance_m.abs().max(1e-9);
@@ -251,15 +260,6 @@ impl SafetyParams {
     /// Distance to keep from a drone whose state is known with a delay of `late_s`, m.
     pub(crate) fn keep_m(&self, late_s: f64) -> f64 {
         self.safe_distance_m + self.margin_m() + late_s * (1.0 + self.acceleration_max_mps2 * late_s)
-    }
-
-    /// The highest speed at which two drones that fly at each other can both stop in time, m/s. They sense each other only
-    /// within the ranging distance.
-    #[must_use]
-    pub fn speed_on_sight_mps(&self) -> f64 {
-        let (late_s, brake) = (self.reaction_time_s, self.braking_mps2);
-        let room_m = (self.ranging_m - self.keep_m(late_s)).max(0.0);
-        (brake * late_s).hypot((brake * room_m).sqrt()) - brake * late_s
     }
 
     /// Half-plane that keeps the drone clear of an obstacle. `all`: the obstacles in reach.

@@ -4,9 +4,9 @@
 //! Neighbours are assumed to keep their velocities.
 
 use crate::reaction::PendingMotion;
-use skein_leader::geometry::nearest;
+use crate::safety::NearObstacle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, Senses};
-use skein_protocol::{SimTime, Vec2, raised};
+use skein_protocol::{SimTime, raised};
 
 /// Predicted senses, and the memory for their entries.
 #[derive(Clone, Debug, Default)]
@@ -29,11 +29,9 @@ impl StatePredictor {
         self.obstacles.clear();
         for sensed in senses.obstacles {
             let Some(outline) = senses.shape(sensed).map(|sensed| &sensed.shape) else { continue };
-            let core: Vec<Vec2> = outline.vertices().collect();
-            let to_core = nearest(&core, position) - position;
-            let distance_m = to_core.norm() - outline.radius_m;
-            let nearest_m = raised(position + to_core * (distance_m / to_core.norm().max(1e-9)), sensed.nearest_m[2]);
-            self.obstacles.push(SensedObstacle { nearest_m, distance_m, ..*sensed });
+            let near = NearObstacle::seen_from(position, outline);
+            let nearest_m = raised(position + near.nearest_m, sensed.nearest_m[2]);
+            self.obstacles.push(SensedObstacle { nearest_m, distance_m: near.distance_m, ..*sensed });
         }
         self.neighbours.clear();
         self.neighbours.extend(senses.neighbours.iter().map(|sensed| {
@@ -54,7 +52,7 @@ mod tests {
     use super::*;
     use skein_protocol::downlink::SensedShape;
     use skein_protocol::shape::ConvexShape;
-    use skein_protocol::{DroneId, ObstacleId};
+    use skein_protocol::{DroneId, ObstacleId, Vec2};
 
     #[test]
     fn obstacles_stay_and_neighbours_keep_their_velocity() {

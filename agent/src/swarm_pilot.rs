@@ -37,7 +37,9 @@ use skein_leader::routes::Routes;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Plan, QueuePlace, set_tag};
+use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, Message, MessageRef, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
+use std::iter;
 
 /// The pilot of one drone, composed of machines that each own their state.
 #[derive(Clone, Debug)]
@@ -255,15 +257,13 @@ impl SwarmPilot {
             passing_since: passing.map(|bundle| bundle.plan.stamp),
         };
         if let Some((slot, velocity)) = self.straggler.slot(senses.now, own, shape, spacing_m) {
-            let wanted = self.velocity_to_slot(senses, slot, velocity);
-            return self.limit_on_sight(wanted, senses.now);
+            return self.velocity_to_slot(senses, slot, velocity);
         }
         let stale = self.stale_formation.is_stale(senses.now, self.leading.obeyed(), self.leading.term());
         match (self.leading.obeyed(), self.leading.part()) {
             (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !stale => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
-                let wanted = self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity);
-                self.limit_on_sight(wanted, senses.now)
+                self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity)
             }
             _ => {
                 let peers = self.leading.peers();
@@ -313,16 +313,6 @@ impl SwarmPilot {
         self.navigator.learn(known.count(), known.iter().map(|(_, known)| &known.shape))
     }
 
-    /// Limits a velocity while a drone is silent that may still fly, because it may come the other way: two drones at this
-    /// speed can stop when they come into ranging distance.
-    fn limit_on_sight(&self, wanted: Vec2, now: SimTime) -> Vec2 {
-        if self.leading.peers().silent(now).next().is_none() {
-            return wanted;
-        }
-        let (speed, limit) = (wanted.norm(), self.safety.params().speed_on_sight_mps());
-        if speed > limit { wanted * (limit / speed) } else { wanted }
-    }
-
     fn queue_speed_mps(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) -> f64 {
         if !self.params.queue {
             return self.params.guidance.speed_mps;
@@ -337,7 +327,8 @@ impl SwarmPilot {
         let obstacles = senses
             .obstacles
             .iter()
-            .map(|o| NearObstacle { nearest_m: o.nearest() - senses.position(), distance_m: o.distance_m });
+            .map(|o| NearObstacle { nearest_m: o.nearest() - senses.position(), distance_m: o.distance_m })
+            .chain(remembered(&self.leading, senses).map(|(_, near)| near));
         // Drones that sense no neighbours keep to the lines between them instead.
         let neighbours = self.neighbours.iter().filter(|_| self.separations.is_none());
         let wanted = (wanted - senses.velocity()) * gain;
@@ -359,13 +350,18 @@ impl SwarmPilot {
             speed_limit_mps: self.params.speed_on_sight_mps(lag),
             lag,
         };
-        let obstacles = then.obstacles.iter().filter_map(|o| Some((&then.shape(o)?.shape, o.distance_m)));
-        let neighbours = now
-            .neighbours
-            .iter()
-            .map(|n| Moving { position_m: n.position(), velocity_mps: n.velocity() + now.velocity() });
+        let remembered = remembered(&self.leading, then).map(|(shape, near)| (shape, near.distance_m));
+        let sensed = then.obstacles.iter().filter_map(|o| Some((&then.shape(o)?.shape, o.distance_m)));
+        let obstacles = sensed.chain(remembered);
+        let neighbours = now.neighbours.iter().map(|n| Moving {
+            id: n.drone,
+            position_m: n.position(),
+            velocity_mps: n.velocity() + now.velocity(),
+        });
         let wanted = match &self.separations {
-            Some(separations) if separations.must_hover() => -then.velocity() / self.params.dt_s,
+            Some(separations) if separations.must_hover() => {
+                self.braking_filter.params().law().braking(then.velocity())
+            }
             _ => wanted,
         };
         let lines = self.separations.iter().flat_map(|separations| separations.lines());
@@ -400,8 +396,10 @@ impl SwarmPilot {
 
     /// The path of this drone with the commands that it has given and full braking after them.
     fn own_path(&self, senses: &Senses<'_>) -> OwnPath {
-        let given = self.reaction.pending_positions(senses.position(), senses.velocity());
-        let velocity = self.reaction.pending_motion(senses.velocity()).velocity;
+        let (position, velocity) = (senses.position(), senses.velocity());
+        let pending = self.reaction.pending_motions(velocity).map(|motion| position + motion.offset);
+        let given = iter::once(position).chain(pending).collect();
+        let velocity = self.reaction.pending_motion(velocity).velocity;
         let filter = self.braking_filter.params();
         OwnPath::new((senses.tick, senses.now), given, velocity, filter.law(), filter.stride())
     }
@@ -413,7 +411,8 @@ impl SwarmPilot {
             None => self.params.incarnation > 1,
         };
         if missed {
-            self.reaction.brake(senses.velocity(), self.params.safety.braking_mps2);
+            self.reaction.brake(senses.velocity(), self.braking_filter.params().law());
+            self.braking_filter.forget();
         }
     }
 
@@ -486,6 +485,17 @@ impl SwarmPilot {
         self.leading.speak(senses.now, &own, &places, say);
         command
     }
+}
+
+/// The obstacles that a drone with a broken obstacle sensor knows from before or from others.
+fn remembered<'a>(
+    leading: &'a Leading,
+    senses: &Senses<'_>,
+) -> impl Iterator<Item = (&'a ConvexShape, NearObstacle)> + Clone {
+    let position = senses.position();
+    let known = senses.broken.obstacles.then(|| leading.obstacles().iter());
+    let shapes = known.into_iter().flatten().map(|(_, known)| &known.shape);
+    shapes.map(move |shape| (shape, NearObstacle::seen_from(position, shape)))
 }
 
 impl Pilot for SwarmPilot {

@@ -81,7 +81,7 @@ impl Obstacles {
     }
 
     /// All known obstacles, by id.
-    pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> {
+    pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> + Clone {
         self.known.iter().map(|(&id, known)| (id, known))
     }
 

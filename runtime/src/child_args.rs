@@ -4,7 +4,7 @@ use crate::error::RuntimeError;
 use crate::process_state::is_stopped;
 use crate::scenario_file;
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
-use skein_bus::PinMode;
+use skein_bus::{Control, Domain, PinMode};
 use skein_scenario::Scenario;
 use std::os::fd::RawFd;
 use std::path::PathBuf;
@@ -24,6 +24,17 @@ pub struct ChildArgs {
 }
 
 impl ChildArgs {
+    /// The arguments for children of this process.
+    pub(crate) fn of_this_process(domain: &Domain, control: &Control, pin: PinMode) -> Self {
+        Self {
+            domain: domain.path().to_owned(),
+            // A segment that this process has created always has a descriptor.
+            control: control.fd().unwrap_or(-1),
+            parent: std::process::id(),
+            pin,
+        }
+    }
+
     /// Appends these arguments to the command that starts a child.
     pub(crate) fn append_to(&self, command: &mut Command) {
         command.arg("--domain").arg(&self.domain);

@@ -81,13 +81,7 @@ impl<'l, 's, 'd> Supervisor<'l, 's, 'd> {
         let restarts = fault_plan::restarts(launch.scenario);
         let spare = (restarts > 0).then(|| SpareRoom::keep(domain, senders, restarts)).transpose()?;
         scenario_file::write(domain.path(), launch.scenario)?;
-        let args = ChildArgs {
-            domain: domain.path().to_owned(),
-            // A segment that this process has created always has a descriptor.
-            control: control.fd().unwrap_or(-1),
-            parent: std::process::id(),
-            pin: launch.pin,
-        };
+        let args = ChildArgs::of_this_process(domain, &control, launch.pin);
         Ok(Self {
             children: Children::new(
                 Programs::new(launch.scenario, launch.program),

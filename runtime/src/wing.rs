@@ -75,13 +75,7 @@ impl<'l> Wing<'l> {
         let control = Control::create(spec)?;
         let services = Services::create(&domain, drones, per_process as usize, "wing")?;
         scenario_file::write(domain.path(), launch.scenario)?;
-        let args = ChildArgs {
-            domain: domain.path().to_owned(),
-            // A segment that this process has created always has a descriptor.
-            control: control.fd().unwrap_or(-1),
-            parent: std::process::id(),
-            pin: launch.pin,
-        };
+        let args = ChildArgs::of_this_process(&domain, &control, launch.pin);
         let programs = Programs::new(launch.scenario, launch.program);
         let mut outcomes = vec![TickOutcome::Absent; drones];
         launch.drones.ids().for_each(|id| outcomes[id.index()] = TickOutcome::Pending);

@@ -55,6 +55,13 @@ fn a_reaction_time_breaks_no_distance() {
     }
 }
 
+#[test]
+fn drones_keep_clear_of_an_obstacle_that_they_no_longer_sense() {
+    for strategy in ["shortest-path", "congestion-aware-paper"] {
+        assert_reached("blind-in-wind", strategy);
+    }
+}
+
 /// Drones that sense no neighbours, over a radio that delays messages by 2 s and loses 70 % of them.
 #[test]
 fn words_alone_keep_every_distance() {

@@ -20,7 +20,7 @@ fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
         speed_limit_mps: 20.0,
         lag: 0,
     };
-    let neighbour = Moving { position_m: Vec2::new(distance_m, 0.0), velocity_mps: other };
+    let neighbour = Moving { id: DroneId(1), position_m: Vec2::new(distance_m, 0.0), velocity_mps: other };
     BrakingFilter::new(params).filter(&own, wanted, std::iter::empty(), std::iter::once(neighbour), std::iter::empty())
 }
 

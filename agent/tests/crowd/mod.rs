@@ -4,21 +4,11 @@
 pub(crate) mod words;
 
 use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};
-use skein_agent::braking_path::{BrakingLaw, BrakingPath};
+use skein_agent::braking_path::BrakingPath;
 use skein_leader::geometry::nearest;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{SimTime, Vec2};
+use skein_protocol::{DroneId, SimTime, Vec2};
 use std::collections::VecDeque;
-
-fn law(params: &BrakingFilterParams) -> BrakingLaw {
-    BrakingLaw { deceleration_mps2: params.braking_mps2, dt_s: params.dt_s }
-}
-
-/// Acceleration of full braking, m/s².
-fn braking(params: &BrakingFilterParams, velocity: Vec2) -> Vec2 {
-    let (speed, step) = (velocity.norm(), params.braking_mps2 * params.dt_s);
-    if speed > step { velocity * (-params.braking_mps2 / speed) } else { -velocity / params.dt_s }
-}
 
 /// A crowd whose drones all follow the rule.
 #[derive(Clone, Debug)]
@@ -31,6 +21,12 @@ pub(crate) struct Crowd {
     lag: u32,
     /// Commands of each drone that have not taken effect yet, m/s², the oldest first.
     pending: Vec<VecDeque<Vec2>>,
+    /// For each drone, the tick in which it comes back; in the past if its process runs.
+    frozen: Vec<u64>,
+    /// Drones sense each other within this distance, m.
+    ranging_m: f64,
+    /// Greatest speed of a drone that senses so far, m/s.
+    speed_limit_mps: f64,
     obstacles: Vec<ConvexShape>,
 }
 
@@ -105,28 +101,46 @@ impl Crowd {
             })
             .collect();
         let tick = (random.unit() * 1e4) as u64;
-        let mut crowd = Self { params, tick, bodies: Vec::new(), lag, pending: Vec::new(), obstacles };
+        let stop_m = params.speed_max_mps * params.speed_max_mps / (2.0 * params.braking_mps2);
+        let room_m = if random.unit() < 0.5 { f64::INFINITY } else { stop_m * random.within(0.2, 1.5) };
+        let speed_limit_mps = params.speed_within_mps(room_m, lag).min(params.speed_max_mps);
+        let mut crowd = Self {
+            params,
+            tick,
+            bodies: Vec::new(),
+            lag,
+            pending: Vec::new(),
+            frozen: Vec::new(),
+            ranging_m: params.keep_m() + 2.0 * room_m,
+            speed_limit_mps,
+            obstacles,
+        };
         for _ in 0..drones * 20 {
             let position = Vec2::new(random.within(-side_m, side_m), random.within(-side_m, side_m));
-            let body = (position, random.disc(params.speed_max_mps));
+            let body = (position, random.disc(speed_limit_mps));
             if crowd.bodies.len() < drones && crowd.admits(body) {
                 crowd.bodies.push(body);
-                // The first `lag` commands of each drone are full braking.
-                let (mut velocity, mut pending) = (body.1, VecDeque::new());
-                for _ in 0..lag {
-                    let braking = braking(&params, velocity);
-                    velocity += braking * params.dt_s;
-                    pending.push_back(braking);
-                }
-                crowd.pending.push(pending);
+                crowd.pending.push(crowd.braking_commands(body.1));
+                crowd.frozen.push(0);
             }
         }
         crowd
     }
 
+    /// As many commands as are late: full braking.
+    fn braking_commands(&self, mut velocity: Vec2) -> VecDeque<Vec2> {
+        let law = self.params.law();
+        let next = |_| {
+            let braking = law.braking(velocity);
+            velocity += braking * law.dt_s;
+            braking
+        };
+        (0..self.lag).map(next).collect()
+    }
+
     /// Whether the braking path of a body keeps all distances from the obstacles and the drones so far.
     fn admits(&self, (position, velocity): (Vec2, Vec2)) -> bool {
-        let law = law(&self.params);
+        let law = self.params.law();
         let path = BrakingPath::new(position, velocity, law);
         let keep_m = self.params.safe_distance_m + self.params.margin_m();
         let clear_m = self.params.clearance_m + 0.01;
@@ -169,36 +183,62 @@ impl Crowd {
         (position + (velocity + next) * (self.params.dt_s / 2.0), next)
     }
 
-    /// One tick of all drones. Each drone decides by what it senses at the start of the tick.
-    fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, random: &mut Keyed) {
+    /// One tick of all drones. Each drone decides by what it senses at the start of the tick. `freezes`: share of the time in which the
+    /// process of a drone is stopped. The body of such a drone brakes fully, and its commands are void.
+    fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, freezes: f64, random: &mut Keyed) {
         let before = self.bodies.clone();
         for (i, filter) in filters.iter_mut().enumerate() {
-            let (mut position, mut velocity) = before[i];
-            for command in &self.pending[i] {
-                (position, velocity) = self.fly((position, velocity), *command);
+            let begins = random.unit() < freezes / f64::from(FROZEN_TICKS);
+            if begins && self.frozen[i] < self.tick {
+                self.frozen[i] = self.tick + (random.unit() * 2.0 * f64::from(FROZEN_TICKS)) as u64;
             }
-            let own = OwnMotion {
-                tick: self.tick,
-                now: SimTime::ZERO,
-                sensed_position: before[i].0,
-                sensed_velocity: before[i].1,
-                position,
-                velocity,
-                speed_limit_mps: f64::INFINITY,
-                lag: self.lag,
-            };
-            let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
-            let neighbours = before.iter().enumerate().filter(|(j, _)| *j != i);
-            let neighbours = neighbours.map(|(_, b)| Moving { position_m: b.0 - before[i].0, velocity_mps: b.1 });
-            let wanted = self.wish(i, wish, random);
-            let acceleration = filter.filter(&own, wanted, obstacles, neighbours, std::iter::empty());
-            assert!(acceleration.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
-            self.pending[i].push_back(acceleration);
+            if self.tick <= self.frozen[i] {
+                self.bodies[i] = self.fly(before[i], self.params.law().braking(before[i].1));
+                self.pending[i] = self.braking_commands(self.bodies[i].1);
+                if self.tick == self.frozen[i] {
+                    filter.forget();
+                }
+                continue;
+            }
+            let command = self.command(i, filter, &before, wish, random);
+            assert!(command.norm() <= self.params.acceleration_max_mps2 * (1.0 + 1e-9));
+            self.pending[i].push_back(command);
             let command = self.pending[i].pop_front().unwrap();
             self.bodies[i] = self.fly(before[i], command);
             assert!(self.bodies[i].1.norm() <= self.params.speed_max_mps + 1e-6);
         }
         self.tick += 1;
+    }
+
+    /// The command of drone `i`, m/s². `before`: the states that it senses.
+    fn command(
+        &self,
+        i: usize,
+        filter: &mut BrakingFilter,
+        before: &[(Vec2, Vec2)],
+        wish: Wish,
+        random: &mut Keyed,
+    ) -> Vec2 {
+        let (mut position, mut velocity) = before[i];
+        for command in &self.pending[i] {
+            (position, velocity) = self.fly((position, velocity), *command);
+        }
+        let own = OwnMotion {
+            tick: self.tick,
+            now: SimTime::ZERO,
+            sensed_position: before[i].0,
+            sensed_velocity: before[i].1,
+            position,
+            velocity,
+            speed_limit_mps: self.speed_limit_mps,
+            lag: self.lag,
+        };
+        let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
+        let near = |b: Vec2| (b - before[i].0).norm() <= self.ranging_m;
+        let neighbours = before.iter().enumerate().filter(|(j, b)| *j != i && near(b.0));
+        let neighbours =
+            neighbours.map(|(j, b)| Moving { id: DroneId(j as u32), position_m: b.0 - before[i].0, velocity_mps: b.1 });
+        filter.filter(&own, self.wish(i, wish, random), obstacles, neighbours, std::iter::empty())
     }
 
     /// Least distance beyond the distance to keep, over all pairs of drones and all drones and obstacles, m.
@@ -218,15 +258,38 @@ impl Crowd {
 
 pub(crate) const WISHES: [Wish; 5] = [Wish::Gather, Wish::Swap, Wish::Chase, Wish::Rotate, Wish::Erratic];
 
-/// Flies a crowd. Returns the least distance beyond the distance to keep, m, and the number of drone-ticks flown.
-pub(crate) fn fly(seed: u64, drones: usize, density: f64, ticks: usize, wish: Wish, lag: u32) -> (f64, usize) {
+/// Mean time for which a process is stopped, ticks.
+const FROZEN_TICKS: u32 = 20;
+
+/// How a crowd was flown.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flown {
+    /// Least distance beyond the distance to keep, m.
+    pub(crate) least_m: f64,
+    /// Number of drone-ticks.
+    pub(crate) drone_ticks: usize,
+    /// Mean distance that a drone has flown, m.
+    pub(crate) mean_m: f64,
+}
+
+/// Flies a crowd. `freezes`: share of the time in which the process of a drone is stopped.
+pub(crate) fn fly(
+    seed: u64,
+    (drones, density): (usize, f64),
+    ticks: usize,
+    (wish, lag): (Wish, u32),
+    freezes: f64,
+) -> Flown {
     let mut crowd = Crowd::random(seed, drones, density, lag);
     let mut random = Keyed(seed ^ 0xabcdef);
     let mut filters = vec![BrakingFilter::new(crowd.params); crowd.bodies.len()];
-    let mut least_m = crowd.least_m();
+    let (mut least_m, mut sum_m) = (crowd.least_m(), 0.0);
     for _ in 0..ticks {
-        crowd.step(&mut filters, wish, &mut random);
+        let before = crowd.bodies.clone();
+        crowd.step(&mut filters, wish, freezes, &mut random);
+        sum_m += before.iter().zip(&crowd.bodies).map(|(a, b)| (a.0 - b.0).norm()).sum::<f64>();
         least_m = least_m.min(crowd.least_m());
     }
-    (least_m, ticks * crowd.bodies.len())
+    let n = crowd.bodies.len();
+    Flown { least_m, drone_ticks: ticks * n, mean_m: sum_m / n.max(1) as f64 }
 }

@@ -1,6 +1,6 @@
 //! Crowds that sense no neighbours. Their drones keep apart by the lines of `skein_agent::separation`, over an adverse radio.
 
-use super::{Crowd, Keyed, Wish, braking, law, shape_distance_m};
+use super::{Crowd, Flown, Keyed, Wish, shape_distance_m};
 use bytemuck::Zeroable;
 use skein_agent::braking_filter::{BrakingFilter, OwnMotion};
 use skein_agent::separation::own_path::OwnPath;
@@ -8,7 +8,6 @@ use skein_agent::separation::{SeparationParams, Separations};
 use skein_leader::peers::Peers;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, Message, SimTime, Vec2, raised};
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Time between two beacons, s.
@@ -53,24 +52,16 @@ impl Crowd {
         let velocity = random.disc(self.params.speed_max_mps);
         let bodies = std::mem::take(&mut self.bodies);
         self.pending.clear();
+        self.frozen.clear();
         self.tick = 0;
         for (position, _) in bodies {
             if self.admits((position, velocity)) {
                 self.bodies.push((position, velocity));
                 self.pending.push(self.braking_commands(velocity));
+                self.frozen.push(0);
             }
         }
         velocity
-    }
-
-    /// The first `lag` commands of a drone: full braking.
-    fn braking_commands(&self, mut velocity: Vec2) -> VecDeque<Vec2> {
-        let next = |_| {
-            let braking = braking(&self.params, velocity);
-            velocity += braking * self.params.dt_s;
-            braking
-        };
-        (0..self.lag).map(next).collect()
     }
 
     fn now(&self) -> SimTime {
@@ -89,13 +80,13 @@ impl Crowd {
 
     fn own_path(&self, i: usize) -> OwnPath {
         let (given, velocity) = self.given(i);
-        OwnPath::new((self.tick, self.now()), given, velocity, law(&self.params), self.params.stride())
+        OwnPath::new((self.tick, self.now()), given, velocity, self.params.law(), self.params.stride())
     }
 
     /// One tick of drone `i`, which hears, makes lines, and gives a command.
     fn step_by_words(&mut self, i: usize, filter: &mut BrakingFilter, wish: Wish, talk: &mut Talk, random: &mut Keyed) {
         let (given, velocity) = self.given(i);
-        let braking = braking(&self.params, velocity);
+        let braking = self.params.law().braking(velocity);
         let acceleration = match talk.exchange(self, i, random) {
             None => braking,
             Some(lines) if lines.must_hover() => braking,
@@ -212,16 +203,14 @@ impl Adversary {
     }
 }
 
-/// Flies a crowd by word alone. Returns the least distance beyond the distance to keep, m, the number of drone-ticks flown, and
-/// the mean distance that a drone has flown, m.
+/// Flies a crowd by word alone.
 pub(crate) fn fly_by_words(
     seed: u64,
-    drones: usize,
-    density: f64,
+    (drones, density): (usize, f64),
     ticks: usize,
     (wish, lag): (Wish, u32),
     adversary: Adversary,
-) -> (f64, usize, f64) {
+) -> Flown {
     let mut crowd = Crowd::random(seed, drones, density, lag);
     let mut random = Keyed(seed ^ 0xabcdef);
     let velocity = crowd.with_one_velocity(&mut random);
@@ -243,5 +232,5 @@ pub(crate) fn fly_by_words(
         least_m = least_m.min(crowd.least_m());
     }
     let n = crowd.bodies.len();
-    (least_m, ticks * n, flown_m / n.max(1) as f64)
+    Flown { least_m, drone_ticks: ticks * n, mean_m: flown_m / n.max(1) as f64 }
 }

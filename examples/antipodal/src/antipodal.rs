@@ -141,7 +141,7 @@ impl Pilot for Antipodal {
         self.speak(senses, &path, out);
         self.flown_m += velocity.norm() * limits.dt_s;
         let wanted = match self.separations.must_hover() {
-            true => -velocity / limits.dt_s,
+            true => limits.law().braking(velocity),
             false => self.wanted(position, velocity, limits.dt_s),
         };
         let own = OwnMotion {
