@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from . import _child, _skein
-from ._app import Make, answer
+from ._app import Make, Schema, answer
 
 #: A scenario: the path of its file, its text as TOML, or its keys.
 Scenario = str | os.PathLike[str] | Mapping[str, Any]
@@ -112,6 +112,7 @@ def run(
     strategy: str | None = None,
     clock: str | None = None,
     record: bool = True,
+    json_topics: Mapping[str, Schema] | None = None,
 ) -> Run:
     """Flies one mission and gives its result.
 
@@ -119,6 +120,7 @@ def run(
     ``[[pilot]]``; a single one flies all drones of a scenario without such tables. ``set``: keys to change, such as
     ``{"radio.loss": 0.2}``. ``out``: folder of the run; the default is a temporary one, which lives as long as the result.
     ``runtime="processes"`` gives each drone a process; classes must then be importable, as with multiprocessing.
+    ``json_topics``: JSON schemas of topics under which pilots say JSON objects, as in ``skein.main``.
 
     Raises ``skein.Error`` if the mission could not be flown. A goal that was not reached, or a broken invariant, is no error: see
     ``run.outcome``.
@@ -135,7 +137,7 @@ def run(
         args += ["--strategy", strategy] if strategy is not None else []
         args += ["--clock", clock] if clock is not None else []
         args += [] if record else ["--no-record"]
-        answer(args, _program(pilots, runtime == "processes"), pilots)
+        answer(args, _program(pilots, runtime == "processes"), pilots, json_topics)
     return Run(folder, kept)
 
 

@@ -215,9 +215,12 @@ class Swarm:
     def scenario(self) -> dict[str, Any]: ...
 
 def answer(
-    arguments: list[str], program: list[str], pilots: list[tuple[str, Callable[[Birth], Any]]]
+    arguments: list[str],
+    program: list[str],
+    pilots: list[tuple[str, Callable[[Birth], Any]]],
+    topics: list[tuple[str, str]],
 ) -> int:
-    """Does what the arguments say and returns the exit code."""
+    """Does what the arguments say and returns the exit code. ``topics``: names of topics, and their JSON schemas as text."""
 
 def messages(folder: str) -> list[tuple[float, int, str, bytes]]:
     """What pilots said under topics of their own, in the recording of a run: time, s, sender, topic, bytes."""

@@ -10,13 +10,15 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Does what the arguments say, such as `["run", "scenario.toml"]`, and returns the exit code. `program`: the words that start
-/// this program in another process. `pilots`: names, and what makes a pilot of a birth.
+/// this program in another process. `pilots`: names, and what makes a pilot of a birth. `topics`: names of topics, and their JSON
+/// schemas as text.
 #[pyfunction]
 pub(crate) fn answer(
     py: Python<'_>,
     arguments: Vec<OsString>,
     program: Vec<OsString>,
     pilots: Vec<(String, Py<PyAny>)>,
+    topics: Vec<(String, String)>,
 ) -> u8 {
     let add = |app: App, (name, class): (String, Py<PyAny>)| {
         app.try_pilot(&name, move |birth| {
@@ -24,6 +26,7 @@ pub(crate) fn answer(
         })
     };
     let app = pilots.into_iter().fold(App::new().program(program).on_folder(tell_folder), add);
+    let app = topics.iter().fold(app, |app, (topic, schema)| app.json_topic(topic, schema));
     py.detach(|| app.run(arguments))
 }
 
@@ -39,15 +42,25 @@ pub(crate) fn messages(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<Said>> {
     let mut said = Vec::new();
     for message in MessageStream::new(&bytes).map_err(wrong)? {
         let message = message.map_err(wrong)?;
-        // Four bytes of each message are the number of its sender.
-        if let (Some(topic), Some((source, data))) =
-            (message.channel.topic.strip_prefix("/pilots/"), message.data.split_first_chunk())
-        {
+        if let Some((source, topic, data)) = said_by_pilot(&message) {
             let data = PyBytes::new(py, data).unbind();
-            said.push((message.log_time as f64 * 1e-9, u32::from_le_bytes(*source), topic.to_owned(), data));
+            said.push((message.log_time as f64 * 1e-9, source, topic.to_owned(), data));
         }
     }
     Ok(said)
+}
+
+/// Sender, topic and bytes of a message of a pilot; `None` for any other message.
+fn said_by_pilot<'m>(message: &'m mcap::Message<'_>) -> Option<(u32, &'m str, &'m [u8])> {
+    let topic = message.channel.topic.strip_prefix("/pilots/")?;
+    if message.channel.schema.is_some() {
+        // A topic with a schema has a channel for each drone.
+        let (topic, source) = topic.rsplit_once('/')?;
+        return Some((source.parse().ok()?, topic, &message.data));
+    }
+    // Four bytes of each other message are the number of its sender.
+    let (source, data) = message.data.split_first_chunk()?;
+    Some((u32::from_le_bytes(*source), topic, data))
 }
 
 /// Tells this process and its children where the run's folder is. Without it, tracebacks go to stderr.

@@ -108,6 +108,60 @@ def test_a_run_has_the_messages_of_its_pilots():
     assert times == sorted(times) and 0 <= times[0] and times[-1] <= 0.5
 
 
+STATE = {"type": "object", "properties": {"mode": {"type": "integer"}}}
+
+
+class States(skein.Pilot):
+    """Says a JSON object in each tick, and once something else."""
+
+    def __init__(self, birth):
+        self.drone = birth.drone
+
+    def step(self, senses, inbox, out):
+        data = {"mode": self.drone, "tick": senses.tick}
+        out.say("fleet/state", b"no object" if senses.tick == 3 else json.dumps(data).encode())
+        return skein.Acceleration(0.0, 0.0)
+
+
+def test_a_topic_with_a_schema_has_a_channel_for_each_drone():
+    short = {"time.timeout_s": 0.2}
+    run = skein.run(HEAD, pilots={"states": States}, set=short, json_topics={"fleet/state": STATE})
+    assert run.manifest["facts"]["topics"] == [{"topic": "fleet/state", "schema": STATE}]
+    recording = (run.folder / "run.mcap").read_bytes()
+    assert b"/pilots/fleet/state/3" in recording and b"pilots.fleet/state" in recording
+    messages = run.messages
+    said = list(zip(messages["source"], messages["topic"], messages["data"], strict=True))
+    assert {topic for _, topic, _ in said} == {"fleet/state"}
+    objects = [(source, json.loads(data)) for source, _, data in said if data != b"no object"]
+    assert len(said) - len(objects) == 4 and len(objects) >= 20
+    assert all(source == found["mode"] for source, found in objects)
+    # The schema is about the recording alone.
+    assert run.digest == skein.run(HEAD, pilots={"states": States}, set=short).digest
+
+
+def test_an_application_gives_its_topics_schemas_and_a_wrong_one_is_refused(tmp_path):
+    scenario = tmp_path / "states.toml"
+    scenario.write_text(HEAD + '[[pilot]]\nname = "states"\n')
+    script = tmp_path / "states.py"
+    words = ["run", scenario, "--set", "time.timeout_s=0.2", "--force", "--out", "run"]
+
+    def fly(topics, check):
+        script.write_text(
+            f"import sys\nsys.path.insert(0, {str(HERE)!r})\nimport skein\nfrom test_pilots import STATE, States\n"
+            f'if __name__ == "__main__":\n    skein.main(states=States, json_topics={topics})\n'
+        )
+        return app(tmp_path, *words, script=script, check=check).stderr
+
+    fly('{"fleet/state": STATE}', 1)
+    assert skein.load(tmp_path / "run").manifest["facts"]["topics"][0]["schema"] == STATE
+    assert "topic fleet: the schema is no JSON" in fly('{"fleet": "{"}', 2)
+    assert '"no name"' in fly('{"no name": STATE}', 2)
+    with pytest.raises(skein.Error, match="no JSON"):
+        skein.run(HEAD, pilots={"states": States}, json_topics={"fleet": "{"})
+    with pytest.raises(TypeError, match="json_topics"):
+        skein.run(HEAD, pilots={"states": States}, json_topics={"fleet": 3})
+
+
 def test_an_obstacle_has_a_floor_and_a_top():
     seen = []
 
