@@ -51,66 +51,16 @@
 //! assert!(command(30.15).x < -4.0, "each needs 10 m to stop, and 10 m must remain");
 //! ```
 
-use crate::braking_path::{BrakingLaw, BrakingPath};
+pub use crate::braking_motion::{BrakingFilterParams, Moving, OwnMotion};
+use crate::braking_path::BrakingPath;
 use crate::program::{HalfPlane, Program};
 use crate::separation::separating_line::{SeparatingLine, Side};
 use crate::sights::Sights;
+use skein_protocol::Vec2;
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
-use skein_protocol::{DroneId, SimTime, Vec2};
-
-/// Constants of the rule.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BrakingFilterParams {
-    /// Least distance between two drones, m.
-    pub safe_distance_m: f64,
-    /// Least distance of a drone's centre to an obstacle, m.
-    pub clearance_m: f64,
-    /// Greatest acceleration, m/s².
-    pub acceleration_max_mps2: f64,
-    /// Deceleration of a drone that brakes fully, m/s²; at most the greatest acceleration.
-    pub braking_mps2: f64,
-    /// Greatest speed of any drone, m/s.
-    pub speed_max_mps: f64,
-    /// Length of a tick, s.
-    pub dt_s: f64,
-}
-
-/// A neighbour as sensed now.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moving {
-    /// Which drone it is. Only drones whose commands take effect late need to know.
-    pub id: DroneId,
-    /// Position relative to the drone's present position, m.
-    pub position_m: Vec2,
-    /// Velocity in the world frame, m/s.
-    pub velocity_mps: Vec2,
-}
-
-/// The drone's own state, to which the rule is applied.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OwnMotion {
-    /// Number of the present tick, in which neighbours are sensed.
-    pub tick: u64,
-    /// The present time.
-    pub now: SimTime,
-    /// Position now, world frame, m.
-    pub sensed_position: Vec2,
-    /// Velocity now, world frame, m/s.
-    pub sensed_velocity: Vec2,
-    /// Position when the command takes effect, world frame, m.
-    pub position: Vec2,
-    /// Velocity when the command takes effect, world frame, m/s.
-    pub velocity: Vec2,
-    /// Greatest speed from which the drone can stop within its sensing range, m/s.
-    pub speed_limit_mps: f64,
-    /// Delay from a command to its effect, ticks.
-    pub lag: u32,
-}
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
-/// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
-const MARGIN_SHARE: f64 = 0.01;
 /// Added to the clearance, m, so that rounding errors do not break it.
 const CLEARANCE_ROUNDING_M: f64 = 1e-3;
 /// Rounds in which half-planes are added. After them the command is moved towards full braking.
@@ -119,63 +69,6 @@ const ROUNDS: usize = 8;
 const HALVINGS: usize = 10;
 /// Tolerance of a condition, m (of the speed limit: m/s). A condition that is missed by at most this counts as met.
 const MET_M: f64 = 1e-9;
-
-impl BrakingFilterParams {
-    /// Margin on the safe distance for the loss of distance between the compared ticks, m.
-    #[must_use]
-    pub fn margin_m(&self) -> f64 {
-        MARGIN_SHARE * self.safe_distance_m
-    }
-
-    /// Number of ticks between two comparisons of braking paths. Let h be the time between two comparisons. Between them, the
-    /// distance of two paths falls by at most h²/8 · (v²/D + 2a) below the smaller of the two compared distances. v is the
-    /// relative speed, at most twice the greatest speed.
-    #[must_use]
-    pub fn stride(&self) -> u32 {
-        let relative_mps = 2.0 * self.speed_max_mps;
-        let bend = relative_mps * relative_mps / self.safe_distance_m + 2.0 * self.acceleration_max_mps2;
-        ((8.0 * self.margin_m() / bend).sqrt() / self.dt_s).max(1.0) as u32
-    }
-
-    /// The distance that two drones keep, m.
-    #[must_use]
-    pub fn keep_m(&self) -> f64 {
-        self.safe_distance_m + self.margin_m()
-    }
-
-    /// How a drone brakes.
-    #[must_use]
-    pub fn law(&self) -> BrakingLaw {
-        BrakingLaw { deceleration_mps2: self.braking_mps2, dt_s: self.dt_s }
-    }
-
-    /// Greatest speed from which a drone stops within `room_m`, m/s. The drone flies on at this speed for `lag` + 2 ticks before
-    /// it brakes.
-    #[must_use]
-    pub fn speed_within_mps(&self, room_m: f64, lag: u32) -> f64 {
-        let late_s = f64::from(lag + 2) * self.dt_s;
-        let brake = self.braking_mps2;
-        (brake * late_s).hypot((2.0 * brake * room_m.max(0.0)).sqrt()) - brake * late_s
-    }
-
-    /// Upper bound on the distance that a drone flies until it stops, if it may accelerate for `ticks` ticks, m.
-    /// `speed_squared`: square of its speed, m²/s².
-    fn reach_m(&self, speed_squared: f64, ticks: u32) -> f64 {
-        let span_s = f64::from(ticks) * self.dt_s;
-        let speed_mps = speed_squared.sqrt() + self.acceleration_max_mps2 * span_s;
-        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s
-    }
-
-    /// The same for a drone at `speed_mps` that obeys the speed limit of `own`, m.
-    pub(crate) fn late_reach_m(&self, own: &OwnMotion, speed_mps: f64, ticks: u32) -> f64 {
-        let span_s = f64::from(ticks) * self.dt_s;
-        let limit_mps = own.speed_limit_mps.min(self.speed_max_mps).max(speed_mps);
-        let speed_mps = (speed_mps + self.acceleration_max_mps2 * span_s).min(limit_mps);
-        // The last tick of full braking brakes less.
-        let last_m = self.braking_mps2 * self.dt_s * self.dt_s / 8.0;
-        speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s + last_m
-    }
-}
 
 /// Two braking paths at one compared tick.
 #[derive(Clone, Copy, Debug)]

@@ -19,6 +19,7 @@
 
 mod altitude;
 pub mod braking_filter;
+mod braking_motion;
 pub mod braking_path;
 pub mod command_delay;
 pub mod detection;

@@ -5,7 +5,7 @@
 mod sight;
 mod sighted_pair;
 
-use crate::braking_filter::{BrakingFilterParams, Moving, OwnMotion};
+use crate::braking_motion::{BrakingFilterParams, Moving, OwnMotion};
 use crate::braking_path::BrakingPath;
 pub(crate) use sight::Sight;
 use sighted_pair::{Paths, SightedPair};

@@ -1,4 +1,5 @@
 use super::*;
+use skein_protocol::{DroneId, SimTime};
 
 /// The command of one drone at the origin with one neighbour on the x axis. Velocities in m/s, accelerations in m/s².
 fn pair(distance_m: f64, own: Vec2, other: Vec2, wanted: Vec2) -> Vec2 {
