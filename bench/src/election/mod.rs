@@ -1,6 +1,7 @@
 //! Elections: all drones start at once, over a simulated radio that is one hop wide or many. Measures the time until one drone
 //! leads, the frames that this takes, and how many led in vain.
 
+mod course;
 mod row;
 mod swarm;
 mod topology;
