@@ -52,7 +52,7 @@ const NUMBERS: [(&str, f64, Within); 41] = [
     ("R5.reformation", 84.1, Part(0.05)),
     ("R5.end", 90.5, Part(0.05)),
     ("R5.energy.congestion-aware-paper", 93.9, Part(0.04)),
-    ("R5.energy.shortest-path", 101.4, Part(0.04)),
+    ("between.close-up.shortest-path.total", 101.4, Part(0.04)),
     ("R4.S2.ratio.jitter", 1.15, Absolute(0.03)),
     ("P1.0", 168.48, Absolute(0.01)),
     ("P1.5", 143.61, Absolute(0.01)),

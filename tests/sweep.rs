@@ -119,6 +119,10 @@ fn merged_shards_give_the_same_files_as_one_machine() {
         assert_eq!((done.code, rows(&place.join(out))), (Some(0), 8), "{done:?}");
         assert!(done.stdout.contains("skein sweep merge") && !place.join(out).join("runs.csv").exists(), "{done:?}");
     }
+    let early = place.run(&[&["sweep", "progress", "--json"], &folders[..6]].concat());
+    assert_eq!(early.code, Some(1), "{early:?}");
+    let (found, flown) = (early.summary(), folders[..6].iter().map(|out| rows(&place.join(out))).sum::<usize>());
+    assert_eq!((&found["done"], &found["runs"], &found["absent"]), (&flown.into(), &56.into(), &["7/7"].into()));
     let early = merge(&folders);
     assert!(early.code == Some(2) && early.stderr.contains("of 56 runs are missing"), "{early:?}");
     for (args, out) in &shards[..2] {
@@ -126,6 +130,8 @@ fn merged_shards_give_the_same_files_as_one_machine() {
         assert_eq!((resumed.code, rows(&place.join(out))), (Some(0), 8), "{resumed:?}");
     }
 
+    let done = place.run(&[&["sweep", "progress"], &folders[..]].concat());
+    assert!(done.code == Some(0) && done.stdout.contains("56 of 56 runs are done: 56 reached"), "{done:?}");
     // The experiment is not needed any more.
     fs::remove_file(place.join("e.toml")).unwrap();
     let merged = merge(&["c", "a", "g", "f", "b", "e", "d"]);

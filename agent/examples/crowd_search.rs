@@ -1,14 +1,15 @@
 //! Searches for a crowd that violates a distance although all its drones follow the safety rule of `docs/safety.md`:
 //! `cargo run --release -p skein-agent --example crowd_search -- DRONE_TICKS`. The default of `DRONE_TICKS` is three million.
 //!
-//! The command fails if a distance is violated.
+//! The command fails if a distance is violated, or if crowds that do not allow for their errors violate none.
 #![allow(clippy::disallowed_macros, reason = "this command prints its results")]
 
 #[path = "../tests/crowd/mod.rs"]
 mod crowd;
 
-use crowd::words::{Adversary, fly_by_words};
-use crowd::{Flown, Keyed, WISHES, fly};
+use crowd::errors::Errors;
+use crowd::words::{Adversary, fly_by_words, fly_with_errors};
+use crowd::{Crowd, Flown, Keyed, WISHES, fly};
 use std::process::ExitCode;
 
 /// Flies random crowds until `drone_ticks` drone-ticks are reached, and prints what came of it. `crowd`: flies the crowd of a seed.
@@ -56,10 +57,32 @@ fn by_words(lag: u32, drone_ticks: usize) -> usize {
     })
 }
 
+/// The same with wrong positions, clocks and outlines, for which the drones allow or not.
+fn with_errors(allowed: bool, drone_ticks: usize) -> usize {
+    let name = format!("by words with errors, {}", if allowed { "with margins" } else { "without margins" });
+    search(&name, 200_000_000, drone_ticks, |seed| {
+        let mut random = Keyed(seed);
+        let drones = 2 + (random.unit() * random.unit() * 48.0) as usize;
+        let (density, wish) = (random.within(0.7, 4.0), WISHES[(seed % 5) as usize]);
+        let adversary = Adversary {
+            delay_s: random.within(0.0, 3.0),
+            loss: random.within(0.0, 0.8),
+            restarts: random.within(-0.2, 0.2),
+        };
+        let errors = |crowd: &Crowd| {
+            let errors = Errors::random(crowd, seed);
+            if allowed { errors } else { errors.unallowed() }
+        };
+        let lag = if seed % 2 == 0 { 0 } else { 10 };
+        fly_with_errors(seed, (drones, density), 1000, (wish, lag), adversary, errors)
+    })
+}
+
 fn main() -> ExitCode {
     let drone_ticks = std::env::args().nth(1).and_then(|count| count.parse().ok()).unwrap_or(3_000_000);
     let late = [1, 2, 5, 10, 20].into_iter().map(|lag| sighted(lag, drone_ticks / 3));
     let sighted = sighted(0, drone_ticks) + late.sum::<usize>();
     let by_words: usize = [0, 10].into_iter().map(|lag| by_words(lag, drone_ticks / 6)).sum();
-    ExitCode::from(u8::from(sighted + by_words > 0))
+    let with_errors = with_errors(true, drone_ticks / 6) + usize::from(with_errors(false, drone_ticks / 12) == 0);
+    ExitCode::from(u8::from(sighted + by_words + with_errors > 0))
 }

@@ -54,6 +54,7 @@
 pub use crate::braking_motion::{BrakingFilterParams, Moving, OwnMotion};
 use crate::braking_path::BrakingPath;
 use crate::program::{HalfPlane, Program};
+use crate::sensing_errors::SensingErrors;
 use crate::separation::separating_line::{SeparatingLine, Side};
 use crate::sights::Sights;
 use skein_protocol::Vec2;
@@ -87,6 +88,7 @@ struct Sample {
 #[derive(Clone, Debug)]
 pub struct BrakingFilter {
     params: BrakingFilterParams,
+    errors: SensingErrors,
     stride: u32,
     samples: Vec<Sample>,
     /// For each near neighbour, the end index of its samples in `samples`.
@@ -112,6 +114,7 @@ impl BrakingFilter {
         let stride = params.stride();
         Self {
             params,
+            errors: SensingErrors::default(),
             stride,
             samples: Vec::new(),
             ends: Vec::new(),
@@ -119,6 +122,17 @@ impl BrakingFilter {
             program: Program::default(),
             sights: Sights::default(),
         }
+    }
+
+    /// The same filter for a drone whose senses have errors up to these bounds (docs/safety.md, "Real sensors").
+    #[must_use]
+    pub fn with_errors(self, errors: SensingErrors) -> Self {
+        Self { errors, ..self }
+    }
+
+    /// Sets how far outlines are displaced from now on, relative to the drone, m.
+    pub fn set_obstacle_error_m(&mut self, error_m: f64) {
+        self.errors.obstacle_m = error_m;
     }
 
     /// The constants of the filter.
@@ -147,8 +161,9 @@ impl BrakingFilter {
             return self.params.law().braking(own.velocity);
         }
         self.keep_to(own, lines);
-        let reach_m =
-            self.params.reach_m(own.velocity.norm_squared(), 1) + self.params.clearance_m + CLEARANCE_ROUNDING_M;
+        // With a reaction time the drone looks from elsewhere.
+        let aside_m = if self.errors.partial_outlines { (own.position - own.sensed_position).norm() } else { 0.0 };
+        let reach_m = self.params.reach_m(own.velocity.norm_squared(), 1).max(aside_m) + self.clear_m();
         let near = obstacles.filter(move |(_, distance_m)| *distance_m <= reach_m).map(|(shape, _)| shape);
         let limit = self.params.acceleration_max_mps2;
         let wanted = if wanted.norm() > limit { wanted * (limit / wanted.norm()) } else { wanted };
@@ -164,6 +179,11 @@ impl BrakingFilter {
             candidate = self.candidate(own, next);
         }
         self.towards_braking(own, candidate.acceleration, near)
+    }
+
+    /// The distance from a sensed outline that is allowed without a further look, m.
+    fn clear_m(&self) -> f64 {
+        self.params.clear_m() + self.errors.obstacle_m
     }
 
     fn candidate(&self, own: &OwnMotion, acceleration: Vec2) -> Candidate {
@@ -238,24 +258,25 @@ impl BrakingFilter {
 
     /// Samples the braking path of this drone for each line that some command could bring too near.
     fn keep_to<'a>(&mut self, own: &OwnMotion, lines: impl Iterator<Item = (&'a SeparatingLine, Side)>) {
-        let half_m = self.params.keep_m() / 2.0;
+        let half_m = self.params.keep_m() / 2.0 + self.errors.position_m;
         let reach_m = self.params.reach_m(own.velocity.norm_squared(), 1);
         let path = BrakingPath::new(Vec2::zeros(), own.velocity, self.params.law());
+        let clock_s = self.errors.clock_s;
         let dt_s = self.params.dt_s;
         for (line, side) in lines {
             let inward = line.normal() * side.sign();
             let here_m = inward.dot(&own.position);
             let beyond_m = |offset_m: f64| here_m - side.sign() * offset_m - half_m;
-            let begins_m = beyond_m(line.offset_m(own.now, f64::from(own.lag) * dt_s));
+            let begins_m = beyond_m(line.nearest_offset_m(side, own.now, f64::from(own.lag) * dt_s, clock_s));
             if begins_m.min(beyond_m(line.stop_m())) > reach_m {
                 continue;
             }
             // Each command can lengthen this drone's path by one tick.
-            let rests = (line.rests_after_s(own.now) / dt_s).ceil() as u32;
+            let rests = ((line.rests_after_s(own.now) + clock_s) / dt_s).ceil() as u32;
             let last = (path.ticks() + own.lag + 2).max(rests);
             self.sample_ticks(own, last, |ticks| {
                 let own_m = path.at(ticks - own.lag);
-                let offset_m = line.offset_m(own.now, f64::from(ticks) * dt_s);
+                let offset_m = line.nearest_offset_m(side, own.now, f64::from(ticks) * dt_s, clock_s);
                 let room_m = (beyond_m(offset_m) + inward.dot(&own_m)).max(0.0);
                 Sample { ticks: ticks - own.lag, normal: inward, own_m, room_m }
             });
@@ -279,7 +300,8 @@ impl BrakingFilter {
 
     /// Adds a half-plane for each condition that the candidate violates.
     fn cut<'a>(&mut self, own: &OwnMotion, candidate: &Candidate, obstacles: impl Iterator<Item = &'a ConvexShape>) {
-        let dt_s = self.params.dt_s;
+        let (params, errors) = (self.params, self.errors);
+        let dt_s = params.dt_s;
         let mut plane = |normal: Vec2, slope: Vec2, missing_m: f64| {
             // The gradient is the first-order change of the condition with the acceleration.
             let gradient = (slope + normal * (dt_s / 2.0)) * dt_s;
@@ -300,7 +322,7 @@ impl BrakingFilter {
             }
         }
         for shape in obstacles {
-            if let Some(hit) = self.params.hit(own, candidate, shape) {
+            for hit in params.hits(&errors, own, candidate, shape).into_iter().flatten() {
                 plane(hit.normal, candidate.path.pull_back_at(hit.share, hit.normal), hit.missing_m);
             }
         }
@@ -343,6 +365,7 @@ impl BrakingFilter {
 }
 
 /// The point at which a braking path comes too close to an obstacle.
+#[derive(Clone, Copy, Debug)]
 struct Hit {
     /// Unit vector away from the obstacle.
     normal: Vec2,
@@ -359,11 +382,60 @@ impl BrakingFilterParams {
         own.speed_limit_mps.min(self.speed_max_mps).max(braked)
     }
 
+    /// The distance from the outline of an obstacle that is allowed without a further look, m.
+    fn clear_m(&self) -> f64 {
+        self.clearance_m + CLEARANCE_ROUNDING_M
+    }
+
+    /// How the candidate's braking path violates the distance to an outline that is sensed with errors: in up to four ways.
+    fn hits(
+        &self,
+        errors: &SensingErrors,
+        own: &OwnMotion,
+        candidate: &Candidate,
+        shape: &ConvexShape,
+    ) -> [Option<Hit>; 4] {
+        if *errors == SensingErrors::default() {
+            return [self.hit(own, candidate, shape), None, None, None];
+        }
+        let keep_m = self.clear_m() + errors.obstacle_m;
+        let (from, to) = (own.position + candidate.path.start(), own.position + candidate.path.end());
+        let mut nearest = segment_to_core(shape, from, to);
+        if errors.partial_outlines {
+            // Only a convex set that holds the place from which the drone looks is certainly nearest to a point in view.
+            let looks = own.sensed_position;
+            let swept = [segment_to_core(shape, looks, to), segment_to_core(shape, looks, from)];
+            nearest = swept.into_iter().fold(nearest, |a, b| if b.distance_m < a.distance_m { b } else { a });
+        }
+        let distance_m = nearest.distance_m - shape.radius_m;
+        if distance_m >= keep_m {
+            return Default::default();
+        }
+        if errors.partial_outlines && own.lag > 0 {
+            return [
+                Some(Hit { normal: nearest.normal, share: nearest.share, missing_m: keep_m - distance_m }),
+                None,
+                None,
+                None,
+            ];
+        }
+        let braked = BrakingPath::new(own.position, own.velocity, self.law());
+        let near = segment_to_core(shape, braked.start(), braked.end());
+        let braked_m = near.distance_m - shape.radius_m;
+        if errors.obstacle_m > 0.0 && braked_m < keep_m {
+            let way_m = (braked.end() - braked.start()).norm();
+            let moved = [(0.0, from - braked.at(1)), (1.0, to - braked.end())];
+            return near.aside(errors.obstacle_m + way_m, moved);
+        }
+        let hit = Hit { normal: nearest.normal, share: nearest.share, missing_m: keep_m.min(braked_m) - distance_m };
+        [(hit.missing_m > MET_M).then_some(hit), None, None, None]
+    }
+
     /// The violation of the distance to `shape` by the candidate's braking path, if there is one.
     fn hit(&self, own: &OwnMotion, candidate: &Candidate, shape: &ConvexShape) -> Option<Hit> {
         let (from, to) = (own.position + candidate.path.start(), own.position + candidate.path.end());
         let nearest = segment_to_core(shape, from, to);
-        let keep_m = self.clearance_m + CLEARANCE_ROUNDING_M;
+        let keep_m = self.clear_m();
         let distance_m = nearest.distance_m - shape.radius_m;
         if distance_m >= keep_m {
             return None;
@@ -384,6 +456,24 @@ struct Nearest {
     normal: Vec2,
     /// Position on the segment, 0 at its start to 1 at its end.
     share: f64,
+}
+
+impl Nearest {
+    /// The outline is nearer than it can be, or full braking leads too near. Only ways that lead away from it, wherever it is within
+    /// `error_m` of the braking path, are allowed. Returns the ways that do not. `moved`: two shares of the path, and by how much
+    /// the path moves there, m.
+    fn aside(&self, error_m: f64, moved: [(f64, Vec2); 2]) -> [Option<Hit>; 4] {
+        let sin = if self.distance_m > 0.0 { error_m / self.distance_m } else { 1.0 };
+        let cos = (1.0 - sin * sin).max(0.0).sqrt();
+        let across = Vec2::new(-self.normal.y, self.normal.x) * sin.min(1.0);
+        let limits = [self.normal * cos + across, self.normal * cos - across];
+        let hit = |normal: Vec2, (share, by): (f64, Vec2)| {
+            let missing_m = if sin < 1.0 { -normal.dot(&by) } else { by.norm() };
+            (missing_m > MET_M).then_some(Hit { normal, share, missing_m })
+        };
+        let [begin, end] = moved;
+        [hit(limits[0], begin), hit(limits[1], begin), hit(limits[0], end), hit(limits[1], end)]
+    }
 }
 
 /// Distance between a segment and the core of a shape, m. Negative if the segment enters the core.

@@ -33,6 +33,12 @@ pub struct Escape {
 }
 
 impl Escape {
+    /// Number of attempts since the drone was last free.
+    #[must_use]
+    pub fn attempts(&self) -> usize {
+        self.attempts
+    }
+
     /// Returns the velocity to fly, world frame, m/s. This is `wanted` unless the drone has been stuck for `patience_s`. Then
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `velocity` and `wanted`: world frame, m/s.
     pub fn steer(&mut self, now: SimTime, velocity: Vec2, wanted: Vec2, patience_s: f64, speed_mps: f64) -> Vec2 {

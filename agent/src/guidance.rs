@@ -60,6 +60,9 @@ mod tests {
         };
         assert_eq!(anchor(&plan, SimTime::from_secs(2.0)), (Vec2::new(20.0, 1.0), Vec2::new(10.0, 0.0)));
         assert_eq!(anchor(&plan, SimTime::from_secs(9.0)), (Vec2::new(50.0, 1.0), Vec2::zeros()));
+        let aslant = Plan { anchor_mps: [8.0, 6.0], ..plan };
+        assert_eq!(anchor(&aslant, SimTime::from_secs(2.0)), (Vec2::new(18.0, 7.0), Vec2::new(8.0, 6.0)));
+        assert_eq!(anchor(&aslant, SimTime::from_secs(99.0)), (Vec2::new(50.0, 31.0), Vec2::zeros()), "after 5 s");
         let still = Plan { anchor_mps: [0.0; 2], anchor_m: [80.0, 0.0], ..plan };
         assert_eq!(anchor(&still, SimTime::from_secs(9.0)), (Vec2::new(80.0, 0.0), Vec2::zeros()));
     }

@@ -64,6 +64,8 @@ pub struct Navigator {
     path: Option<Path>,
     /// After a search without a result: the tick from which the next search is allowed.
     retry_at: u64,
+    /// How often the obstacles had changed when they were learnt.
+    changes: usize,
 }
 
 impl Navigator {
@@ -74,16 +76,19 @@ impl Navigator {
         Self {
             wide: VisibilityMap::new(planning_m),
             tight: VisibilityMap::new(clearance_m + TIGHT_M),
+            changes: 0,
             path: None,
             retry_at: 0,
         }
     }
 
-    /// Replaces the known obstacles by `shapes` (world frame) if `count`, their number, has changed. Returns whether it has.
-    pub fn learn<'a>(&mut self, count: usize, shapes: impl Iterator<Item = &'a ConvexShape>) -> bool {
-        if count == self.tight.len() {
+    /// Replaces the known obstacles by `shapes` (world frame) if `changes`, how often they have changed, is another number than
+    /// before. Returns whether it is.
+    pub fn learn<'a>(&mut self, changes: usize, shapes: impl Iterator<Item = &'a ConvexShape>) -> bool {
+        if changes == self.changes {
             return false;
         }
+        self.changes = changes;
         self.wide.clear();
         self.tight.clear();
         for shape in shapes {

@@ -7,11 +7,13 @@ use crate::neighbour_table::NeighbourParams;
 use crate::queue::QueueParams;
 use crate::rollout::RolloutParams;
 use crate::safety::SafetyParams;
+use crate::sensing_errors::SensingErrors;
 use crate::separation::SeparationParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
 use skein_protocol::{DroneId, SimTime, Vec2};
+use std::iter;
 use std::sync::Arc;
 
 /// Parameters of a [`crate::SwarmPilot`].
@@ -39,11 +41,13 @@ pub struct PilotParams {
     pub detection_range_m: f64,
     /// Greatest speed, m/s.
     pub speed_max_mps: f64,
-    /// Whether it has a sensor that ranges neighbours.
-    pub ranging: bool,
     /// Greatest distance at which a drone senses its neighbours, m, if it does.
     pub ranging_m: f64,
-    /// Where each drone starts, world frame, m. A drone that senses no neighbours keeps its first distances by it.
+    /// Whether distances between drones are kept by messages: nothing that the drone ranges is needed for them.
+    pub apart_by_words: bool,
+    /// Bounds on the errors of what it senses.
+    pub sensing: SensingErrors,
+    /// Where each drone starts, world frame, m. A drone whose distances are kept by messages keeps its first distances by it.
     pub starts_m: Arc<[Vec2]>,
     /// Stopping distances.
     pub braking: Braking,
@@ -125,8 +129,10 @@ impl PilotParams {
     #[must_use]
     pub fn speed_on_sight_mps(&self, lag: u32) -> f64 {
         let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
-        let obstacles_mps = filter.speed_within_mps(self.detection_range_m - self.safety.clearance_m, lag);
-        if !self.ranging || self.drones < 2 {
+        // An outline may seem farther away than it is.
+        let sight_m = self.detection_range_m - self.sensing.obstacle_m;
+        let obstacles_mps = filter.speed_within_mps(sight_m - self.safety.clearance_m, lag);
+        if self.apart_by_words || self.drones < 2 {
             return obstacles_mps;
         }
         let room_m = self.ranging_m - self.safety.safe_distance_m - filter.margin_m();
@@ -138,27 +144,34 @@ impl PilotParams {
     #[must_use]
     pub fn separation_kept_m(&self) -> f64 {
         let filter = BrakingFilterParams { dt_s: self.tick_s, ..self.braking_filter() };
-        filter.keep_m().max(self.safety.keep_m(self.braking.reaction_time_s))
+        let errors_m = if self.apart_by_words { 2.0 * self.sensing.position_m } else { 0.0 };
+        (filter.keep_m() + errors_m).max(self.safety.keep_m(self.braking.reaction_time_s))
     }
 
-    /// The parameters of the lines that keep drones apart; `None` if drones sense each other.
-    pub(crate) fn separation(&self) -> Option<SeparationParams> {
-        (!self.ranging).then(|| SeparationParams {
+    /// The parameters of the lines that keep drones apart.
+    pub(crate) fn separation(&self) -> SeparationParams {
+        // Without lines from the start on, only the number of drones counts.
+        let starts_m = if self.apart_by_words {
+            Arc::clone(&self.starts_m)
+        } else {
+            iter::repeat_n(Vec2::zeros(), self.drones as usize).collect()
+        };
+        SeparationParams {
             me: self.me,
             incarnation: self.incarnation,
-            starts_m: Arc::clone(&self.starts_m),
+            starts_m,
             start_velocity: Vec2::new(self.guidance.speed_mps, 0.0),
-            keep_m: self.braking_filter().keep_m(),
+            keep_m: self.braking_filter().keep_m() + 2.0 * self.sensing.position_m,
             braking_mps2: self.safety.braking_mps2,
             period_s: self.separation_period_s,
             dt_s: self.dt_s,
-        })
+        }
     }
 
     pub(crate) fn neighbours(&self) -> NeighbourParams {
         NeighbourParams {
             safe_distance_m: self.safety.safe_distance_m,
-            ranging_m: self.ranging.then_some(self.ranging_m),
+            ranging_m: (!self.apart_by_words).then_some(self.ranging_m),
             precedence_share: self.precedence_share,
         }
     }

@@ -2,7 +2,7 @@
 
 use skein_leader::peers::Peers;
 use skein_protocol::SimTime;
-use skein_protocol::payload::{MAX_PLACES, Pose, QueuePlace};
+use skein_protocol::payload::{Pose, QueuePlace};
 
 /// A drone ahead in a queue, as far as this drone knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,26 +38,25 @@ pub fn queue_speed(queue: &[Ahead], remaining_m: f64, params: &QueueParams) -> f
     (remaining_m / mine).clamp(speed_mps - speed_change_mps, speed_mps)
 }
 
-/// What the last beacon of a peer says about queues. All peers are looked at in each tick, so this is kept apart from the
-/// rest of their beacons.
+/// What the last beacon of a peer says about a queue that this drone is in as well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Queued {
+    /// The peer's index of [`Peers::stamps`].
+    peer: u32,
     stamp: SimTime,
     speed_mps: f64,
-    places: [QueuePlace; MAX_PLACES],
-}
-
-impl Queued {
-    fn of(pose: &Pose) -> Self {
-        Self { stamp: pose.stamp, speed_mps: pose.velocity().norm(), places: pose.queue }
-    }
+    place: QueuePlace,
 }
 
 /// Finds the speed of a drone that stands in one or several queues.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct QueuePacer {
-    /// Of each peer ever heard, by id.
-    peers: Vec<Queued>,
+    /// This drone's places when it looked last.
+    mine: Vec<QueuePlace>,
+    /// The time stamp of the last beacon of each peer that was looked at, by id.
+    stamps: Vec<SimTime>,
+    /// The places of peers before one of `mine`, by peer. All other places are of no interest, so they are not kept.
+    before: Vec<Queued>,
     /// Memory for the queue that is looked at.
     ahead: Vec<Ahead>,
 }
@@ -66,51 +65,78 @@ impl QueuePacer {
     /// The lowest speed that one of the queues asks for, m/s; the nominal speed if there is none.
     pub(crate) fn speed_mps(
         &mut self,
-        places: impl Iterator<Item = QueuePlace>,
+        places: impl Iterator<Item = QueuePlace> + Clone,
         peers: &Peers,
         now: SimTime,
         params: &QueueParams,
     ) -> f64 {
-        let (mut speed, mut is_current) = (params.speed_mps, false);
+        self.follow(places.clone(), peers);
+        let mut speed = params.speed_mps;
         for place in places {
-            if !std::mem::replace(&mut is_current, true) {
-                self.follow(peers);
-            }
             self.collect_ahead(place, peers, now);
             speed = speed.min(queue_speed(&self.ahead, place.remaining_m, params));
         }
         speed
     }
 
-    /// Takes over the beacons that are new.
-    fn follow(&mut self, peers: &Peers) {
-        let stamps = peers.stamps();
-        if self.peers.len() != stamps.len() {
-            self.peers.clear();
-            self.peers.extend(peers.all().map(|(_, pose)| Queued::of(pose)));
+    /// Whether no living drone before this place has still to reach the gate, as far as it was heard in [`Self::speed_mps`].
+    pub(crate) fn is_first(&mut self, place: QueuePlace, peers: &Peers, now: SimTime) -> bool {
+        self.collect_ahead(place, peers, now);
+        self.ahead.iter().all(|one| one.remaining_m <= 0.0)
+    }
+
+    /// Takes over the beacons that are new, and all of them if the places of this drone or the peers are others.
+    fn follow(&mut self, places: impl Iterator<Item = QueuePlace> + Clone, peers: &Peers) {
+        let key = |place: &QueuePlace| (place.set, place.route, place.rank);
+        if !places.clone().map(|place| key(&place)).eq(self.mine.iter().map(key)) {
+            self.mine.clear();
+            self.mine.extend(places);
+            self.stamps.clear();
         }
-        for (index, (known, &stamp)) in self.peers.iter_mut().zip(stamps).enumerate() {
-            if known.stamp != stamp {
-                *known = Queued::of(peers.at(index).1);
+        if self.mine.is_empty() {
+            return;
+        }
+        if self.stamps.len() != peers.stamps().len() {
+            self.stamps.clear();
+            self.stamps.resize(peers.stamps().len(), SimTime::MAX);
+            self.before.clear();
+        }
+        for (index, &stamp) in peers.stamps().iter().enumerate() {
+            if std::mem::replace(&mut self.stamps[index], stamp) != stamp {
+                self.note(index as u32, peers.at(index).1);
             }
         }
+    }
+
+    /// Notes the places of a peer that are before one of this drone's.
+    fn note(&mut self, peer: u32, pose: &Pose) {
+        let mine = &self.mine;
+        let is_before = |place: &&QueuePlace| mine.iter().any(|own| is_ahead(place, own));
+        let (stamp, speed_mps) = (pose.stamp, pose.velocity().norm());
+        let news = pose.queue.iter().filter(is_before).map(|&place| Queued { peer, stamp, speed_mps, place });
+        let from = self.before.partition_point(|known| known.peer < peer);
+        let known = self.before[from..].iter().take_while(|known| known.peer == peer).count();
+        self.before.splice(from..from + known, news);
     }
 
     /// Collects the living peers with a place before `mine` on the same route of the same set, sorted by rank. The remaining
     /// path in a beacon is shortened by what the peer has flown since it sent the beacon.
     fn collect_ahead(&mut self, mine: QueuePlace, peers: &Peers, now: SimTime) {
         self.ahead.clear();
-        let is_ahead = |p: &&QueuePlace| p.set == mine.set && p.route == mine.route && p.rank < mine.rank;
-        for (index, known) in self.peers.iter().enumerate() {
-            for place in known.places.iter().filter(is_ahead) {
-                if peers.is_living_at(index, now) {
-                    let flown_m = known.speed_mps * now.since(known.stamp);
-                    self.ahead.push(Ahead { rank: place.rank, remaining_m: place.remaining_m - flown_m });
-                }
+        for known in self.before.iter().filter(|known| is_ahead(&known.place, &mine)) {
+            if peers.is_living_at(known.peer as usize, now) {
+                let flown_m = known.speed_mps * now.since(known.stamp);
+                let remaining_m = known.place.remaining_m - flown_m;
+                self.ahead.push(Ahead { rank: known.place.rank, remaining_m });
             }
         }
         self.ahead.sort_unstable_by(|a, b| a.rank.cmp(&b.rank).then(a.remaining_m.total_cmp(&b.remaining_m)));
     }
+}
+
+/// Whether a place is before another one on the same route of the same set.
+fn is_ahead(place: &QueuePlace, mine: &QueuePlace) -> bool {
+    place.set == mine.set && place.route == mine.route && place.rank < mine.rank
 }
 
 #[cfg(test)]
@@ -166,6 +192,25 @@ mod tests {
         assert_eq!(queue(&peers), [ahead(0, 100.0), ahead(3, 100.0)]);
         hear(&mut peers, 5, 10.0, [place(1, 4), none]);
         assert_eq!(queue(&peers).len(), 3);
+    }
+
+    #[test]
+    fn a_drone_is_first_once_all_before_it_are_past_the_gate_or_have_given_up() {
+        let now = SimTime::from_secs(10.0);
+        let place = |remaining_m, rank| QueuePlace { remaining_m, set: 7, route: 1, rank };
+        let mut peers = Peers::new(4, 1.0);
+        let (mut pacer, mut heard_s) = (QueuePacer::default(), 9.0);
+        let mut is_first_with = |theirs| {
+            heard_s += 0.1;
+            let stamp = SimTime::from_secs(heard_s);
+            peers.hear(stamp, DroneId(0), Pose { stamp, queue: [theirs, QueuePlace::default()], ..Pose::zeroed() });
+            pacer.speed_mps([place(80.0, 3)].into_iter(), &peers, now, &PARAMS);
+            pacer.is_first(place(80.0, 3), &peers, now)
+        };
+        assert!(!is_first_with(place(30.0, 2)));
+        assert!(is_first_with(place(-5.0, 2)));
+        assert!(!is_first_with(place(30.0, 0)));
+        assert!(is_first_with(place(30.0, QueuePlace::NO_RANK)));
     }
 
     #[test]

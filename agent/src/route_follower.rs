@@ -26,9 +26,12 @@ struct DrawnFor {
     stamp: PlanStamp,
     emergency: bool,
     legs_left: usize,
+    /// How often outlines have grown.
+    redrawn: usize,
 }
 
-/// A route taken instead of the assigned one, because an obstacle abreast or a body in the gap blocks that one.
+/// A route taken instead of the assigned one, because an obstacle abreast or a body in the gap blocks that one. It is the assigned one
+/// itself if the drone has only given up its place in the queue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Detour {
     set: u32,
@@ -87,6 +90,16 @@ impl RouteFollower {
         self.emergency = Some(route);
     }
 
+    /// Gives up the place in the queue of the first set that the drone has still to leave. It keeps its route, and flies behind all
+    /// others until a new plan gives it a place.
+    pub fn give_up_place(&mut self) {
+        let Some(leg) = self.legs.iter_mut().find(|leg| leg.open) else { return };
+        if leg.place.rank != QueuePlace::NO_RANK {
+            leg.place.rank = QueuePlace::NO_RANK;
+            self.detours.push(Detour { set: leg.place.set, route: usize::from(leg.place.route) });
+        }
+    }
+
     /// Follows the ledger: accepts new assignments, closes the legs that the drone has left, and evades `bodies`, silent
     /// drones that hover. `position`: the drone's, world frame, m.
     pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) {
@@ -113,7 +126,7 @@ impl RouteFollower {
 
     fn drawing_key(&self, ledger: &Ledger, position: Vec2) -> DrawnFor {
         let legs_left = self.legs.iter().filter(|leg| position.x >= leg.exit_x_m).count();
-        DrawnFor { stamp: ledger.stamp(), emergency: self.emergency.is_some(), legs_left }
+        DrawnFor { stamp: ledger.stamp(), emergency: self.emergency.is_some(), legs_left, redrawn: ledger.redrawn() }
     }
 
     /// The route that the drone flies past a set, and its place in the queue.

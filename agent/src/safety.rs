@@ -72,6 +72,16 @@ impl NearObstacle {
         Self { nearest_m: to_core * (distance_m / to_core.norm().max(1e-9)), distance_m }
     }
 
+    /// The same obstacle, if it is `error_m` nearer than it seems, m.
+    #[must_use]
+    pub fn nearer_by(self, error_m: f64) -> Self {
+        let distance_m = self.distance_m - error_m;
+        if error_m == 0.0 || self.distance_m == 0.0 {
+            return self;
+        }
+        Self { nearest_m: self.nearest_m * (distance_m / self.distance_m), distance_m }
+    }
+
     /// Unit vector from the obstacle to the drone.
     fn normal(&self) -> Vec2 {
         let away = -self.nearest_m / self.distance_m.abs().max(1e-9);

@@ -11,7 +11,7 @@ use separating_line::{SeparatingLine, Side};
 use separation_pair::{NumberedLine, SeparationPair, Statement};
 use skein_leader::peers::Peers;
 use skein_protocol::payload::{MAX_SEPARATORS, Pose, Separation, Separator};
-use skein_protocol::{DroneId, Message, SimTime, Vec2};
+use skein_protocol::{DroneId, Message, SimTime, Vec2, raised};
 use std::sync::Arc;
 
 /// Greatest number of messages in which a drone states its lines at one time. A larger swarm states the lines of near pairs more
@@ -71,12 +71,30 @@ struct Known {
     said: SimTime,
     /// When the line last changed.
     changed: SimTime,
+    /// What this drone ranges of the other one in this tick.
+    seen: Option<Sighting>,
+    /// Whether this drone is bound to a line to which it has heard the other one to be bound. The two have a common line then, and
+    /// from then on.
+    agreed: bool,
+    /// Whether this drone makes a first line if there is none.
+    opens: bool,
+}
+
+/// What a drone ranges of another one, world frame. It may be wrong in any way: it helps to place lines well, and nothing else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting {
+    /// Position, m.
+    pub position: Vec2,
+    /// Velocity, m/s.
+    pub velocity: Vec2,
 }
 
 /// The lines between one drone and all others.
 #[derive(Clone, Debug)]
 pub struct Separations {
     params: SeparationParams,
+    /// Whether what the drones range of each other keeps them apart where there is no line.
+    ranges: bool,
     known: Vec<Known>,
     /// Order in which lines are stated: scratch memory.
     order: Vec<(f64, usize)>,
@@ -86,17 +104,62 @@ impl Separations {
     /// The lines at the start, which follow from where the drones start. A restarted drone knows no lines.
     #[must_use]
     pub fn new(params: SeparationParams, now: SimTime) -> Self {
-        let me = params.me;
-        let others = (0..params.starts_m.len() as u32).map(DroneId).filter(|&peer| peer != me);
-        let known = others.map(|peer| {
-            let side = if me < peer { Side::Front } else { Side::Back };
-            let pair = match params.incarnation {
+        let (me, incarnation) = (params.me, params.incarnation);
+        let known = params.others().map(|peer| {
+            let side = side_of(me, peer);
+            let pair = match incarnation {
                 0 | 1 => SeparationPair::new(side, params.first_line(me.min(peer), me.max(peer))),
-                incarnation => SeparationPair::restarted(side, incarnation),
+                _ => SeparationPair::restarted(side, incarnation),
             };
-            Known { pair, peer, heard: None, said: SimTime::ZERO, changed: now }
+            Known {
+                pair,
+                peer,
+                heard: None,
+                said: SimTime::ZERO,
+                changed: now,
+                seen: None,
+                agreed: incarnation < 2,
+                opens: false,
+            }
         });
-        Self { known: known.collect(), params, order: Vec::new() }
+        Self { known: known.collect(), params, ranges: false, order: Vec::new() }
+    }
+
+    /// No lines: so far, what the drones range of each other keeps them apart.
+    #[must_use]
+    pub fn unbound(params: SeparationParams, now: SimTime) -> Self {
+        let (me, incarnation) = (params.me, params.incarnation);
+        let known = params.others().map(|peer| {
+            let pair = SeparationPair::restarted(side_of(me, peer), incarnation);
+            Known {
+                pair,
+                peer,
+                heard: None,
+                said: SimTime::ZERO,
+                changed: now,
+                seen: None,
+                agreed: false,
+                opens: false,
+            }
+        });
+        Self { known: known.collect(), params, ranges: true, order: Vec::new() }
+    }
+
+    /// From now on, makes a first line with every other drone with which there is none.
+    pub fn open_all(&mut self) {
+        self.known.iter_mut().for_each(|known| known.opens = true);
+    }
+
+    /// Whether this drone and another one have a common line, as far as this drone knows.
+    #[must_use]
+    pub fn has_agreed(&self, peer: DroneId) -> bool {
+        self.known.get(self.place(peer)).is_some_and(|known| known.peer == peer && known.agreed)
+    }
+
+    /// Whether this drone knows that it has a common line with every other drone.
+    #[must_use]
+    pub fn has_agreed_with_all(&self) -> bool {
+        self.known.iter().all(|known| known.agreed)
     }
 
     /// Whether there is another drone of which no line is known. Such a drone has been restarted; it hovers.
@@ -115,6 +178,7 @@ impl Separations {
     /// Hears the lines of another drone. `path`: this drone's path with full braking from now on.
     pub fn hear(&mut self, source: DroneId, separation: &Separation, path: &OwnPath) {
         let (me, half_m) = (self.params.me, self.params.keep_m / 2.0);
+        let ranges = self.ranges;
         let Some(known) = self.find(source) else { return };
         for separator in separation.separators().iter().filter(|s| s.peer == me) {
             let heard = statement(separator);
@@ -128,6 +192,8 @@ impl Separations {
             }
             let side = known.pair.side();
             known.pair.hear(&heard, |line| path.distance_m(line, side) >= half_m);
+            known.agreed |= known.pair.is_bound_to(heard.bound_to.number);
+            known.opens |= ranges;
         }
     }
 
@@ -138,11 +204,22 @@ impl Separations {
         }
     }
 
+    /// Notes what this drone ranges of another one in this tick.
+    pub fn see(&mut self, peer: DroneId, sighting: Sighting) {
+        if let Some(known) = self.find(peer) {
+            known.seen = Some(sighting);
+        }
+    }
+
     /// Makes new lines and states them, if that is due. Call once per tick, before the command of the tick is computed.
     pub fn speak(&mut self, peers: &Peers, path: &OwnPath, say: &mut Vec<Message>) {
-        if !self.params.is_due(path.tick()) {
-            return;
+        if self.params.is_due(path.tick()) {
+            self.state(peers, path, say);
         }
+        self.known.iter_mut().for_each(|known| known.seen = None);
+    }
+
+    fn state(&mut self, peers: &Peers, path: &OwnPath, say: &mut Vec<Message>) {
         let now = path.now();
         self.order.clear();
         for (index, known) in self.known.iter().enumerate() {
@@ -157,16 +234,30 @@ impl Separations {
             let known = &mut self.known[index];
             known.said = now;
             if let Some(pose) = peers.last(known.peer) {
-                self.params.propose(known, pose, peers.delay_s(), path);
+                let pose = known.seen.map_or(*pose, |seen| seen.at(now, pose));
+                self.params.propose(known, &pose, peers.delay_s(), path);
             }
             separators.extend(known.pair.statement().map(|said| separator(known.peer, &said)));
         }
         say.extend(separators.chunks(MAX_SEPARATORS).map(message));
     }
 
+    /// The index of what is known of another drone.
+    fn place(&self, peer: DroneId) -> usize {
+        peer.index() - usize::from(peer > self.params.me)
+    }
+
     fn find(&mut self, peer: DroneId) -> Option<&mut Known> {
-        let index = peer.index() - usize::from(peer > self.params.me);
-        self.known.get_mut(index).filter(|known| known.peer == peer)
+        let place = self.place(peer);
+        self.known.get_mut(place).filter(|known| known.peer == peer)
+    }
+}
+
+impl Sighting {
+    /// The beacon that the other drone would send now.
+    fn at(&self, now: SimTime, last: &Pose) -> Pose {
+        let (position_m, velocity_mps) = (raised(self.position, 0.0), raised(self.velocity, 0.0));
+        Pose { stamp: now, position_m, velocity_mps, ..*last }
     }
 }
 
@@ -202,7 +293,18 @@ struct Stop {
     velocity: Vec2,
 }
 
+/// The side of drone `me` of its lines with another one.
+fn side_of(me: DroneId, peer: DroneId) -> Side {
+    if me < peer { Side::Front } else { Side::Back }
+}
+
 impl SeparationParams {
+    /// All drones but this one.
+    fn others(&self) -> impl Iterator<Item = DroneId> + use<> {
+        let me = self.me;
+        (0..self.starts_m.len() as u32).map(DroneId).filter(move |&peer| peer != me)
+    }
+
     /// Whether a statement is due. Those of different drones fall into different ticks.
     fn is_due(&self, tick: u64) -> bool {
         let period = ((self.period_s / self.dt_s).round() as u64).max(1);
@@ -228,10 +330,18 @@ impl SeparationParams {
         let now = path.now();
         let age_s = now.since(pose.stamp).max(0.0);
         let late_s = age_s.max(delay_s);
-        let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else { return };
         let peer = self.peer_stop(known, pose, age_s);
         let own = Stop { at: path.end(), velocity: path.velocity() };
         let Some(towards_me) = (own.at - peer.at).try_normalize(1e-9) else { return };
+        let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
+            let side = known.pair.side();
+            let between = SeparatingLine::resting(now, towards_me * side.sign(), 0.0);
+            let first = if known.opens { self.line(&between, side, &own, &peer, late_s, path) } else { None };
+            if first.is_some_and(|line| known.pair.open(line)) {
+                known.changed = now;
+            }
+            return;
+        };
         let side = known.pair.side();
         let along_mps = towards_me.dot(&(own.velocity + peer.velocity)) / 2.0;
         let ahead = along_mps > ABREAST_MPS || (along_mps >= -ABREAST_MPS && side == Side::Front);
@@ -242,7 +352,7 @@ impl SeparationParams {
         let Some(line) = self.line(&stated.line, side, &own, &peer, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
-        if (turned || shifted_m >= SHIFT_M) && known.pair.propose(line, now) {
+        if (turned || shifted_m >= SHIFT_M) && known.pair.propose(line, path.earliest()) {
             known.changed = now;
         }
     }

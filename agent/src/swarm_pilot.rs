@@ -11,13 +11,15 @@ use crate::lone_flight::LoneFlight;
 use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
+use crate::peer_clocks::{PeerClocks, Restamped};
 use crate::queue::QueuePacer;
 use crate::reaction::ReactionDelay;
 use crate::rollout::{Rollout, RolloutDrone, RolloutInput, RolloutPilot};
 use crate::route_follower::RouteFollower;
-use crate::safety::{NearObstacle, Safety};
-use crate::separation::Separations;
+use crate::safety::{NearObstacle, Neighbour, Safety};
+use crate::sensing_errors::SensingErrors;
 use crate::separation::own_path::OwnPath;
+use crate::separation::{Separations, Sighting};
 use crate::silent_drones::SilentDrones;
 use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
@@ -34,6 +36,7 @@ use skein_leader::own_state::OwnState;
 use skein_leader::params::{Objective, Strategy};
 use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
+use skein_leader::set_place::SetPlace;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Plan, QueuePlace, set_tag};
@@ -64,7 +67,9 @@ pub struct SwarmPilot {
     lone_flight: LoneFlight,
     silent: SilentDrones,
     neighbours: NeighbourTable,
-    /// The lines that separate it from the others, if it senses no neighbours. Boxed, because most drones do.
+    clocks: PeerClocks,
+    /// The lines that separate it from the others, if distances are kept by words, or if a drone could not range the others for a
+    /// while. Boxed, because most drones have none.
     separations: Option<Box<Separations>>,
     /// Boxed: only a leader that looks ahead has one, and the others would carry the memory for it through every tick.
     rollout: Option<Box<Rollout<Self>>>,
@@ -84,9 +89,12 @@ impl SwarmPilot {
             route: RouteFollower::new(params.me, params.planner.course_y_m),
             queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
-            braking_filter: BrakingFilter::new(params.braking_filter()),
+            braking_filter: BrakingFilter::new(params.braking_filter()).with_errors(params.sensing),
             altitude: Altitude::new(params.altitude_m, params.planner.routes.planning_distance_m),
-            navigator: Navigator::new(params.safety.clearance_m, params.planner.routes.planning_distance_m),
+            navigator: Navigator::new(
+                params.safety.clearance_m + params.sensing.obstacle_m,
+                params.planner.routes.planning_distance_m,
+            ),
             detour_to: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             stepped: None,
@@ -97,13 +105,14 @@ impl SwarmPilot {
             lone_flight: LoneFlight::new(params.drones, &params.planner),
             silent: SilentDrones::default(),
             neighbours: NeighbourTable::new(params.neighbours()),
-            separations: params.separation().map(|lines| Box::new(Separations::new(lines, params.start))),
+            clocks: PeerClocks::new(params.sensing.clock_s),
+            separations: params.apart_by_words.then(|| Box::new(Separations::new(params.separation(), params.start))),
             rollout: None,
             params,
         }
     }
 
-    /// Algorithm 2: notes every obstacle in detection range, with its whole shape.
+    /// Algorithm 2: notes every obstacle in detection range, with what is sensed of its outline.
     fn sense(&mut self, senses: &Senses<'_>) {
         for shape in senses.obstacles.iter().filter_map(|entry| senses.shape(entry)) {
             self.leading.sense(senses.now, shape.id, shape.shape);
@@ -199,8 +208,9 @@ impl SwarmPilot {
         params.beacon_period_s = dt_s.max(self.params.beacon_period_s);
         // A simulated leader does not look ahead itself.
         params.planner.strategy = Strategy::PaperRule;
-        // Simulated drones sense each other.
-        params.ranging = true;
+        // Simulated drones sense each other, and without error.
+        params.apart_by_words = false;
+        params.sensing = SensingErrors::default();
         let leading = self.leading.rollout_member(&params.leading(), now, ledger.of_member(me));
         Self::with_leading(params, leading)
     }
@@ -310,7 +320,15 @@ impl SwarmPilot {
     /// Gives the navigator the obstacles that are known by now; true if there are new ones.
     fn update_map(&mut self) -> bool {
         let known = self.leading.obstacles();
-        self.navigator.learn(known.count(), known.iter().map(|(_, known)| &known.shape))
+        self.navigator.learn(known.changes(), known.iter().map(|(_, known)| &known.shape))
+    }
+
+    /// A drone that cannot move would hold up the queue if it stayed first.
+    fn give_up_first_place(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) {
+        let first = open.iter().copied().find(|place| place.set != 0);
+        if first.is_some_and(|place| self.queue.is_first(place, self.leading.peers(), now)) {
+            self.route.give_up_place();
+        }
     }
 
     fn queue_speed_mps(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) -> f64 {
@@ -324,16 +342,26 @@ impl SwarmPilot {
     /// The safe acceleration nearest to the one that leads to the wanted velocity, m/s².
     fn safe_acceleration(&mut self, wanted: Vec2, now: &Senses<'_>, senses: &Senses<'_>) -> Vec2 {
         let gain = self.params.velocity_gain_per_s;
+        let error_m = self.obstacle_error_m(senses);
         let obstacles = senses
             .obstacles
             .iter()
             .map(|o| NearObstacle { nearest_m: o.nearest() - senses.position(), distance_m: o.distance_m })
-            .chain(remembered(&self.leading, senses).map(|(_, near)| near));
-        // Drones that sense no neighbours keep to the lines between them instead.
-        let neighbours = self.neighbours.iter().filter(|_| self.separations.is_none());
+            .chain(remembered(&self.leading, senses).map(|(_, near)| near))
+            .map(|near| near.nearer_by(error_m));
+        // Drones that keep apart by words keep to the lines between them instead of fleeing from where an old beacon was.
+        let words = self.separations.as_deref();
+        let by_words = |n: &Neighbour| !n.sensed && words.is_some_and(|lines| lines.has_agreed(n.id));
+        let neighbours = self.neighbours.iter().filter(|n| !self.params.apart_by_words && !by_words(n));
         let wanted = (wanted - senses.velocity()) * gain;
         let smooth = self.safety.filter(wanted, senses.velocity(), obstacles, neighbours);
         self.keep_braking_path(smooth, now, senses)
+    }
+
+    /// How far the outlines that the drone keeps clear of may be displaced, m.
+    fn obstacle_error_m(&self, senses: &Senses<'_>) -> f64 {
+        let sensing = &self.params.sensing;
+        if senses.broken.obstacles { sensing.remembered_obstacle_m() } else { sensing.obstacle_m }
     }
 
     /// The acceleration nearest to `wanted` that the safety rule allows, m/s².
@@ -353,18 +381,25 @@ impl SwarmPilot {
         let remembered = remembered(&self.leading, then).map(|(shape, near)| (shape, near.distance_m));
         let sensed = then.obstacles.iter().filter_map(|o| Some((&then.shape(o)?.shape, o.distance_m)));
         let obstacles = sensed.chain(remembered);
-        let neighbours = now.neighbours.iter().map(|n| Moving {
+        let separations = self.separations.as_deref();
+        let ranged = if self.params.apart_by_words { &[] } else { now.neighbours };
+        // A drone that commands late and ranges cannot follow one that keeps to a line by words.
+        let by_words = |drone| lag > 0 && separations.is_some_and(|lines| lines.has_agreed(drone));
+        let neighbours = ranged.iter().filter(|n| !by_words(n.drone)).map(|n| Moving {
             id: n.drone,
             position_m: n.position(),
             velocity_mps: n.velocity() + now.velocity(),
         });
-        let wanted = match &self.separations {
-            Some(separations) if separations.must_hover() => {
-                self.braking_filter.params().law().braking(then.velocity())
-            }
-            _ => wanted,
-        };
-        let lines = self.separations.iter().flat_map(|separations| separations.lines());
+        let alone = separations.is_some_and(|lines| match self.params.apart_by_words {
+            true => lines.must_hover(),
+            false => now.broken.ranging && !lines.has_agreed_with_all(),
+        });
+        // What a drone remembers of an outline may be a part of it.
+        let hovers = alone || (now.broken.obstacles && self.params.sensing.partial_outlines);
+        let wanted = if hovers { self.braking_filter.params().law().braking(then.velocity()) } else { wanted };
+        let error_m = self.obstacle_error_m(now);
+        self.braking_filter.set_obstacle_error_m(error_m);
+        let lines = separations.into_iter().flat_map(|separations| separations.lines());
         self.braking_filter.filter(&own, wanted, obstacles, neighbours, lines)
     }
 
@@ -381,7 +416,11 @@ impl SwarmPilot {
         let wanted = self.wanted_velocity(&then, open);
         let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
+        let attempts = self.escape.attempts();
         let wanted = self.escape.steer(then.now, then.velocity(), wanted, patience_s, slow_mps);
+        if self.escape.attempts() > attempts {
+            self.give_up_first_place(senses.now, open);
+        }
         self.neighbours.update(&NeighbourView {
             now: senses.now,
             senses: &then,
@@ -401,7 +440,8 @@ impl SwarmPilot {
         let given = iter::once(position).chain(pending).collect();
         let velocity = self.reaction.pending_motion(velocity).velocity;
         let filter = self.braking_filter.params();
-        OwnPath::new((senses.tick, senses.now), given, velocity, filter.law(), filter.stride())
+        let path = OwnPath::new((senses.tick, senses.now), given, velocity, filter.law(), filter.stride());
+        path.with_clock_error(self.params.sensing.clock_s)
     }
 
     /// After ticks without a step, and after a restart, the drone has been braked by its failsafe. Its pending commands are void.
@@ -416,6 +456,27 @@ impl SwarmPilot {
         }
     }
 
+    /// A drone that cannot range the others, and one that such a drone speaks to, keep apart by lines from now on.
+    fn open_words(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>) {
+        if self.params.apart_by_words || self.params.drones < 2 {
+            return;
+        }
+        let me = self.params.me;
+        let spoken_to = |message: MessageRef<'_>| match message {
+            MessageRef::Separation(lines) => lines.separators().iter().any(|line| line.peer == me),
+            _ => false,
+        };
+        let blind = senses.broken.ranging;
+        if blind || (self.separations.is_none() && inbox.heard().iter().any(|heard| spoken_to(heard.message))) {
+            let params = &self.params;
+            let unbound = || Box::new(Separations::unbound(params.separation(), senses.now));
+            let separations = self.separations.get_or_insert_with(unbound);
+            if blind {
+                separations.open_all();
+            }
+        }
+    }
+
     fn hear_separation(&mut self, source: DroneId, message: MessageRef<'_>, path: Option<&OwnPath>) {
         let (Some(separations), Some(path)) = (&mut self.separations, path) else { return };
         match message {
@@ -425,8 +486,13 @@ impl SwarmPilot {
         }
     }
 
-    fn speak_separation(&mut self, path: Option<&OwnPath>, say: &mut Vec<Message>) {
+    /// `senses`: neighbours that the drone ranges are better known than by their beacons.
+    fn speak_separation(&mut self, senses: &Senses<'_>, path: Option<&OwnPath>, say: &mut Vec<Message>) {
         if let (Some(separations), Some(path)) = (&mut self.separations, path) {
+            for seen in senses.neighbours {
+                let position = senses.position() + seen.position();
+                separations.see(seen.drone, Sighting { position, velocity: senses.velocity() + seen.velocity() });
+            }
             separations.speak(self.leading.peers(), path, say);
         }
     }
@@ -457,8 +523,11 @@ impl SwarmPilot {
             altitude_m: senses.position_m[2],
             climb_mps: senses.velocity_mps[2],
         };
+        self.open_words(senses, inbox);
         let path = self.separations.as_ref().map(|_| self.own_path(senses));
         for &Heard { source, message } in inbox.heard() {
+            let restamped = self.clocks.restamp(senses.now, source, message);
+            let message = restamped.as_ref().map_or(message, Restamped::message);
             self.hear_separation(source, message, path.as_ref());
             if matches!(message, MessageRef::Obstacle(obstacle) if !self.altitude.is_blocked_by(&obstacle.shape)) {
                 continue;
@@ -477,7 +546,7 @@ impl SwarmPilot {
         self.leading.note_passed(senses.position());
         let places = self.route.places(senses.position());
         let open = self.route.open_places(places);
-        self.speak_separation(path.as_ref(), say);
+        self.speak_separation(senses, path.as_ref(), say);
         let safe = self.steer(senses, &open);
         let acceleration = self.reaction.push(safe);
         let climb_mps2 = self.altitude.climb_mps2(senses, acceleration, safety.acceleration_max_mps2);
@@ -536,7 +605,21 @@ impl RolloutPilot for SwarmPilot {
 
     fn part_past(&self, set: u32) -> Option<Assignment> {
         let planned = self.leading.planned_sets().iter().find(|planned| planned.tag == set)?;
-        planned.parts.get(self.params.me).copied()
+        let &SetPlace { drone, leader, group, route, rank } = planned.parts.get(self.params.me)?;
+        let slot_m = self.leading.part().map_or([0.0; 2], |part| part.slot_m);
+        let arrival_s = 0.0;
+        Some(Assignment {
+            id: planned.stamp,
+            scope: planned.scope,
+            group,
+            drone,
+            leader,
+            slot_m,
+            arrival_s,
+            route,
+            rank,
+            reserved: 0,
+        })
     }
 
     fn own_part(&self, plan: &Plan, position: Vec2) -> Assignment {

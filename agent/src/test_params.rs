@@ -1,6 +1,6 @@
 //! Parameters that the unit tests of several files share.
 
-use skein_leader::params::{Destination, PlannerParams, Strategy};
+use skein_leader::params::{Between, Destination, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::Vec2;
@@ -20,6 +20,7 @@ pub(crate) fn planner() -> PlannerParams {
         safe_distance_m: 30.0,
         course_y_m: 0.0,
         destination: Destination::Goal { front_m: Vec2::new(100.0, 0.0) },
+        between: Between::CloseUp,
         debounce_s: 0.1,
     }
 }

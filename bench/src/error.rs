@@ -68,6 +68,22 @@ pub enum BenchError {
     /// The plot cannot be drawn.
     #[error(transparent)]
     Plot(#[from] DrawError),
+    /// A divided world and the same one in one piece gave different digests.
+    #[error("{drones} drones in {parts} parts have another digest than in one")]
+    Digests {
+        /// Size of the swarm.
+        drones: u32,
+        /// Number of parts.
+        parts: usize,
+    },
+    /// What Skein is compared with cannot be run.
+    #[error("{}: {why}; the comparison needs Python with RVO2: `pip install pyrvo` installs it where there is a wheel", python.display())]
+    NoPeer {
+        /// The program.
+        python: PathBuf,
+        /// What it said.
+        why: String,
+    },
     /// The table of arrival times is not valid.
     #[error("the table of arrival times: {0}")]
     Arrivals(#[from] SplitError),

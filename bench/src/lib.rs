@@ -7,6 +7,8 @@
 //! - [`election::ElectionBench`] measures how long swarms of any size and shape take to elect a leader over a bad radio.
 //! - [`clock::ClockBench`] flies by the wall clock, and measures how late ticks open.
 //! - [`pilots::PilotBench`] flies one mission with several pilots, and compares what they cost.
+//! - [`peers::PeerBench`] compares Skein with another library for collision avoidance.
+//! - [`split::SplitBench`] divides the world by space, and says from measured costs how many drones one swarm can have.
 //! - [`parts::PartBench`] measures single parts of a tick: radio, grouping, sensing, recording.
 //!
 //! Each benchmark is a plain struct of settings with a method `run`, which gives rows that serialise to JSON. The structs
@@ -35,9 +37,11 @@ pub mod failover;
 mod flown_by;
 mod median;
 pub mod parts;
+pub mod peers;
 pub mod pilots;
 pub mod runtime;
 mod scratch;
+pub mod split;
 
 pub use context::{Context, Interrupted};
 pub use error::BenchError;

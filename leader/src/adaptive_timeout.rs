@@ -59,7 +59,8 @@ impl AdaptiveTimeout {
 
     /// The longest silence that is not yet significant, s: `base_s`, or more if gaps are long or vary.
     pub(crate) fn timeout_s(&self, base_s: f64) -> f64 {
-        (self.mean_s + TIMEOUT_DEVIATIONS * self.deviation_s).clamp(base_s, MAX_TIMEOUTS * base_s)
+        let longest_s = MAX_TIMEOUTS * base_s.max(self.mean_s);
+        (self.mean_s + TIMEOUT_DEVIATIONS * self.deviation_s).clamp(base_s, longest_s)
     }
 }
 

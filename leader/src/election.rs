@@ -33,7 +33,7 @@
 //! ```
 
 use crate::adaptive_timeout::AdaptiveTimeout;
-use crate::tuning::{NEWCOMER_TIMEOUTS, PARTED_TIMEOUTS, SAME_BEAT};
+use crate::tuning::{CLOCKS_S, NEWCOMER_TIMEOUTS, PARTED_TIMEOUTS, SAME_BEAT};
 use skein_protocol::payload::Leadership;
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, SimTime};
 
@@ -66,6 +66,8 @@ pub enum Input {
         scope: GroupId,
         /// Whether the message names this drone: then the term is for this drone, whatever its group is.
         named: bool,
+        /// When the leader sent it, by the leader's clock, if the message says so.
+        stamp: Option<SimTime>,
     },
     /// This drone is in this group now.
     Joined(GroupId),
@@ -84,6 +86,19 @@ pub enum Input {
     },
 }
 
+/// A sign that the leader of a term lives.
+#[derive(Clone, Copy, Debug)]
+struct Sign {
+    ballot: Ballot,
+    scope: GroupId,
+    /// Whether it names this drone.
+    named: bool,
+    /// When the leader sent it, by the leader's clock, if it says so.
+    stamp: Option<SimTime>,
+    /// How often it was passed on.
+    hops: u16,
+}
+
 /// The election state of one drone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Election {
@@ -99,6 +114,12 @@ pub struct Election {
     leads: bool,
     /// Last sign of life of the leader, heard by this drone or by another one; or the start.
     heard: SimTime,
+    /// The greatest time stamp of the leader's signs, by the leader's clock.
+    newest: SimTime,
+    /// How much later this drone heard that sign, by its own clock, ns.
+    lag_ns: i64,
+    /// How often that sign was passed on before this drone heard it.
+    hops: u16,
     /// Of the leaders' signs that this drone heard itself.
     adaptive_timeout: AdaptiveTimeout,
     /// Since when it has heard only leaders of parts of its group.
@@ -124,6 +145,9 @@ impl Election {
             highest_round: 0,
             leads: false,
             heard: now,
+            newest: SimTime::ZERO,
+            lag_ns: 0,
+            hops: 0,
             adaptive_timeout: AdaptiveTimeout::expecting(now, params.heartbeat_period_s),
             parted: None,
             next_heartbeat: now,
@@ -153,6 +177,11 @@ impl Election {
     #[must_use]
     pub fn group(&self) -> GroupId {
         self.group
+    }
+
+    /// How many drones passed on the newest sign of the leader before this one heard it.
+    pub(crate) fn hops(&self) -> u16 {
+        self.hops
     }
 
     /// How long the closest member waits before it claims, s. The next one waits as much longer, and so on.
@@ -206,8 +235,8 @@ impl Election {
     pub fn handle(&mut self, now: SimTime, epoch: u32, input: Input) -> Option<Leadership> {
         match input {
             Input::Heard(message) => self.hear(now, epoch, &message),
-            Input::Sign { ballot, scope, named } => {
-                self.sign(now, ballot, scope, named);
+            Input::Sign { ballot, scope, named, stamp } => {
+                self.sign(now, Sign { ballot, scope, named, stamp, hops: 0 });
                 None
             }
             Input::Joined(group) => {
@@ -232,14 +261,13 @@ impl Election {
         let ballot = message.ballot;
         match message.kind() {
             LeadershipKind::PreVote => {
-                let heard = if self.leads { now } else { self.heard };
-                let news = ballot == self.obeyed && heard.since(message.stamp) >= self.heartbeat_period_s;
-                news.then(|| self.message(LeadershipKind::PreVoteRejection, heard, epoch, DroneId::NONE))
+                let newest = if self.leads { now } else { self.newest };
+                let news = ballot == self.obeyed && newest.since(message.stamp) >= self.heartbeat_period_s;
+                news.then(|| self.message(LeadershipKind::PreVoteRejection, newest, epoch, DroneId::NONE))
             }
             LeadershipKind::PreVoteRejection => {
-                if ballot == self.obeyed && message.stamp > self.heard && message.stamp <= now {
-                    self.heard = message.stamp;
-                    self.pre_voted = None;
+                if ballot == self.obeyed && message.stamp.since(now) <= CLOCKS_S {
+                    self.catch_up(now, message.stamp);
                 }
                 None
             }
@@ -247,13 +275,27 @@ impl Election {
                 self.claim(now, self.scope)
             }
             LeadershipKind::Claim | LeadershipKind::Heartbeat | LeadershipKind::LeadershipTransfer => {
-                self.sign(now, ballot, message.group, false);
+                let is_echo = message.hops > 0 && ballot == self.obeyed && message.stamp <= self.newest;
+                if !is_echo {
+                    let (scope, stamp) = (message.group, Some(message.stamp));
+                    self.sign(now, Sign { ballot, scope, named: false, stamp, hops: message.hops });
+                }
                 None
             }
         }
     }
 
-    fn sign(&mut self, now: SimTime, ballot: Ballot, scope: GroupId, named: bool) {
+    /// Notes that another drone heard a sign of the leader with this stamp, if that is news: as if this drone had heard it, as
+    /// late after the leader sent it as the newest one that it heard.
+    fn catch_up(&mut self, now: SimTime, stamp: SimTime) {
+        let heard = now.min(stamp + self.lag_ns);
+        if stamp > self.newest && heard > self.heard {
+            (self.newest, self.heard, self.pre_voted) = (stamp, heard, None);
+        }
+    }
+
+    fn sign(&mut self, now: SimTime, sign: Sign) {
+        let Sign { ballot, scope, named, stamp, hops } = sign;
         if f64::from(ballot.round) > CLAIMS_PER_S * (1.0 + now.since(SimTime::ZERO)) {
             return;
         }
@@ -262,7 +304,15 @@ impl Election {
             self.obeyed = ballot;
             self.scope = scope;
             self.leads = false;
-            self.adaptive_timeout.restart(now);
+            (self.newest, self.lag_ns) = (SimTime::ZERO, 0);
+            // Far away, gaps are longer: they grow with the square root of the distance if frames get lost.
+            match f64::from(hops).sqrt() {
+                0.0 => self.adaptive_timeout.restart(now),
+                root => self.adaptive_timeout = AdaptiveTimeout::expecting(now, root * self.heartbeat_period_s),
+            }
+        }
+        if let Some(stamp) = stamp.filter(|&stamp| ballot == self.obeyed && stamp > self.newest) {
+            (self.newest, self.lag_ns, self.hops) = (stamp, now - stamp, hops);
         }
         // Its group was split without it. A leader of a part will take it in, and its own term ends. A leader of an older
         // term cannot do that.
@@ -296,7 +346,7 @@ impl Election {
         }
         if self.obeyed.is_some() && self.pre_voted.is_none() {
             self.pre_voted = Some(now);
-            return Some(self.message(LeadershipKind::PreVote, self.heard, epoch, DroneId::NONE));
+            return Some(self.message(LeadershipKind::PreVote, self.newest, epoch, DroneId::NONE));
         }
         let scope = if self.scope.contains(self.group) { self.scope } else { self.group };
         self.claim(now, scope)
@@ -310,7 +360,7 @@ impl Election {
         self.scope = scope;
         self.leads = true;
         self.parted = None;
-        self.heard = now;
+        (self.heard, self.newest, self.lag_ns) = (now, now, 0);
         self.pre_voted = None;
         self.next_heartbeat = now.after(self.heartbeat_period_s);
         Some(self.message(LeadershipKind::Claim, now, 0, DroneId::NONE))

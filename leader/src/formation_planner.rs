@@ -9,7 +9,7 @@ use crate::situation::Situation;
 use crate::slots::{self, Reformation};
 use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_S};
 use skein_protocol::formation::HOLD_SPEED_MPS;
-use skein_protocol::payload::{Assignment, NO_ROUTE};
+use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
 use skein_protocol::{GroupId, Phase, SimTime, Vec2};
 
 /// Most steps by which the anchor moves on. Obstacles without end do not hold up the leader.
@@ -60,7 +60,9 @@ impl FormationPlanner {
             return None;
         }
         *self = Self::default();
-        let avoided = s.ledger.obeyed().is_some_and(|bundle| bundle.plan.phase() != Phase::Cruise);
+        // A part of the swarm cruises only between obstacle sets.
+        let parted = |plan: &Plan| plan.group != GroupId::ALL;
+        let avoided = s.ledger.obeyed().is_some_and(|b| b.plan.phase() != Phase::Cruise || parted(&b.plan));
         self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
     }
 
@@ -121,9 +123,14 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     let count = s.members.len().max(1) as f64;
     let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
     let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
-    let mut anchor = Vec2::new(x, s.params.course_y_m);
+    let anchor = Vec2::new(x, s.params.course_y_m);
+    if phase == Phase::Reform { moved_on(s, shape, anchor) } else { anchor }
+}
+
+/// The anchor, moved on until the slots of the shape are clear of obstacles and of dead drones.
+pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2) -> Vec2 {
     let (mut steps, is_blocked) = (0, blocker(s));
-    while phase == Phase::Reform && steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
+    while steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
         anchor.x += ANCHOR_STEP_M;
         steps += 1;
     }

@@ -2,8 +2,9 @@
 
 use crate::draft::draft;
 use crate::member::{Member, group_leaders};
-use crate::params::PlannerParams;
+use crate::params::{Between, PlannerParams};
 use crate::plan_bundle::PlanBundle;
+use crate::set_place::SetPlace;
 use crate::situation::Situation;
 use crate::split::ArrivalTable;
 use crate::survey::Survey;
@@ -83,9 +84,9 @@ pub(crate) fn ranks(chosen: &[usize], arrivals: &[Vec<f64>], kept: &[Option<u16>
 /// The group of each member: a part of the group it is in, numbered from the left by the routes that the members of that
 /// group take. A member of no part of the scope counts as one of the scope itself.
 ///
-/// If the set was planned for before, a group that stays on one route is not split. A member that joins a queue that is
+/// If the set was planned for before, or if groups go on between sets, a group that stays on one route is not split. A member that joins a queue that is
 /// already flying joins the group in that queue: a group is split as a whole or not at all.
-fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], replan: bool) -> Vec<GroupId> {
+fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&SetPlace>], replan: bool) -> Vec<GroupId> {
     let parents: Vec<GroupId> =
         s.members.iter().map(|m| if s.scope.contains(m.group) { m.group } else { s.scope }).collect();
     let keeps = |i: usize| kept[i].map(|part| part.group).filter(|group| s.scope.contains(*group));
@@ -94,7 +95,8 @@ fn groups(s: &Situation<'_>, chosen: &[usize], kept: &[Option<&Assignment>], rep
             (0..chosen.len()).filter(|&j| parents[j] == parents[i]).map(|j| chosen[j]).collect();
         taken.sort_unstable_by(|a, b| b.cmp(a));
         taken.dedup();
-        if replan && taken.len() == 1 {
+        let goes_on = s.params.between == Between::GoOn && parents[i] != GroupId::ALL;
+        if (replan || goes_on) && taken.len() == 1 {
             return parents[i];
         }
         let number = taken.iter().position(|&route| route == chosen[i]).unwrap_or(0) + 1;

@@ -10,6 +10,7 @@ use crate::obstacles::set_ids;
 use crate::params::Strategy;
 use crate::plan_bundle::PlanBundle;
 use crate::plan_exchange::{self, PlanExchange, arrivals_s};
+use crate::set_place::SetPlace;
 use crate::situation::Situation;
 use crate::split::{ArrivalTable, RouteAssignment};
 use crate::survey::Survey;
@@ -42,7 +43,7 @@ struct AwaitedChoice {
     coordinator: DroneId,
     table: Vec<Arrivals>,
     /// The assignments that members had for the set when the wait began.
-    kept: BTreeMap<DroneId, Assignment>,
+    kept: BTreeMap<DroneId, SetPlace>,
     /// Whether the set was planned for before.
     replan: bool,
 }

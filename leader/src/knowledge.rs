@@ -55,7 +55,7 @@ impl Knowledge {
         other.ledger = ledger;
         let (ballot, scope) = (self.first_term(), GroupId::ALL);
         let leads = Input::Claim(scope);
-        let follows = Input::Sign { ballot, scope, named: true };
+        let follows = Input::Sign { ballot, scope, named: true, stamp: Some(now) };
         other.election.handle(now, 0, if params.me == self.me { leads } else { follows });
         other.join(now);
         other
@@ -176,7 +176,7 @@ impl Knowledge {
         let ballot = self.election.obeyed();
         if pose.leads() && pose.term == ballot && ballot.claimant == source {
             let scope = self.election.scope();
-            self.election.handle(now, 0, Input::Sign { ballot, scope, named: false });
+            self.election.handle(now, 0, Input::Sign { ballot, scope, named: false, stamp: Some(pose.stamp) });
         }
         let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
         self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
@@ -195,6 +195,7 @@ impl Knowledge {
         let new = self.obstacles.learn(now, id, shape, witness);
         if new {
             self.ledger.settle(&self.obstacles);
+            self.ledger.redraw(id, &self.obstacles);
             self.join(now);
         }
         new
@@ -254,7 +255,7 @@ impl Knowledge {
         // by a drone that leads another term by now does not show that this term goes on.
         let over = ballot == self.election.obeyed() && self.term_of(source) > ballot;
         if goes_on && !over {
-            self.election.handle(now, 0, Input::Sign { ballot, scope, named });
+            self.election.handle(now, 0, Input::Sign { ballot, scope, named, stamp: None });
         }
         ballot == self.election.obeyed() && !self.election.leads()
     }
@@ -297,12 +298,16 @@ impl Knowledge {
         self.join(now);
     }
 
-    /// Tells the election which group this drone is in, and notes what all drones have passed.
+    /// Tells the election which group this drone is in, and notes what the drones of a new formation have passed. Drones that its
+    /// leader did not hear may still be before the obstacles.
     fn join(&mut self, now: SimTime) {
         let ended = self.ledger.take_ended();
-        if !ended.is_empty() {
-            for drone in 0..self.drones {
-                self.obstacles.note_passed(DroneId(drone), &ended);
+        if !ended.is_empty()
+            && let Some(bundle) = self.ledger.obeyed()
+        {
+            let of_all = bundle.plan.members >= self.drones;
+            for drone in (0..self.drones).map(DroneId).filter(|&drone| of_all || bundle.parts.contains(drone)) {
+                self.obstacles.note_passed(drone, &ended);
             }
         }
         let group = self.ledger.group();

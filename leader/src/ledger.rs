@@ -6,7 +6,7 @@ use crate::plan_bundle::PlanBundle;
 use crate::planned_set::PlannedSet;
 use crate::roster::Roster;
 use crate::routes::{RouteParams, Routes};
-use bytemuck::Zeroable;
+use crate::set_place::SetPlace;
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp};
@@ -29,10 +29,12 @@ pub struct Ledger {
     /// The plan of an earlier leader that split the group, if this drone obeys a plan for a part.
     origin: Option<PlanBundle>,
     sets: Vec<PlannedSet>,
-    /// The obstacles of sets that a formation of the whole swarm has ended. Its leader knew that all drones had passed them.
+    /// The obstacles of sets that a formation of the whole swarm has ended. Its leader knew that all its drones had passed them.
     ended: Vec<ObstacleId>,
     /// Hash of `mine`.
     part_hash: u64,
+    /// How often the routes past a set were drawn anew because an outline has grown.
+    redrawn: usize,
 }
 
 impl Ledger {
@@ -52,6 +54,7 @@ impl Ledger {
             sets: Vec::new(),
             ended: Vec::new(),
             part_hash: 0,
+            redrawn: 0,
         }
     }
 
@@ -74,7 +77,8 @@ impl Ledger {
         for set in &mut all.sets {
             (set.stamp.ballot, set.scope) = (ballot, GroupId::ALL);
             for &(drone, place) in places.iter().filter(|(id, place)| place.set == set.tag && !given(*id)) {
-                let part = set.parts.add(Assignment { drone, ..Assignment::zeroed() });
+                let new = SetPlace { drone, leader: DroneId(0), group: GroupId::ALL, route: 0, rank: 0 };
+                let part = set.parts.add(new);
                 (part.route, part.rank) = (place.route, place.rank);
             }
         }
@@ -134,7 +138,7 @@ impl Ledger {
         &self.sets
     }
 
-    /// Takes the obstacles that all drones have passed: those of the sets that a formation of the whole swarm has ended since
+    /// Takes the obstacles that all drones of the obeyed formation have passed: those of the sets that a formation of the whole swarm has ended since
     /// the last call.
     pub fn take_ended(&mut self) -> Vec<ObstacleId> {
         std::mem::take(&mut self.ended)
@@ -176,7 +180,7 @@ impl Ledger {
         if let Some(bundle) = self.obeyed.as_mut().filter(|bundle| bundle.plan.id == part.id) {
             bundle.parts.add(*part);
             for set in self.sets.iter_mut().filter(|set| set.stamp == part.id) {
-                set.parts.add(*part);
+                set.parts.add(part.into());
             }
         } else {
             self.parts.add(*part);
@@ -189,10 +193,7 @@ impl Ledger {
         for place in pose.queue.iter().filter(|place| place.rank != QueuePlace::NO_RANK) {
             let (route, rank) = (place.route, place.rank);
             for set in self.sets.iter_mut().filter(|set| set.tag == place.set && pose.obeyed >= set.stamp) {
-                let (id, scope, group) = (set.stamp, set.scope, pose.group);
-                let part =
-                    Assignment { id, scope, group, drone, leader: DroneId::NONE, route, rank, ..Assignment::zeroed() };
-                set.parts.add(part);
+                set.parts.add(SetPlace { drone, leader: DroneId::NONE, group: pose.group, route, rank });
             }
         }
     }
@@ -216,6 +217,22 @@ impl Ledger {
         stamp == self.stamp
     }
 
+    /// Draws the routes past an obstacle anew, whose outline has grown.
+    pub fn redraw(&mut self, id: ObstacleId, obstacles: &Obstacles) {
+        for set in self.sets.iter_mut().filter(|set| set.ids.contains(&id)) {
+            if let Some(shapes) = obstacles.shapes(&set.ids) {
+                set.routes = Routes::new(&shapes, &self.params);
+                self.redrawn += 1;
+            }
+        }
+    }
+
+    /// How often routes were drawn anew.
+    #[must_use]
+    pub fn redrawn(&self) -> usize {
+        self.redrawn
+    }
+
     /// Obeys the newest plan once the plan, this drone's assignment and all obstacles of the set are known. Call again when
     /// an obstacle was learnt.
     pub fn settle(&mut self, obstacles: &Obstacles) {
@@ -228,7 +245,7 @@ impl Ledger {
             let Some(shapes) = obstacles.shapes(ids) else { return };
             let routes = Routes::new(&shapes, &self.params);
             self.sets.retain(|set| !set.ids.iter().any(|id| ids.contains(id)));
-            let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.clone());
+            let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.iter().map(SetPlace::from).collect());
             let (stamp, made, members, scope) = (plan.id, plan.stamp, plan.members, plan.group);
             self.sets.push(PlannedSet { ids, tag, stamp, made, members, scope, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));

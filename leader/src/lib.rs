@@ -39,6 +39,7 @@
 
 mod adaptive_timeout;
 mod avoidance;
+mod beats;
 mod broadcaster;
 pub mod candidates;
 pub mod cost;
@@ -58,6 +59,7 @@ mod matroid_intersection;
 pub mod member;
 mod membership;
 pub mod obstacles;
+mod onward;
 pub mod own_state;
 pub mod params;
 pub mod peers;
@@ -71,6 +73,7 @@ mod relays;
 mod roles;
 pub mod roster;
 pub mod routes;
+pub mod set_place;
 mod situation;
 pub mod slots;
 pub mod split;

@@ -1,8 +1,10 @@
 //! What a drone knows of obstacles, from its own senses or from messages, and which drones have passed them.
 
+use crate::geometry::{hull, nearest};
+use crate::tuning::OUTLINE_GROWTH_M;
 use skein_protocol::payload::{MAX_SET, Passed};
-use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, ObstacleId, SimTime};
+use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
+use skein_protocol::{DroneId, ObstacleId, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most obstacles that a drone keeps. Further ones are ignored.
@@ -27,6 +29,8 @@ pub struct Obstacles {
     drones: u32,
     reach_m: f64,
     sets: Vec<Vec<ObstacleId>>,
+    /// How often an outline was learnt or has grown.
+    changes: usize,
 }
 
 impl Obstacles {
@@ -37,14 +41,25 @@ impl Obstacles {
         Self { drones, reach_m, ..Self::default() }
     }
 
-    /// Learns of an obstacle. Returns whether it is new.
+    /// Learns of an obstacle, or that its outline reaches farther than was known. Returns whether that is new.
     pub fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
-        if self.known.contains_key(&id) || self.known.len() >= MAX_KNOWN {
+        if let Some(known) = self.known.get_mut(&id) {
+            let Some(grown) = grown(&known.shape, &shape) else { return false };
+            known.shape = grown;
+        } else if self.known.len() < MAX_KNOWN {
+            self.known.insert(id, Known { shape, witness, since: now });
+        } else {
             return false;
         }
-        self.known.insert(id, Known { shape, witness, since: now });
+        self.changes += 1;
         self.sets = self.cluster();
         true
+    }
+
+    /// How often an outline was learnt or has grown. Where it is the same, all outlines are.
+    #[must_use]
+    pub fn changes(&self) -> usize {
+        self.changes
     }
 
     /// Hears which obstacles a drone has passed.
@@ -141,6 +156,31 @@ impl Obstacles {
     }
 }
 
+/// The outline that is known after another part of it was seen; `None` if that part adds nothing that matters to planning.
+fn grown(known: &ConvexShape, seen: &ConvexShape) -> Option<ConvexShape> {
+    if known == seen {
+        return None;
+    }
+    let core: Vec<Vec2> = known.vertices().collect();
+    let beyond_m = |v: Vec2| (nearest(&core, v) - v).norm() + seen.radius_m - known.radius_m;
+    if seen.vertices().all(|v| beyond_m(v) <= OUTLINE_GROWTH_M) {
+        return None;
+    }
+    let mut corners = hull(&core.into_iter().chain(seen.vertices()).collect::<Vec<_>>());
+    while corners.len() > MAX_VERTICES {
+        let count = corners.len();
+        let cut_off_m2 = |i: &usize| {
+            let (a, b, c) = (corners[(i + count - 1) % count], corners[*i], corners[(i + 1) % count]);
+            (b - a).perp(&(c - b)).abs()
+        };
+        let flattest = (0..count).min_by(|i, j| cut_off_m2(i).total_cmp(&cut_off_m2(j)))?;
+        corners.remove(flattest);
+    }
+    let shape = ConvexShape::new(&corners, known.radius_m.max(seen.radius_m)).ok()?;
+    let (floor_m, top_m) = (known.floor_m.min(seen.floor_m), known.top_m.max(seen.top_m));
+    Some(ConvexShape { floor_m, top_m, ..shape })
+}
+
 /// The part of a message's obstacle array that is in use.
 #[must_use]
 pub fn set_ids(set: &[ObstacleId; MAX_SET], count: u32) -> &[ObstacleId] {
@@ -171,10 +211,30 @@ mod tests {
         for (id, x) in [(3, 100.0), (1, 140.0), (2, 300.0)] {
             assert!(obstacles.learn(SimTime::ZERO, ObstacleId(id), disc(x), DroneId(0)));
         }
-        assert!(!obstacles.learn(SimTime::ZERO, ObstacleId(3), disc(0.0), DroneId(0)));
+        assert!(!obstacles.learn(SimTime::ZERO, ObstacleId(3), disc(100.0), DroneId(0)));
         assert_eq!(obstacles.sets(), [vec![ObstacleId(1), ObstacleId(3)], vec![ObstacleId(2)]]);
         obstacles.learn(SimTime::ZERO, ObstacleId(0), disc(220.0), DroneId(0));
         assert_eq!(obstacles.sets().len(), 3);
+    }
+
+    #[test]
+    fn an_outline_grows_with_what_is_seen_of_it() {
+        let mut obstacles = Obstacles::new(4, 40.0);
+        let mut see = |corners: &[[f64; 2]]| {
+            let corners: Vec<Vec2> = corners.iter().map(|&corner| Vec2::from(corner)).collect();
+            let shape = ConvexShape::new(&corners, 0.0).unwrap();
+            let new = obstacles.learn(SimTime::ZERO, ObstacleId(0), shape, DroneId(0));
+            (new, obstacles.get(ObstacleId(0)).unwrap().shape.vertices().map(|v| [v.x, v.y]).collect::<Vec<_>>())
+        };
+        assert!(see(&[[100.0, 10.0], [100.0, -10.0]]).0);
+        assert!(!see(&[[100.0, 11.0], [100.0, -10.0]]).0, "that much does not matter");
+        assert_eq!(see(&[[100.0, 30.0], [100.0, 0.0]]).1, [[100.0, -10.0], [100.0, 30.0]]);
+        assert_eq!(see(&[[120.0, 30.0], [100.0, 30.0]]).1, [[100.0, -10.0], [120.0, 30.0], [100.0, 30.0]]);
+        let arc: Vec<[f64; 2]> =
+            (0..16).map(|i| f64::from(i) * 0.39).map(|a| [110.0 + 60.0 * a.cos(), 60.0 * a.sin()]).collect();
+        let whole = see(&arc).1;
+        assert!(whole.len() <= MAX_VERTICES && whole.iter().all(|v| (v[0] - 110.0).hypot(v[1]) < 60.1), "{whole:?}");
+        assert_eq!(obstacles.changes(), 4);
     }
 
     #[test]

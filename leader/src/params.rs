@@ -83,6 +83,16 @@ impl Destination {
     }
 }
 
+/// What groups do between two obstacle sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Between {
+    /// The swarm becomes one group again and closes its formation.
+    CloseUp,
+    /// Each group goes on by itself to its part of the formation at the destination, and splits again before the next set. The
+    /// swarm closes its formation once it has flown as far as the destination (paper, G1).
+    GoOn,
+}
+
 /// Parameters of planning.
 #[derive(Clone, Debug)]
 pub struct PlannerParams {
@@ -108,6 +118,8 @@ pub struct PlannerParams {
     pub course_y_m: f64,
     /// Where the mission ends.
     pub destination: Destination,
+    /// What groups do between two obstacle sets.
+    pub between: Between,
     /// Delay between learning an obstacle and planning for it, so that one plan covers obstacles that are learnt together;
     /// also between a change of the members and new slots, s.
     pub debounce_s: f64,

@@ -1,7 +1,7 @@
 //! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
-use crate::tuning::{DELAY_WEIGHT, DIRECT_S};
+use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
@@ -11,6 +11,9 @@ const MAX_DELAY_S: f64 = 60.0;
 
 /// Time between two looks at all peers for silent ones, in time-outs. Each look costs as much as a few beacons per peer.
 const LOOK_TIMEOUTS: f64 = 0.25;
+
+/// Before every time of a mission.
+const NEVER: SimTime = SimTime(i64::MIN / 2);
 
 /// More than times in nanoseconds lose by rounding, s.
 const ROUNDING_S: f64 = 1e-6;
@@ -22,8 +25,8 @@ struct Peer {
     silence_s: f64,
     /// Of its beacons, by their times of arrival.
     timeout: AdaptiveTimeout,
-    /// When it was last heard without a relay.
-    direct: Option<SimTime>,
+    /// When it was last heard without a relay; [`NEVER`] if it never was.
+    direct: SimTime,
     pose: Pose,
 }
 
@@ -33,7 +36,7 @@ impl Peer {
     }
 
     fn is_direct(&self, now: SimTime) -> bool {
-        self.direct.is_some_and(|direct| now.since(direct) <= self.silence_s)
+        now.since(self.direct) <= self.silence_s
     }
 
     /// A moment until which it certainly lives.
@@ -98,19 +101,24 @@ impl Peers {
         }
         match self.place(source) {
             Err(place) => {
-                let timeout = AdaptiveTimeout::new(now);
-                let peer = Peer { silence_s: timeout.timeout_s(self.timeout_s), timeout, direct, pose };
+                let timeout = self.prior(now, direct.is_some());
+                let silence_s = patience_s(&timeout, self.timeout_s);
+                let peer = Peer { silence_s, timeout, direct: direct.unwrap_or(NEVER), pose };
                 self.quiet_until = self.quiet_until.min(peer.lives_until());
                 self.ids.insert(place, source);
                 self.stamps.insert(place, pose.stamp);
                 self.last.insert(place, peer);
             }
             Ok(place) if pose.stamp > self.stamps[place] => {
+                let prior = self.prior(now, false);
                 let peer = &mut self.last[place];
                 peer.pose = pose;
-                peer.direct = direct.or(peer.direct);
+                if direct.is_none() && peer.timeout.last() <= peer.direct {
+                    peer.timeout = prior;
+                }
+                peer.direct = direct.unwrap_or(peer.direct);
                 peer.timeout.hear(now, 0.0, peer.silence_s);
-                peer.silence_s = peer.timeout.timeout_s(self.timeout_s);
+                peer.silence_s = patience_s(&peer.timeout, self.timeout_s);
                 self.stamps[place] = pose.stamp;
                 self.quiet_until = self.quiet_until.min(peer.lives_until());
                 if direct.is_some() {
@@ -122,6 +130,11 @@ impl Peers {
         if now >= self.next_look {
             self.look_for_silence(now);
         }
+    }
+
+    /// What is assumed of the gaps between the beacons of a peer. Those that are passed on come rarely.
+    fn prior(&self, now: SimTime, direct: bool) -> AdaptiveTimeout {
+        if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.timeout_s) }
     }
 
     /// Finds out anew until when no peer is silent for too long.
@@ -149,7 +162,7 @@ impl Peers {
 
     /// Whether a peer's own beacon was heard just now.
     pub(crate) fn is_heard_now(&self, peer: DroneId, now: SimTime) -> bool {
-        self.get(peer).and_then(|known| known.direct).is_some_and(|direct| now.since(direct) <= DIRECT_S)
+        self.get(peer).is_some_and(|known| now.since(known.direct) <= DIRECT_S)
     }
 
     /// Whether a peer is heard without a relay.
@@ -264,6 +277,12 @@ impl Peers {
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
         self.ids.iter().copied().zip(&self.last)
     }
+}
+
+/// The longest silence of a peer that is not yet significant, s: never more than [`MAX_TIMEOUTS`], however rarely it was heard, because a
+/// dead drone must not count for long.
+fn patience_s(timeout: &AdaptiveTimeout, base_s: f64) -> f64 {
+    timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
 }
 
 /// A hash of a set of drones, whatever their order; never 0.

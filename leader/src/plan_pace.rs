@@ -52,3 +52,101 @@ impl Made {
         self.members.iter().eq(members.iter().map(|member| &member.id))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ledger::Ledger;
+    use crate::obstacles::Obstacles;
+    use crate::params::{Between, Destination, PlannerParams, Strategy};
+    use crate::routes::RouteParams;
+    use crate::slots::Reformation;
+    use skein_protocol::formation::Shape;
+    use skein_protocol::{GroupId, Vec2};
+
+    const TERM: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
+
+    fn params() -> PlannerParams {
+        PlannerParams {
+            strategy: Strategy::PaperRule,
+            speed_mps: 10.0,
+            headway_s: 4.0,
+            routes: RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 },
+            between: Between::CloseUp,
+            shape: Shape::V,
+            spacing_m: 40.0,
+            reformation: Reformation::Optimal,
+            arrival_error_m: 2.0,
+            safe_distance_m: 20.0,
+            course_y_m: 0.0,
+            destination: Destination::Hold { stop_x_m: f64::INFINITY },
+            debounce_s: 0.1,
+        }
+    }
+
+    fn members(ids: &[u32]) -> Vec<Member> {
+        let member = |&id: &u32| Member {
+            id: DroneId(id),
+            position: Vec2::zeros(),
+            speed_mps: 0.0,
+            velocity: Vec2::zeros(),
+            group: GroupId::ALL,
+            follows: true,
+        };
+        ids.iter().map(member).collect()
+    }
+
+    /// The times (s) at which a leader plans that is asked every 10 ms for 60 s: in this term, with this delay, for these members.
+    fn planned_s(ballot: impl Fn(f64) -> Ballot, delay_s: f64, members_at: impl Fn(f64) -> Vec<Member>) -> Vec<f64> {
+        let (params, obstacles) = (params(), Obstacles::new(4, 40.0));
+        let ledger = Ledger::new(DroneId(0), 4, params.routes);
+        let (mut pace, mut planned) = (PlanPace::default(), Vec::new());
+        for step in 0..6000 {
+            let now_s = 0.01 * f64::from(step);
+            let s = Situation {
+                params: &params,
+                now: SimTime::from_secs(now_s),
+                ballot: ballot(now_s),
+                scope: GroupId::ALL,
+                members: &members_at(now_s),
+                others: &[],
+                delay_s,
+                silent: &[],
+                obstacles: &obstacles,
+                ledger: &ledger,
+            };
+            if pace.allows(&s, &[ObstacleId(0)]) {
+                pace.note(&s, &[ObstacleId(0)]);
+                planned.push(now_s);
+            }
+        }
+        planned
+    }
+
+    #[test]
+    fn the_waits_double_up_to_a_limit_while_the_members_stay_the_same() {
+        let times = planned_s(|_| TERM, 0.0, |_| members(&[0, 1]));
+        let waits: Vec<f64> = times.windows(2).map(|pair| ((pair[1] - pair[0]) * 100.0).round() / 100.0).collect();
+        assert_eq!(waits[..6], [0.5, 1.0, 2.0, 4.0, 8.0, 8.0]);
+    }
+
+    #[test]
+    fn other_members_end_the_waiting_but_not_the_least_wait() {
+        let times = planned_s(|_| TERM, 0.0, |now_s| members(&[0, (now_s / 0.02) as u32 + 1]));
+        let waits = times.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(waits.clone().all(|wait_s| (0.499..0.511).contains(&wait_s)), "{times:?}");
+    }
+
+    #[test]
+    fn the_least_wait_grows_by_the_way_there_and_back() {
+        let times = planned_s(|_| TERM, 1.0, |_| members(&[0, 1]));
+        assert!((times[1] - times[0] - 2.5).abs() < 0.011, "{times:?}");
+    }
+
+    #[test]
+    fn another_term_plans_at_once() {
+        let times =
+            planned_s(|now_s| Ballot { round: if now_s < 30.0 { 1 } else { 2 }, ..TERM }, 0.0, |_| members(&[0]));
+        assert!(times.iter().any(|&time_s| (time_s - 30.0).abs() < 1e-9), "{times:?}");
+    }
+}

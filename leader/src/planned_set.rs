@@ -2,6 +2,7 @@
 
 use crate::roster::Roster;
 use crate::routes::Routes;
+use crate::set_place::SetPlace;
 use skein_protocol::{GroupId, ObstacleId, PlanStamp, SimTime};
 
 /// An obstacle set that is being passed: its routes, and which drone flies which.
@@ -21,6 +22,6 @@ pub struct PlannedSet {
     pub scope: GroupId,
     /// The routes past the set.
     pub routes: Routes,
-    /// The assignments heard so far.
-    pub parts: Roster,
+    /// Where the drones fly, as far as heard.
+    pub parts: Roster<SetPlace>,
 }

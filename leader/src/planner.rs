@@ -4,6 +4,7 @@
 use crate::avoidance;
 use crate::formation_planner::FormationPlanner;
 use crate::joint_planner::JointPlanner;
+use crate::onward::OnwardPlanner;
 use crate::plan_bundle::PlanBundle;
 use crate::plan_pace::PlanPace;
 use crate::situation::Situation;
@@ -17,6 +18,7 @@ use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime};
 pub(crate) struct Planner {
     joint: JointPlanner,
     formation: FormationPlanner,
+    onward: OnwardPlanner,
     pace: PlanPace,
     /// Index of the alternative, of those decided on last, that is flown until a choice is made.
     interim: usize,
@@ -26,7 +28,8 @@ impl Planner {
     /// A planner that has decided nothing yet, in a swarm of `drones`. Questions are repeated every `repeat_s`.
     pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
         let joint = JointPlanner::new(drones, repeat_s);
-        Self { joint, formation: FormationPlanner::default(), pace: PlanPace::default(), interim: 0 }
+        let (formation, onward) = (FormationPlanner::default(), OnwardPlanner::default());
+        Self { joint, formation, onward, pace: PlanPace::default(), interim: 0 }
     }
 
     /// Hears when a drone of another group can be where.
@@ -56,7 +59,8 @@ impl Planner {
                 bundles
             }
             Task::Form if s.scope == GroupId::ALL => self.formation.decide(s).into_iter().collect(),
-            Task::Wait | Task::Form => Vec::new(),
+            Task::Form => self.onward.decide(s).into_iter().collect(),
+            Task::Wait => Vec::new(),
         }
     }
 

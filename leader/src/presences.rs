@@ -2,6 +2,7 @@
 
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
+use crate::roster::{OfDrone, Roster};
 use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
@@ -11,15 +12,22 @@ use std::collections::BTreeMap;
 /// What the drones of one frame have in common.
 type Kind = (PlanStamp, GroupId, Ballot);
 
-/// What was said of one drone.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What was said of one drone. Each drone keeps this for all drones of the swarm, so it is small.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
-    /// What the drone obeys, and its flags.
-    news: Option<(Kind, u32, u32)>,
+    drone: DroneId,
     /// How often the news is said at once.
     left: u32,
+    /// A hash of what the drone obeys, and of its flags.
+    news: u64,
     /// When the neighbourhood last heard of it, as far as this drone knows.
     covered: SimTime,
+}
+
+impl OfDrone for Told {
+    fn drone(&self) -> DroneId {
+        self.drone
+    }
 }
 
 /// The states that one drone passes on.
@@ -27,7 +35,7 @@ struct Told {
 pub(crate) struct Presences {
     me: DroneId,
     repeat_s: f64,
-    told: BTreeMap<DroneId, Told>,
+    told: Roster<Told>,
     /// When a drone was last heard of for the first time.
     last_new: SimTime,
     /// When this drone speaks next.
@@ -38,7 +46,7 @@ impl Presences {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, start) = (params.me, params.start);
-        Self { me, repeat_s: params.repeat_period_s, told: BTreeMap::new(), last_new: start, turn: start }
+        Self { me, repeat_s: params.repeat_period_s, told: Roster::default(), last_new: start, turn: start }
     }
 
     /// When a drone was last heard of for the first time.
@@ -50,15 +58,19 @@ impl Presences {
     pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, near: Option<&Pose>) {
         let Some(newest) = k.peers().last(drone) else { return };
         let period_s = self.repeat_s * PRESENCE_REPEATS;
-        let told = self.told.entry(drone).or_insert_with(|| {
-            self.last_new = now;
-            Told::default()
-        });
-        if told.news != Some(news(newest)) {
-            *told = Told { news: Some(news(newest)), left: NEWS_TIMES, covered: SimTime::ZERO };
+        let new = Told { drone, left: NEWS_TIMES, news: news(newest), covered: SimTime::ZERO };
+        let told = match self.told.get_mut(drone) {
+            Some(told) => told,
+            None => {
+                self.last_new = now;
+                self.told.add(new)
+            }
+        };
+        if told.news != new.news {
+            *told = new;
         }
         if let Some(pose) = near
-            && told.news == Some(news(pose))
+            && told.news == news(pose)
             && newest.stamp.since(pose.stamp) < period_s
         {
             told.covered = now;
@@ -75,11 +87,16 @@ impl Presences {
         self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
         let period_s = self.repeat_s * PRESENCE_REPEATS;
         let mut due: BTreeMap<Kind, Vec<(u32, SimTime, DroneId)>> = BTreeMap::new();
-        for (&id, told) in &self.told {
+        for told in self.told.iter() {
+            let id = told.drone;
             let stale = now.since(told.covered) >= period_s;
             let pose = k.peers().last_of_living(id, now).filter(|_| told.left > 0 || stale);
             if let Some(pose) = pose {
-                due.entry(news(pose).0).or_default().push((NEWS_TIMES - told.left.min(NEWS_TIMES), told.covered, id));
+                due.entry((pose.obeyed, pose.group, pose.term)).or_default().push((
+                    NEWS_TIMES - told.left.min(NEWS_TIMES),
+                    told.covered,
+                    id,
+                ));
             }
         }
         let mut left = frames;
@@ -88,7 +105,7 @@ impl Presences {
             for chunk in drones.chunks(MAX_PRESENT).take(left) {
                 let mut presence = Presence { obeyed, group, term, ..Presence::default() };
                 for (entry, &(_, _, id)) in presence.drones.iter_mut().zip(chunk) {
-                    let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(&id)) else { continue };
+                    let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(id)) else { continue };
                     *entry = present(id, pose);
                     presence.count += 1;
                     told.covered = now;
@@ -101,9 +118,13 @@ impl Presences {
     }
 }
 
-/// What must be passed on at once if it changes.
-fn news(pose: &Pose) -> (Kind, u32, u32) {
-    ((pose.obeyed, pose.group, pose.term), pose.flags, pose.incarnation)
+/// A hash of what must be passed on at once if it changes.
+fn news(pose: &Pose) -> u64 {
+    let ballot = |ballot: Ballot| [ballot.round, ballot.incarnation, ballot.claimant.0];
+    let ([a, b, c], [d, e, f]) = (ballot(pose.obeyed.ballot), ballot(pose.term));
+    let group: [u32; 2] = bytemuck::cast(pose.group.0);
+    let words = [a, b, c, pose.obeyed.epoch, d, e, f, group[0], group[1], pose.flags, pose.incarnation];
+    Digest::of(bytemuck::cast_slice(&words))
 }
 
 /// A beacon as it is passed on.

@@ -5,18 +5,20 @@
 //! unless it heard a drone close to it say the same: the Trickle algorithm, as in [`crate::gossip`], and the distance rule of
 //! Ni, Tseng, Chen and Sheu, *The Broadcast Storm Problem in a Mobile Ad Hoc Network*, 1999.
 //!
-//! - The messages of a term, arrivals and passages are passed on once by each drone.
+//! - The newest message of a term is repeated until the next one comes: see [`crate::beats`].
+//! - Arrivals and passages are passed on once by each drone.
 //! - A plan is repeated while a neighbour does not obey it.
 //! - An assignment is repeated while its drone does not obey it; first only by drones that are closer to that drone.
 //! - The states of drones are collected, so that a frame holds several.
 
+use crate::beats::Beats;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::presences::Presences;
 use crate::tuning::{
-    DETOUR_DOUBLINGS, HOP_S, MAX_RELAYED_PER_TICK, NEAR, RELAY_MEMORY_S, SETTLED_S, UNSETTLED_S, WIDE_S,
+    CLOCKS_S, DETOUR_DOUBLINGS, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, RELAY_MEMORY_S, SETTLED_S, UNSETTLED_S, WIDE_S,
 };
 use skein_protocol::payload::{Leadership, Plan, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec2};
@@ -25,8 +27,6 @@ use std::collections::BTreeMap;
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Subject {
-    /// The term of this group.
-    Term(GroupId),
     /// The plan for this group.
     Plan(GroupId),
     /// The assignment of this drone in a plan for this group.
@@ -74,6 +74,11 @@ pub(crate) struct Relays {
     differs: Option<SimTime>,
     /// Whether this drone passes messages on.
     wide: bool,
+    /// Whether some drone is close to this one.
+    crowded: bool,
+    /// Whether a neighbour obeys an earlier term than this drone.
+    lags: bool,
+    beats: Beats,
     relayed: BTreeMap<Subject, Relayed>,
     presences: Presences,
 }
@@ -91,6 +96,9 @@ impl Relays {
             near_m: 0.0,
             differs: None,
             wide: false,
+            crowded: false,
+            lags: false,
+            beats: Beats::new(params),
             relayed: BTreeMap::new(),
             presences: Presences::new(params),
         }
@@ -124,22 +132,28 @@ impl Relays {
             return;
         }
         self.position = own.position;
-        let (mine, mut differs, mut far_m) = (k.peers().hears(self.me, now), false, 0.0_f64);
+        let (mine, mut differs) = (k.peers().hears(self.me, now), false);
+        let (mut near_m, mut far_m) = (f64::INFINITY, 0.0_f64);
+        let (term, scope) = (k.election().obeyed(), k.election().scope());
+        self.lags = false;
         for (_, pose) in k.peers().direct(now) {
-            far_m = far_m.max((pose.position() - own.position).norm());
+            let away_m = (pose.position() - own.position).norm();
+            (near_m, far_m) = (near_m.min(away_m), far_m.max(away_m));
             // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
             differs |= pose.hears != 0 && pose.hears != mine;
+            self.lags |= pose.term < term && scope.contains(pose.group);
         }
         self.near_m = NEAR * far_m;
+        self.crowded = near_m <= self.near_m;
         self.differs = differs.then(|| self.differs.unwrap_or(now));
         let patience_s = WIDE_S.max(3.0 * beacon_s) + 2.0 * k.peers().delay_s();
         let first = !k.election().obeyed().is_some();
         self.wide = self.differs.is_some_and(|since| first || now.since(since) >= patience_s);
+        self.beats.forget(now);
         if self.wide {
             self.relayed.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
         } else {
-            self.relayed
-                .retain(|subject, one| matches!(subject, Subject::Term(_)) && now.since(one.heard) < RELAY_MEMORY_S);
+            self.relayed.clear();
         }
     }
 
@@ -158,24 +172,28 @@ impl Relays {
         let claimant = message.ballot.claimant;
         if claimant == source {
             if self.wide {
-                self.hear(k, now, source, &Message::Leadership(*message));
+                self.hear_beat(k, now, source, message);
             }
             return true;
         }
         let strange = claimant == self.me || claimant.0 >= self.drones;
         let age_s = now.since(message.stamp);
-        let passed_on = (1..=self.drones).contains(&message.hops.into()) && (0.0..RELAY_MEMORY_S).contains(&age_s);
+        let passed_on = (1..=self.drones).contains(&message.hops.into()) && (-CLOCKS_S..OLDEST_S).contains(&age_s);
         if strange || !passed_on {
             return false;
         }
-        let new = self.hear(k, now, source, &Message::Leadership(*message));
-        new && !k.peers().is_heard_now(claimant, now)
+        self.hear_beat(k, now, source, message) && !k.peers().is_heard_now(claimant, now)
     }
 
-    /// Whether a message of this term's leader was passed on to this drone within the last `within_s`.
+    /// Whether this drone had news of this term's leader, from itself or passed on, within the last `within_s`.
     pub(crate) fn knows_term(&self, now: SimTime, ballot: Ballot, within_s: f64) -> bool {
-        let terms = self.relayed.range(..Subject::Plan(GroupId::ALL));
-        terms.into_iter().any(|(_, one)| one.version.ballot == ballot && now.since(one.heard) <= within_s)
+        self.beats.knows(now, ballot, within_s)
+    }
+
+    /// Notes a message of a term. Returns whether it is news.
+    fn hear_beat(&mut self, k: &Knowledge, now: SimTime, source: DroneId, message: &Leadership) -> bool {
+        let near = self.is_near(k, source);
+        self.beats.hear(now, message, near, self.crowded)
     }
 
     /// Notes a message of `source` that may have to be passed on. Returns whether it is new.
@@ -194,8 +212,7 @@ impl Relays {
         }
         let room = self.relayed.len() < 8 * self.drones as usize + 64;
         if room || self.relayed.contains_key(&subject) {
-            let shortest_s = if matches!(subject, Subject::Term(_)) { HOP_S } else { self.repeat_s };
-            let gossip = Gossip::varying(now, shortest_s, self.me);
+            let gossip = Gossip::varying(now, self.repeat_s, self.me);
             self.relayed.insert(subject, Relayed { message: *message, version, from: source, heard: now, gossip });
         }
         true
@@ -208,11 +225,12 @@ impl Relays {
         }
         let last = say.len() + MAX_RELAYED_PER_TICK;
         let position = self.position;
+        self.beats.speak(k, now, MAX_RELAYED_PER_TICK, self.lags, say);
         for (subject, one) in &mut self.relayed {
             if say.len() >= last {
                 return;
             }
-            if is_wanted(k, now, position, *subject, one) && one.gossip.is_due(now) {
+            if is_wanted(k, now, *subject, one) && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
                 say.push(passed_on(one.message, one.from));
             }
         }
@@ -224,7 +242,6 @@ impl Relays {
 fn subject(source: DroneId, message: &Message) -> Option<(Subject, Version)> {
     let at = |stamp| Version { stamp, ..Version::default() };
     Some(match message {
-        Message::Leadership(l) => (Subject::Term(l.group), Version { ballot: l.ballot, epoch: 0, stamp: l.stamp }),
         Message::Plan(plan) => {
             let version = Version { ballot: plan.id.ballot, epoch: plan.id.epoch, ..Version::default() };
             (Subject::Plan(plan.group), version)
@@ -245,17 +262,25 @@ fn is_same_passage(known: &Message, heard: &Message) -> bool {
 }
 
 /// Whether some drone may still need the message.
-fn is_wanted(k: &Knowledge, now: SimTime, position: Vec2, subject: Subject, one: &Relayed) -> bool {
+fn is_wanted(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> bool {
     match (subject, &one.message) {
         (Subject::Plan(scope), Message::Plan(plan)) => is_plan_wanted(k, now, scope, plan),
         (Subject::Part(..), Message::Assignment(part)) => {
             let Some(pose) = k.peers().last_of_living(part.drone, now) else { return one.gossip.is_first() };
-            let away_m = |from: Vec2| (from - pose.position()).norm();
-            let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
-            is_late(pose, part.id.ballot, part.id.epoch) && (one.gossip.doublings() >= DETOUR_DOUBLINGS || closer())
+            is_late(pose, part.id.ballot, part.id.epoch)
         }
         _ => one.gossip.is_first(),
     }
+}
+
+/// Whether this drone, which is at `position`, is closer to the drone that a message is for than the one it heard it from. In the end
+/// the message is passed on in all directions.
+fn is_on_the_way(k: &Knowledge, position: Vec2, one: &Relayed) -> bool {
+    let Message::Assignment(part) = &one.message else { return true };
+    let Some(pose) = k.peers().last(part.drone) else { return true };
+    let away_m = |from: Vec2| (from - pose.position()).norm();
+    let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
+    one.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
 }
 
 /// Whether a neighbour of the plan's group does not obey it yet.
@@ -271,10 +296,8 @@ fn is_late(pose: &Pose, ballot: Ballot, epoch: u32) -> bool {
 
 /// The message as it is passed on.
 fn passed_on(mut message: Message, from: DroneId) -> Message {
-    match &mut message {
-        Message::Leadership(leadership) => leadership.hops = leadership.hops.saturating_add(1),
-        Message::Passed(passed) => passed.of = passed.drone(from).0.saturating_add(1),
-        _ => {}
+    if let Message::Passed(passed) = &mut message {
+        passed.of = passed.drone(from).0.saturating_add(1);
     }
     message
 }

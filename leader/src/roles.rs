@@ -3,10 +3,12 @@
 use crate::election::Input;
 use crate::knowledge::Knowledge;
 use crate::member::Member;
+use crate::onward;
 use crate::own_state::OwnState;
+use crate::params::Between;
 use crate::peers::extrapolated;
 use crate::tuning::{BEHIND_S, LEFT_OUT_S};
-use skein_protocol::{DroneId, GroupId, ObstacleId, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,8 +18,8 @@ pub(crate) struct Roles {
     /// Since when the parts could be one group again.
     whole: Option<SimTime>,
     transfer: Option<Transfer>,
-    /// Since when its leader has planned without it.
-    left_out: Option<SimTime>,
+    /// The leader's term and since when it has planned without this drone.
+    left_out: Option<(Ballot, SimTime)>,
     /// Whether a drone obeys a plan of this leader's term that this leader never made. A new term ends that.
     plan_conflict_seen: bool,
 }
@@ -47,12 +49,14 @@ impl Roles {
     }
 
     /// The group that this drone is to lead now although another leader may be healthy: its part of a split group, with an
-    /// obstacle ahead; or the whole swarm, if it leads a part and no drone has an obstacle ahead any more.
+    /// obstacle ahead; or the whole swarm, if it leads a part, no drone has an obstacle ahead any more, and groups do not go on
+    /// by themselves.
     fn claimable(&mut self, k: &Knowledge, now: SimTime, own: &OwnState) -> Option<GroupId> {
         let (scope, group) = (k.election().scope(), k.election().group());
         let me = k.myself(own);
         let part = scope != group && scope.contains(group) && part_has_ahead(k, now, &me);
-        let whole = scope != GroupId::ALL && k.election().leads() && !any_has_ahead(k, now, &me);
+        let whole =
+            scope != GroupId::ALL && k.election().leads() && !any_has_ahead(k, now, &me) && !goes_on(k, now, &me);
         let rank = match (part, whole) {
             (true, _) => rank_in_part(k, now, &me),
             (false, true) => rank_among_leaders(k, now, &me),
@@ -73,7 +77,15 @@ impl Roles {
             self.left_out = None;
             return None;
         }
-        let waited_s = now.since(*self.left_out.get_or_insert(now)) - LEFT_OUT_S;
+        // Far from the leader, its neighbours notice first. And word takes longer there, to the leader and back.
+        let patience_s = match k.election().hops() {
+            0 => LEFT_OUT_S,
+            hops => LEFT_OUT_S * (1.0 + f64::from(hops)) + 2.0 * k.election().silence_s(),
+        };
+        let term = k.election().obeyed();
+        let known = self.left_out.filter(|(known, _)| *known == term);
+        let (_, since) = *self.left_out.insert(known.unwrap_or((term, now)));
+        let waited_s = now.since(since) - patience_s;
         if waited_s < 0.0 {
             return None;
         }
@@ -164,6 +176,12 @@ fn part_has_ahead(k: &Knowledge, now: SimTime, me: &Member) -> bool {
 /// Whether any living drone has an obstacle ahead.
 fn any_has_ahead(k: &Knowledge, now: SimTime, me: &Member) -> bool {
     has_ahead(k, k.living_peers(now).chain([*me]))
+}
+
+/// Whether groups still go on by themselves.
+fn goes_on(k: &Knowledge, now: SimTime, me: &Member) -> bool {
+    k.params().between == Between::GoOn
+        && onward::is_under_way(k.params(), k.living_peers(now).chain([*me]).map(|m| m.position))
 }
 
 /// Number of members of this drone's part that should lead it rather: the one that the plan names, even if that drone's

@@ -1,85 +1,103 @@
-//! The assignments of a plan: one block of memory, sorted by drone. It is read far more often than added to, and additions
-//! mostly come in the order of ids.
+//! One entry per drone, such as the assignments of a plan: one block of memory, sorted by drone. It is read far more often than
+//! added to, and additions mostly come in the order of ids.
 
 use skein_protocol::DroneId;
 use skein_protocol::payload::Assignment;
 
-/// At most one assignment per drone, by id.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Roster(Vec<Assignment>);
+/// An entry that belongs to one drone.
+pub trait OfDrone {
+    /// That drone. It must not change while the entry is in a roster.
+    fn drone(&self) -> DroneId;
+}
 
-impl Roster {
-    /// The index of a drone's assignment, or where it belongs. If all drones have assignments, that is the drone's id.
+impl OfDrone for Assignment {
+    fn drone(&self) -> DroneId {
+        self.drone
+    }
+}
+
+/// At most one entry per drone, by id.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Roster<T = Assignment>(Vec<T>);
+
+impl<T> Default for Roster<T> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<T: OfDrone> Roster<T> {
+    /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
         match (self.0.get(drone.index()), self.0.last()) {
-            (Some(part), _) if part.drone == drone => Ok(drone.index()),
-            (_, Some(last)) if last.drone >= drone => self.0.binary_search_by_key(&drone, |part| part.drone),
+            (Some(part), _) if part.drone() == drone => Ok(drone.index()),
+            (_, Some(last)) if last.drone() >= drone => self.0.binary_search_by_key(&drone, OfDrone::drone),
             _ => Err(self.0.len()),
         }
     }
 
-    /// The assignment of a drone.
+    /// The entry of a drone.
     #[must_use]
-    pub fn get(&self, drone: DroneId) -> Option<&Assignment> {
+    pub fn get(&self, drone: DroneId) -> Option<&T> {
         self.place(drone).ok().map(|place| &self.0[place])
     }
 
-    /// The assignment of a drone, to be changed. Its drone must stay the same.
-    pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut Assignment> {
+    /// The entry of a drone, to be changed. Its drone must stay the same.
+    pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut T> {
         self.place(drone).ok().map(|place| &mut self.0[place])
     }
 
-    /// Whether a drone has an assignment.
+    /// Whether a drone has an entry.
     #[must_use]
     pub fn contains(&self, drone: DroneId) -> bool {
         self.place(drone).is_ok()
     }
 
-    /// Adds an assignment, unless its drone has one already. Returns the one that the drone has then.
-    pub fn add(&mut self, part: Assignment) -> &mut Assignment {
-        let place = self.place(part.drone).unwrap_or_else(|place| {
+    /// Adds an entry, unless its drone has one already. Returns the one that the drone has then.
+    pub fn add(&mut self, part: T) -> &mut T {
+        let place = self.place(part.drone()).unwrap_or_else(|place| {
             self.0.insert(place, part);
             place
         });
         &mut self.0[place]
     }
 
-    /// All assignments, by drone.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &Assignment> + Clone {
+    /// All entries, by drone.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &T> + Clone {
         self.0.iter()
     }
 
-    /// All assignments, by drone, to be changed. Their drones must stay the same.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Assignment> {
+    /// All entries, by drone, to be changed. Their drones must stay the same.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
         self.0.iter_mut()
     }
 
-    /// Number of assignments.
+    /// Number of entries.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there is no assignment.
+    /// Whether there is no entry.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Removes the assignments of all other drones.
+    /// Removes the entries of all other drones.
     pub fn retain(&mut self, stays: impl Fn(DroneId) -> bool) {
-        self.0.retain(|part| stays(part.drone));
+        self.0.retain(|part| stays(part.drone()));
     }
 
-    /// Removes all assignments.
+    /// Removes all entries.
     pub fn clear(&mut self) {
         self.0.clear();
     }
 }
 
-/// Of several assignments of one drone the first one counts.
-impl FromIterator<Assignment> for Roster {
-    fn from_iter<I: IntoIterator<Item = Assignment>>(parts: I) -> Self {
+/// Of several entries of one drone the first one counts.
+impl<T: OfDrone> FromIterator<T> for Roster<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(parts: I) -> Self {
         let parts = parts.into_iter();
         let mut roster = Self(Vec::with_capacity(parts.size_hint().0));
         for part in parts {

@@ -6,8 +6,9 @@ use crate::member::Member;
 use crate::plan_exchange;
 use crate::planned_set::PlannedSet;
 use crate::routes::Routes;
+use crate::set_place::SetPlace;
 use crate::situation::Situation;
-use skein_protocol::payload::{Arrivals, Assignment};
+use skein_protocol::payload::Arrivals;
 use skein_protocol::{DroneId, ObstacleId};
 use std::collections::BTreeMap;
 
@@ -17,7 +18,7 @@ pub(crate) struct Survey<'a> {
     routes: Routes,
     /// One trip per member and route.
     trips: Vec<Vec<Trip>>,
-    kept: Vec<Option<&'a Assignment>>,
+    kept: Vec<Option<&'a SetPlace>>,
 }
 
 impl<'a> Survey<'a> {
@@ -33,7 +34,7 @@ impl<'a> Survey<'a> {
     }
 
     /// The same survey, with the assignments that members had at an earlier time.
-    pub(crate) fn with_kept(mut self, members: &[Member], kept: &'a BTreeMap<DroneId, Assignment>) -> Self {
+    pub(crate) fn with_kept(mut self, members: &[Member], kept: &'a BTreeMap<DroneId, SetPlace>) -> Self {
         self.kept = members.iter().map(|m| kept.get(&m.id)).collect();
         self
     }
@@ -44,7 +45,7 @@ impl<'a> Survey<'a> {
     }
 
     /// The assignments that members already have for the set.
-    pub(crate) fn kept(&self) -> &[Option<&'a Assignment>] {
+    pub(crate) fn kept(&self) -> &[Option<&'a SetPlace>] {
         &self.kept
     }
 

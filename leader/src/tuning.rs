@@ -88,10 +88,23 @@ pub(crate) const NEAR: f64 = 0.5;
 /// A drone passes messages on once a neighbour has heard other drones than it does for this long, s. At least three beacons,
 /// and twice the message delay is added. 0.5. By hand: longer than a crash is noticed by some and not by others.
 pub(crate) const WIDE_S: f64 = 0.5;
-/// Longest time until a message of a leader is passed on, s. 0.1: half of a heartbeat period. By hand.
+/// Longest time until a message of a leader is passed on while other drones are close, s; also the time between two repetitions
+/// while a neighbour obeys an earlier term. 0.1: half of a heartbeat period. By hand.
 pub(crate) const HOP_S: f64 = 0.1;
+/// A leader's next message is overdue after this many heartbeat periods. No unit. 1.1. By hand: a little more than one, so that
+/// nothing is repeated while nothing is lost.
+pub(crate) const BEAT_OVERDUE: f64 = 1.1;
+/// Time between two repetitions of a leader's newest message, in heartbeat periods. No unit. 0.5. By hand; `skein bench election`.
+pub(crate) const BEAT_REPEAT: f64 = 0.5;
+/// The newest message of a term that this drone does not obey is repeated for this many heartbeat periods. No unit. 10. By hand.
+pub(crate) const FOREIGN_BEATS: f64 = 10.0;
 /// What was not heard for this long is forgotten, s. 30. By hand.
 pub(crate) const RELAY_MEMORY_S: f64 = 30.0;
+/// A message of a leader whose stamp lies further in the future is not believed, s. 2: twice the offset of two clocks that are
+/// each one second off. By calculation.
+pub(crate) const CLOCKS_S: f64 = 2.0;
+/// A message of a leader that was passed on for longer is not believed, s. 300: some hundred hops at 75 % loss. By hand.
+pub(crate) const OLDEST_S: f64 = 300.0;
 /// Most frames that a drone passes on in one tick. 4. By hand.
 pub(crate) const MAX_RELAYED_PER_TICK: usize = 4;
 /// An assignment is passed on by drones in all directions from this interval on. No unit. 2. By hand.
@@ -143,3 +156,8 @@ pub(crate) const COOLING: f64 = 0.8;
 pub(crate) const SINKHORN_ROUNDS: usize = 20;
 /// Sinkhorn rounds end when no row's scale changes by more than this part of the temperature. No unit. 1e-3. By hand.
 pub(crate) const BALANCED: f64 = 1e-3;
+
+/// How far an outline has to reach beyond what is known of it until it counts as grown, m. Chosen by hand: less than the planning
+/// distance leaves beyond the clearance. `skein sweep
+/// experiments/sensors.toml --set sensors.outline=seen`.
+pub(crate) const OUTLINE_GROWTH_M: f64 = 2.0;

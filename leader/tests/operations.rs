@@ -10,8 +10,10 @@ use swarm::{DEFAULT, Periods, wall};
 
 /// Coarser than in flight, so that much happens in few ticks.
 const PERIODS: Periods = Periods { dt_s: 0.05, ..DEFAULT };
+/// The longest that a dead drone counts as living that was last heard over other drones, s: twelve time-outs.
+const FAR_S: f64 = 12.0 * PERIODS.peer_timeout_s;
 /// Time within which the swarm becomes one group once there are no faults and no obstacles ahead, s.
-const FAIR_S: f64 = 20.0;
+const FAIR_S: f64 = 20.0 + FAR_S;
 
 /// An operation. Indices are taken modulo the number of elements.
 #[derive(Clone, Debug)]

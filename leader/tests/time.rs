@@ -183,3 +183,44 @@ fn a_chain_has_one_leader_and_one_plan_and_keeps_them() {
         assert_eq!((swarm.disunion(0), elections(&swarm)), (None, settled), "{name}");
     }
 }
+
+#[test]
+fn a_chain_that_loses_many_frames_unites() {
+    for (drones, loss, seed, limit_s) in [(10, 0.75, 1, 60.0), (30, 0.25, 2, 40.0), (30, 0.5, 3, 60.0)] {
+        let name = format!("{drones} drones, loss {loss}");
+        let mut swarm = Swarm::new(DEFAULT, Air { seed, loss, ..Air::default() }, drones);
+        swarm.reach = 1;
+        let terms = |s: &Swarm| s.side(0).iter().map(|(_, l)| l.term()).collect::<BTreeSet<_>>();
+        let led = |s: &Swarm| {
+            let one = terms(s).len() == 1 && s.term(0) != Some(Ballot::NONE);
+            (!one).then(|| format!("{:?}", terms(s)))
+        };
+        let united_s = swarm.until(limit_s, led);
+        assert!(united_s.is_ok(), "{name}: {united_s:?}");
+        swarm.run(20.0);
+        let (settled, elections) = (terms(&swarm), swarm.watch.as_ref().unwrap().leaders.len());
+        println!("{name}: one leader after {united_s:?} s, {elections} elections");
+        swarm.run(60.0);
+        assert_eq!((terms(&swarm), swarm.watch.as_ref().unwrap().leaders.len()), (settled, elections), "{name}");
+    }
+}
+
+#[test]
+fn repetitions_of_its_heartbeats_do_not_keep_a_dead_leader_alive() {
+    for (loss, limit_s) in [(0.0, 4.0), (0.25, 10.0), (0.5, 20.0)] {
+        for seed in 0..5 {
+            let mut swarm = Swarm::new(DEFAULT, Air { seed, loss, ..Air::default() }, 12);
+            swarm.reach = 2;
+            swarm.run(40.0);
+            let old = swarm.term(11).unwrap();
+            assert!((0..12).all(|drone| swarm.term(drone) == Some(old)), "loss {loss}, seed {seed}");
+            swarm.kill(old.claimant.index());
+            let replaced_s = swarm.until(limit_s, |s| {
+                let terms: BTreeSet<_> = s.side(0).iter().map(|(_, l)| l.term()).collect();
+                (terms.len() != 1 || terms.contains(&old)).then(|| format!("{terms:?}"))
+            });
+            assert!(replaced_s.is_ok(), "loss {loss}, seed {seed}: {replaced_s:?}");
+            println!("loss {loss}, seed {seed}: replaced after {replaced_s:?} s");
+        }
+    }
+}

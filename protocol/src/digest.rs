@@ -21,6 +21,13 @@ impl Digest {
         xxhash_rust::xxh3::xxh3_64_with_seed(&word.to_le_bytes(), hash)
     }
 
+    /// The hash of these bytes alone. This is cheaper than a [`Digest`] for few bytes.
+    #[must_use]
+    #[inline]
+    pub fn of(bytes: &[u8]) -> u64 {
+        xxhash_rust::xxh3::xxh3_64(bytes)
+    }
+
     /// Adds bytes.
     pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         self.0.update(bytes);

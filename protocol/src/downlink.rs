@@ -74,6 +74,8 @@ pub struct SensesHeader {
     pub link_faults: LinkFaults,
     /// Time that faults add to the drone's reaction time, s.
     pub extra_reaction_s: f64,
+    /// What the drone's clock is ahead of the time of the mission, ns.
+    pub clock_error_ns: i64,
     /// The sensors that report nothing, as flags: [`BrokenSensors::to_wire`].
     pub broken: u32,
     /// Always 0.
@@ -292,9 +294,10 @@ impl<'a> DownlinkView<'a> {
     #[must_use]
     pub fn senses(&self, drone: DroneId) -> Option<Senses<'a>> {
         let head = self.drones.get(drone.index())?;
+        let now = SimTime(self.head.now.0.saturating_add(head.clock_error_ns));
         Some(Senses {
-            now_s: self.head.now.secs(),
-            now: self.head.now,
+            now_s: now.secs(),
+            now,
             tick: self.head.tick,
             position_m: head.position_m,
             velocity_mps: head.velocity_mps,
@@ -310,7 +313,7 @@ impl<'a> DownlinkView<'a> {
 /// What one drone senses in one tick, and when.
 #[derive(Clone, Copy, Debug)]
 pub struct Senses<'a> {
-    /// Simulated time at which the tick begins, s.
+    /// Simulated time at which the tick begins, by the drone's clock, s.
     pub now_s: f64,
     /// The same time, exact.
     pub now: SimTime,
@@ -421,6 +424,17 @@ mod tests {
         assert_eq!(senses.neighbours[0].drone, DroneId(5));
         assert_eq!((view.head.tick, view.head.now, senses.now_s), (3, SimTime(60), 6e-8));
         assert!(view.senses(DroneId(1)).is_none());
+    }
+
+    #[test]
+    fn a_drone_reads_its_own_clock() {
+        let mut down = Downlink::default();
+        down.drones.extend(
+            [-1_000_000_000, 0, 5].map(|clock_error_ns| SensesHeader { clock_error_ns, ..SensesHeader::default() }),
+        );
+        down.seal(3, SimTime(60));
+        let read = |drone| down.view().senses(DroneId(drone)).unwrap().now;
+        assert_eq!([0, 1, 2].map(read), [SimTime(60 - 1_000_000_000), SimTime(60), SimTime(65)]);
     }
 
     #[test]

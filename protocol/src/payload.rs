@@ -190,7 +190,8 @@ pub struct Obstacle {
 #[repr(C)]
 #[derive(Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Leadership {
-    /// Time of sending. In a pre-vote and in its rejection: the time when the source last heard of the leader.
+    /// Time of sending. In a pre-vote and in its rejection: when the leader sent the newest sign of life that the source knows, by
+    /// the leader's clock.
     pub stamp: SimTime,
     /// The term.
     pub ballot: Ballot,
@@ -278,7 +279,8 @@ impl Plan {
         let (start, velocity) = (Vec2::from(self.anchor_m), Vec2::from(self.anchor_mps));
         let here = start + velocity * now.since(self.stamp);
         if velocity.x > 0.0 && here.x >= self.anchor_stop_x_m {
-            return (Vec2::new(self.anchor_stop_x_m.max(start.x), here.y), Vec2::zeros());
+            let moved_s = ((self.anchor_stop_x_m - start.x) / velocity.x).max(0.0);
+            return (Vec2::new(self.anchor_stop_x_m.max(start.x), start.y + velocity.y * moved_s), Vec2::zeros());
         }
         (here, velocity)
     }

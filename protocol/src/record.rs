@@ -248,6 +248,9 @@ pub struct Totals {
     pub telemetry_refused: u64,
     /// Number of times a drone missed a tick's deadline (wall clock only).
     pub deadline_misses: u64,
+    /// Number of parts of the swarm at the end; `None` unless each part ends its mission by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<u32>,
     /// Wall time from the start of the first tick to the end of the last tick, s.
     pub wall_s: f64,
     /// Delay of the ticks' starts behind their schedule (wall clock only).

@@ -88,6 +88,15 @@ impl ConvexShape {
         if floor_m < top_m { Ok(Self { floor_m, top_m, ..self }) } else { Err(ShapeError::Heights) }
     }
 
+    /// The same shape, moved by `by_m`, m.
+    #[must_use]
+    pub fn moved(mut self, by_m: Vec2) -> Self {
+        for vertex in self.vertices_m.iter_mut().take(self.count as usize) {
+            *vertex = [vertex[0] + by_m.x, vertex[1] + by_m.y];
+        }
+        self
+    }
+
     /// Whether a drone at this altitude could come closer to the shape than `margin_m` by flying on at its altitude.
     #[must_use]
     pub fn blocks(&self, altitude_m: f64, margin_m: f64) -> bool {

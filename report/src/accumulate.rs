@@ -247,6 +247,7 @@ impl Accumulator {
             step_us: self.steps.times().filter(|_| self.facts.runtime != "inline"),
             metrics_own: self.own_metrics.finish(),
             telemetry_refused: totals.map(|totals| totals.telemetry_refused),
+            parts: totals.and_then(|totals| totals.parts),
             failures: self.failures,
             hosts: Vec::new(),
             rejected_commands: totals.map(|totals| totals.rejected_commands),

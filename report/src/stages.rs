@@ -10,10 +10,15 @@ use skein_protocol::{GroupId, Message, Phase, PlanStamp};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
+/// More than arrivals lose on their way between leaders, which is in single precision, s.
+const ROUNDING_S: f64 = 1e-3;
+
 /// Follows all stages of a mission. A stage is an obstacle set that the swarm passes.
 pub(crate) struct Stages {
     stages: Vec<Progress>,
     plans: BTreeMap<PlanStamp, AvoidPlan>,
+    /// By plan: the longest free flight to the gate that an assignment names, s.
+    free_flights_s: BTreeMap<PlanStamp, f64>,
 }
 
 /// What is known of one stage so far.
@@ -60,7 +65,8 @@ impl Stages {
             flown: vec![None; drones],
             beyond: vec![false; drones],
         };
-        Self { stages: facts.sets().into_iter().map(stage).collect(), plans: BTreeMap::new() }
+        let stages = facts.sets().into_iter().map(stage).collect();
+        Self { stages, plans: BTreeMap::new(), free_flights_s: BTreeMap::new() }
     }
 
     /// Notes that a living drone senses the set for the first time. Returns whether it is the first set that any drone
@@ -88,14 +94,20 @@ impl Stages {
         !self.stages.is_empty()
     }
 
-    /// Takes the plans that were sent in a tick.
+    /// Takes the plans and assignments that were sent in a tick.
     pub(crate) fn take_frames(&mut self, frames: &[AirFrame]) {
-        for frame in frames.iter().filter(|frame| frame.frame.kind == Topic::Plan as u16) {
-            // Frames that no receiver can decode are no plans.
-            if let Ok(Message::Plan(plan)) = Message::decode(&frame.frame)
-                && plan.phase() == Phase::Avoid
-            {
-                self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
+        let kinds = [Topic::Plan as u16, Topic::Assignment as u16];
+        for frame in frames.iter().filter(|frame| kinds.contains(&frame.frame.kind)) {
+            match Message::decode(&frame.frame) {
+                Ok(Message::Plan(plan)) if plan.phase() == Phase::Avoid => {
+                    self.plans.entry(plan.id).or_insert_with(|| AvoidPlan::new(&plan));
+                }
+                Ok(Message::Assignment(part)) if part.route != NO_ROUTE => {
+                    let longest_s = self.free_flights_s.entry(part.id).or_insert(part.arrival_s);
+                    *longest_s = longest_s.max(part.arrival_s);
+                }
+                // Frames that no receiver can decode are no plans.
+                _ => {}
             }
         }
     }
@@ -137,9 +149,21 @@ impl Stages {
             split_left_right: split.as_deref().and_then(left_right),
             split,
             predicted_s: predicted.zip(stage.detected_s).map(|(instant, detected)| instant - detected),
+            forecasts_too_short: self.forecasts_too_short(stage),
             candidates_rehearsed: plans.iter().map(|plan| plan.candidates).max(),
             groups: stage.detected_s.map(|_| self.groups(stage)),
         }
+    }
+
+    /// Number of plans for the set whose forecast is shorter than the free flight of one of their drones. `None` without plans.
+    fn forecasts_too_short(&self, stage: &Progress) -> Option<u32> {
+        let set = &stage.set.obstacles;
+        let plans = self.plans.iter().filter(|(_, plan)| plan.obstacles.iter().any(|id| set.contains(id)));
+        let mut plans = plans.peekable();
+        plans.peek()?;
+        let free_s = |stamp: &PlanStamp| self.free_flights_s.get(stamp).map_or(0.0, |free_s| free_s - ROUNDING_S);
+        let short = plans.filter(|(stamp, plan)| plan.predicted_s.is_some_and(|forecast_s| forecast_s < free_s(stamp)));
+        Some(short.count() as u32)
     }
 
     /// The last plan for each group, among the plans under which drones passed the set.

@@ -102,6 +102,9 @@ pub struct Summary {
     /// Number of figures, marks and lines that were not recorded, because they were not valid or too many in a tick.
     #[serde(default)]
     pub telemetry_refused: Option<u64>,
+    /// Number of parts of the swarm at the end that no radio connects; null unless the scenario says `mission.parts = "each"`.
+    #[serde(default)]
+    pub parts: Option<u32>,
     /// The pilots that failed.
     #[serde(default)]
     pub failures: Vec<FailureEntry>,
@@ -159,6 +162,10 @@ pub struct Stage {
     pub split_left_right: Option<[u32; 2]>,
     /// The leaders' prediction of `pass_time_s`, s.
     pub predicted_s: Option<f64>,
+    /// Number of plans for the set whose forecast was shorter than the free flight of one of their drones to the gate. No drone can
+    /// pass sooner than that, so this should be 0.
+    #[serde(default)]
+    pub forecasts_too_short: Option<u32>,
     /// Number of candidate groupings that a leader simulated before its choice.
     pub candidates_rehearsed: Option<u32>,
     /// The groups that passed it.

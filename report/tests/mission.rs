@@ -314,7 +314,7 @@ fn an_invalid_record_is_refused_with_its_tick() {
 /// Every key of the summary: `a.b` is a key of an object, `a[].b` a key of the entries of a list.
 const KEYS: &str = "schema scenario strategy seed runtime clock drones dt_s ticks sim_s realtime_factor \
     agent_steps_per_s wall_s startup_s report_s outcome stages[].detected_s stages[].passed_s stages[].pass_time_s \
-    stages[].routes stages[].split stages[].split_left_right stages[].predicted_s stages[].candidates_rehearsed \
+    stages[].routes stages[].split stages[].split_left_right stages[].predicted_s stages[].forecasts_too_short stages[].candidates_rehearsed \
     stages[].groups[].name stages[].groups[].route stages[].groups[].drones stages[].groups[].leader mission_s \
     reform_start_s reform_end_s formation_error_m formation_rmse_m mean_distance_error_m energy_j.total \
     energy_j.until_passed energy_j.detection_to_pass energy_j.per_drone min_separation_m min_clearance_m min_altitude_m \

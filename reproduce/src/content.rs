@@ -137,8 +137,9 @@ fn ambiguities() -> [String; 5] {
          the plan is made, and is then kept; in the paper the drone that is farthest ahead has precedence at any time. With a fixed \
          order no two drones exchange their places while messages are under way."
             .to_owned(),
-        "Between the two sets of the forest our groups close up to the full formation. In the paper, N1 and N2 split again as \
-         soon as they are past the first set."
+        "Between the two sets of the forest, N1 and N2 go on by themselves and split again, as in the paper. The paper does not \
+         say in which order or in which direction they fly there. Here each group closes its own ranks and flies straight to where \
+         its drones will stand at the end. A table below has the mission with a formation that closes between the sets, too."
             .to_owned(),
     ]
 }

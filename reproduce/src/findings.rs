@@ -47,6 +47,69 @@ pub(crate) fn caps(study: &Study, results: &Results) -> String {
     )
 }
 
+/// How much energy and ratio depend on what power is computed from.
+pub(crate) fn power(study: &Study, results: &Results) -> String {
+    let models: Vec<&str> = {
+        let mut models: Vec<&str> = study.cases.iter().map(|case| case.labels[1].as_str()).collect();
+        models.truncate(models.len() / study.first_labels().len().max(1));
+        models.dedup();
+        models
+    };
+    let ratio = |scenario: &str, model: &str| {
+        let ratio = study.ratio(results, &[scenario, model, SHORTEST], &[scenario, model, PAPER]);
+        ratio.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.3}"))
+    };
+    let of = |scenario: &&str| {
+        let ratios: Vec<String> = models.iter().map(|model| ratio(scenario, model)).collect();
+        format!("{scenario} {}", ratios.join(" / "))
+    };
+    let all: Vec<String> = study.first_labels().iter().map(of).collect();
+    let thrust = |strategy: &str| {
+        let of = |scenario: &&str| {
+            let energy = |model: &str| Some(study.reached(results, &[scenario, model, strategy])?.energy_j.total);
+            Some(percent(energy("thrust for acceleration")? / energy("paper")?))
+        };
+        study.first_labels().iter().filter_map(of).collect::<Vec<String>>().join(", ")
+    };
+    format!(
+        "The paper's power depends on the speed in still air alone. With `energy.thrust = \"acceleration\"` it is P(V, κ) of Zeng, \
+         Xu and Zhang, with κ the thrust over the weight; this adds {} to the energy of the rule, and {} to that of shortest path. With \
+         `energy.wind_mps` it is the power of the airspeed. Neither changes a flight. Energy of shortest path over that of the \
+         paper's rule, from start to end, with power by {}: {}.",
+        thrust(PAPER),
+        thrust(SHORTEST),
+        models.join(" / "),
+        all.join("; ")
+    )
+}
+
+/// What it changes whether groups close up between two sets.
+pub(crate) fn between(study: &Study, results: &Results) -> String {
+    let one = |name: &&str| {
+        let rule = study.reached(results, &[name, PAPER])?;
+        let stage = rule.stages.last()?;
+        let split: Vec<String> = stage.split.iter().flatten().rev().map(ToString::to_string).collect();
+        Some(format!(
+            "{name}: second set detected after {:.1} s and passed after {:.1} s in {}, formation closed after {:.1} s, {:.1} kJ, \
+             shortest path over the rule {:.3}",
+            stage.detected_s?,
+            stage.passed_s?,
+            split.join("/"),
+            rule.mission_s,
+            rule.energy_j.total / 1e3,
+            study.ratio(results, &[name, SHORTEST], &[name, PAPER])?
+        ))
+    };
+    let both: Vec<String> = study.first_labels().iter().filter_map(one).collect();
+    format!(
+        "In the paper, N1 and N2 go on as they are, and split again as soon as they are past the first set: `mission.between = \
+         \"go-on\"`, which the scenario file has. Each group closes its own ranks and flies straight to the part of the formation at \
+         the destination that its drones will take. With `close-up`, the default of the key, all drones become one formation \
+         between the sets. {}.",
+        both.join(". ")
+    )
+}
+
 /// How much the ratio depends on the end of the mission and on the convention.
 pub(crate) fn ends(study: &Study, results: &Results) -> String {
     let range = |geometry: &str| {

@@ -6,9 +6,18 @@ use crate::findings;
 use crate::flight::Flight;
 use crate::study::{Study, StudyCase};
 
+/// Models of power, each with the key that it changes.
+const POWER_MODELS: [(&str, (&str, &str)); 5] = [
+    ("paper", ("", "")),
+    ("thrust for acceleration", ("energy.thrust", "acceleration")),
+    ("head wind of 5 m/s", ("energy.wind_mps", "[-5,0]")),
+    ("tail wind of 5 m/s", ("energy.wind_mps", "[5,0]")),
+    ("side wind of 5 m/s", ("energy.wind_mps", "[0,5]")),
+];
+
 /// All studies.
 pub(crate) fn studies(quick: bool) -> Vec<Study> {
-    vec![caps(), strategies(), ends(), ablation(quick), narrow(quick), reaction(quick)]
+    vec![caps(), power(), between(), strategies(), ends(), ablation(quick), narrow(quick), reaction(quick)]
 }
 
 fn strategies() -> Study {
@@ -43,6 +52,47 @@ fn caps() -> Study {
         labels: &["scenario", "cap", "strategy"],
         cases,
         finding: findings::caps,
+    }
+}
+
+/// What the energy is computed from: thrust for acceleration, and airspeed in wind.
+fn power() -> Study {
+    let scenarios = GEOMETRIES.iter().map(|geometry| format!("{geometry}-right")).chain(["forest".to_owned()]);
+    let mut cases = Vec::new();
+    for (scenario, (name, key, value)) in
+        scenarios.flat_map(|scenario| POWER_MODELS.map(|(name, set)| (scenario.clone(), (name, set.0, set.1))))
+    {
+        for strategy in [PAPER, SHORTEST] {
+            let flight = Flight::new(&scenario, strategy);
+            let flight = if key.is_empty() { flight } else { flight.with(key, value) };
+            let id = format!("power.{scenario}.{}.{strategy}", name.replace(' ', "-"));
+            cases.push(StudyCase::new(id, &[&title(&scenario), name, strategy], flight));
+        }
+    }
+    Study {
+        heading: "What power is computed from",
+        labels: &["scenario", "power", "strategy"],
+        cases,
+        finding: findings::power,
+    }
+}
+
+/// The two sets of the forest, both ways.
+fn between() -> Study {
+    let mut cases = Vec::new();
+    for (name, between) in [("go on", "go-on"), ("close up", "close-up")] {
+        for strategy in [PAPER, SHORTEST] {
+            let flight = Flight::new("forest", strategy);
+            // The scenario file has the paper's way.
+            let flight = if between == "go-on" { flight } else { flight.with("mission.between", "close-up") };
+            cases.push(StudyCase::new(format!("between.{between}.{strategy}"), &[name, strategy], flight));
+        }
+    }
+    Study {
+        heading: "Between the two sets of the forest (G1)",
+        labels: &["between the sets", "strategy"],
+        cases,
+        finding: findings::between,
     }
 }
 

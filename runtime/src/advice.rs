@@ -14,6 +14,28 @@ pub fn speed_on_sight_mps(scenario: &Scenario) -> f64 {
     params.speed_on_sight_mps(lag(scenario))
 }
 
+/// The distances that the drones of a scenario keep, with all margins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeptDistances {
+    /// Between two drones, as they read their positions, m.
+    pub separation_m: f64,
+    /// From the outline of an obstacle, as it is sensed, m.
+    pub clearance_m: f64,
+    /// Whether drones keep apart by messages alone.
+    pub by_words: bool,
+}
+
+/// The distances that drones keep while nothing hinders them.
+#[must_use]
+pub fn kept_distances(scenario: &Scenario) -> KeptDistances {
+    let params = pilot(scenario);
+    KeptDistances {
+        separation_m: params.separation_kept_m(),
+        clearance_m: params.safety.clearance_m + params.sensing.obstacle_m,
+        by_words: params.apart_by_words,
+    }
+}
+
 /// Sentences about what cannot work in this scenario, each with its numbers and the keys to change. Empty if there is nothing.
 ///
 /// # Errors
@@ -61,8 +83,8 @@ fn slots_too_close(scenario: &Scenario) -> Option<String> {
     (nearest_m < keep_m).then(|| {
         format!(
             "the nearest slots of the formation are {nearest_m:.2} m apart, but drones keep {keep_m:.2} m \
-             (drone.safe_distance_m, its margin, and the reaction time): the formation may not close; \
-             raise formation.spacing_m or lower drone.reaction_time_s"
+             (drone.safe_distance_m, its margin, the reaction time, and twice sensors.position_error_max_m where words keep them \
+             apart): the formation may not close; raise formation.spacing_m or lower drone.reaction_time_s"
         )
     })
 }
@@ -141,6 +163,19 @@ mod tests {
     #[test]
     fn a_scenario_that_works_gives_no_warning() {
         assert_eq!(warned("[formation]\ndrones = 8\n"), "");
+    }
+
+    #[test]
+    fn errors_of_sensors_add_to_the_distances() {
+        let kept = |keys: &str| {
+            let text = format!("[formation]\ndrones = 8\n[sensors]\nobstacle_error_max_m = 0.5\n{keys}");
+            kept_distances(&Scenario::parse(&text, ScenarioSource { name: "test", stem: "test" }, &[]).unwrap())
+        };
+        let (ranged, said) = (kept("position_std_m = 2\n"), kept("position_std_m = 2\nranging = false\n"));
+        assert!(!ranged.by_words && said.by_words && ranged.clearance_m == 15.5);
+        assert!((said.separation_m - (1.01 * 35.0 + 12.0)).abs() < 1e-9, "{said:?}");
+        assert!(ranged.separation_m < 38.0, "{ranged:?}");
+        assert!(warned("[sensors]\nposition_std_m = 2\nranging = false\n").contains("sensors.position_error_max_m"));
     }
 
     #[test]

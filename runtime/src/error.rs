@@ -5,6 +5,7 @@ use skein_bus::{BusError, Version};
 use skein_protocol::DroneId;
 use skein_protocol::shape::ShapeError;
 use skein_world::WorldError;
+use skein_world::split::SplitError;
 use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -19,6 +20,9 @@ pub enum RuntimeError {
     /// An obstacle of the scenario has an impossible shape.
     #[error("the scenario makes no world: {0}")]
     Shape(ShapeError),
+    /// The world cannot be divided.
+    #[error("the world is not divided: {0}")]
+    Split(#[from] SplitError),
     /// The pilots of the scenario cannot fly it.
     #[error(transparent)]
     Pilot(#[from] PilotProblem),

@@ -6,13 +6,17 @@ use skein_agent::PilotParams;
 use skein_agent::detection::Braking;
 use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::SafetyParams;
+use skein_agent::sensing_errors::SensingErrors;
 use skein_leader::election::ElectionParams;
-use skein_leader::params::{Destination, Objective, PlannerParams, Strategy};
+use skein_leader::params::{Between, Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::{DroneId, SimTime, Vec2, Vec3};
-use skein_scenario::{End, Failsafe, FaultKind, Reformation as ReformationKey, Scenario, Strategy as StrategyKey};
-use skein_world::{World, WorldParams};
+use skein_scenario::{
+    Between as BetweenKey, End, Failsafe, FaultKind, OutlineSensing, Parts, Reformation as ReformationKey, Scenario,
+    Strategy as StrategyKey, Thrust,
+};
+use skein_world::{ClockErrors, EnergyModel, PositionError, RangingErrors, SensorErrors, World, WorldParams};
 
 /// Number of drones in a scenario.
 #[must_use]
@@ -32,8 +36,25 @@ pub fn dt_ns(scenario: &Scenario) -> i64 {
 /// # Errors
 /// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`]. A checked scenario gives no error.
 pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
+    let shapes = scenario.shapes().map_err(RuntimeError::Shape)?;
+    Ok(World::new(world_params(scenario)?, &starts(scenario), &shapes)?)
+}
+
+/// Position (m) and velocity (m/s) of each drone at the start of the mission, world frame.
+#[must_use]
+pub fn starts(scenario: &Scenario) -> Vec<(Vec3, Vec3)> {
+    let velocity = Vec3::new(scenario.drone.speed_mps, 0.0, 0.0);
+    let start = |place: Vec2| (place.push(scenario.altitude_m()), velocity);
+    scenario.starts().into_iter().map(start).collect()
+}
+
+/// The parameters of the world.
+///
+/// # Errors
+/// [`RuntimeError::Shape`]. A checked scenario gives no error.
+pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
     let drone = &scenario.drone;
-    let params = WorldParams {
+    Ok(WorldParams {
         dt_ns: dt_ns(scenario),
         timeout_s: scenario.timeout_s(),
         without_way: without_way(scenario)?,
@@ -45,6 +66,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
         planning_distance_m: scenario.avoidance.planning_distance_m,
         detection_range_m: scenario.sensors.detection_range_m,
         ranging_m: scenario.sensors.ranging.then_some(scenario.ranging_m()),
+        sensors: sensor_errors(scenario),
         channel: scenario.channel(),
         locality: scenario.radio().locality(),
         failsafe: match scenario.faults.failsafe {
@@ -52,17 +74,44 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
             Failsafe::Land => skein_world::Failsafe::Land,
         },
         end: end(scenario),
+        parts: parts(scenario),
         arrival_error_m: scenario.mission.arrival_error_m,
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
+        energy: EnergyModel {
+            wind_mps: scenario.energy.wind_mps.into(),
+            thrust: scenario.energy.thrust == Thrust::Acceleration,
+        },
         faults: fault_plan(scenario),
         pilots: scenario.pilot_names(),
-    };
-    let velocity = Vec3::new(drone.speed_mps, 0.0, 0.0);
-    let start = |place: Vec2| (place.push(scenario.altitude_m()), velocity);
-    let starts: Vec<(Vec3, Vec3)> = scenario.starts().into_iter().map(start).collect();
-    let shapes = scenario.shapes().map_err(RuntimeError::Shape)?;
-    Ok(World::new(params, &starts, &shapes)?)
+    })
+}
+
+/// The errors of sensors and clocks.
+fn sensor_errors(scenario: &Scenario) -> SensorErrors {
+    let sensors = &scenario.sensors;
+    SensorErrors {
+        seed: scenario.seed,
+        position: PositionError {
+            std_m: sensors.position_std_m,
+            correlation_s: sensors.position_correlation_s,
+            max_m: sensors.position_error_max_m(),
+        },
+        ranging: RangingErrors {
+            std_m: sensors.ranging_std_m,
+            bearing_std_rad: sensors.ranging_bearing_std_rad,
+            velocity_std_mps: sensors.ranging_velocity_std_mps,
+            outlier_share: sensors.ranging_outlier_share,
+            outlier_m: sensors.ranging_outlier_m,
+            dropout_share: sensors.ranging_dropout_share,
+            latency_s: sensors.ranging_latency_s,
+            field_rad: sensors.ranging_field_rad,
+            occlusion: sensors.ranging_occlusion,
+        },
+        obstacle_error_max_m: sensors.obstacle_error_max_m,
+        view_m: (sensors.outline == OutlineSensing::Seen).then_some(sensors.detection_range_m),
+        clock: ClockErrors { offset_max_s: sensors.clock_offset_max_s, drift_max_ppm: sensors.clock_drift_max_ppm },
+    }
 }
 
 /// What ends the mission.
@@ -72,6 +121,14 @@ fn end(scenario: &Scenario) -> skein_world::End {
         (End::Pilots, _) => skein_world::End::Pilots,
         (_, Destination::Hold { stop_x_m }) => skein_world::End::Hold { stop_x_m },
         (_, Destination::Goal { front_m }) => skein_world::End::Goal { front_m },
+    }
+}
+
+/// What has to be in formation at the end.
+fn parts(scenario: &Scenario) -> skein_world::PartsRule {
+    match scenario.mission.parts {
+        Parts::One => skein_world::PartsRule::One,
+        Parts::Each => skein_world::PartsRule::Each { reach_m: scenario.radio().beacon_range_m() },
     }
 }
 
@@ -127,9 +184,15 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         altitude_m: scenario.altitude_m(),
         detection_range_m: scenario.sensors.detection_range_m,
         speed_max_mps: drone.speed_max_mps,
-        ranging: scenario.sensors.ranging,
         ranging_m: scenario.ranging_m(),
-        starts_m: if scenario.sensors.ranging { [].into() } else { scenario.starts().into() },
+        apart_by_words: scenario.sensors.apart_by_words(),
+        sensing: SensingErrors {
+            position_m: scenario.sensors.position_error_max_m(),
+            obstacle_m: scenario.sensors.obstacle_error_max_m,
+            clock_s: scenario.clock_error_max_s(),
+            partial_outlines: scenario.sensors.outline == OutlineSensing::Seen,
+        },
+        starts_m: if scenario.sensors.apart_by_words() { scenario.starts().into() } else { [].into() },
         braking: Braking { deceleration_mps2: scenario.braking_mps2(), reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
         election: ElectionParams {
@@ -161,7 +224,10 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         },
         speed_mps: drone.speed_mps,
         headway_s: avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps,
-        routes: RouteParams { clearance_m: avoidance.clearance_m, planning_distance_m: avoidance.planning_distance_m },
+        routes: RouteParams {
+            clearance_m: avoidance.clearance_m + scenario.sensors.obstacle_error_max_m,
+            planning_distance_m: avoidance.planning_distance_m + scenario.sensors.obstacle_error_max_m,
+        },
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
         reformation: match scenario.mission.reformation {
@@ -174,6 +240,10 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         safe_distance_m: drone.safe_distance_m,
         course_y_m: scenario.formation.start_m[1],
         destination: destination(scenario),
+        between: match scenario.mission.between {
+            BetweenKey::CloseUp => Between::CloseUp,
+            BetweenKey::GoOn => Between::GoOn,
+        },
         debounce_s: scenario.protocol.debounce_s,
     }
 }

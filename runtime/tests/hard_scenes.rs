@@ -62,6 +62,21 @@ fn drones_keep_clear_of_an_obstacle_that_they_no_longer_sense() {
     }
 }
 
+/// Sensors and clocks with errors: what the world judges is true.
+#[test]
+fn real_sensors_break_no_distance() {
+    for strategy in ["shortest-path", "congestion-aware-paper"] {
+        assert_reached("real-sensors", strategy);
+    }
+}
+
+#[test]
+fn drones_whose_ranging_fails_agree_on_lines_and_fly_on() {
+    for strategy in ["shortest-path", "congestion-aware-paper"] {
+        assert_reached("blind-ranging", strategy);
+    }
+}
+
 /// Drones that sense no neighbours, over a radio that delays messages by 2 s and loses 70 % of them.
 #[test]
 fn words_alone_keep_every_distance() {

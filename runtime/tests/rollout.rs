@@ -96,7 +96,9 @@ fn it_costs_less_than_the_shortest_ways_and_on_average_less_than_the_rule() {
 /// In the forest both halves of the swarm come to the second obstacle set. The leader of one half plans for both.
 #[test]
 fn one_leader_looks_ahead_for_groups_that_meet() {
-    let [best, rule] = ["congestion-aware", "congestion-aware-paper"].map(|strategy| fly("forest", strategy));
+    let close_up = ("mission.between", "close-up");
+    let [best, rule] = ["congestion-aware", "congestion-aware-paper"]
+        .map(|strategy| fly_with("forest", &[("strategy", strategy), close_up]));
     let count = |group: &str| best.groups.values().filter(|name| *name == group).count();
     assert_eq!(["N11", "N12", "N21", "N22"].map(count), [2; 4], "{:?}", best.groups);
     assert!(best.energy_j <= 1.01 * rule.energy_j, "{} J, the rule {} J", best.energy_j, rule.energy_j);

@@ -75,6 +75,18 @@ fn parts_that_do_not_hear_each_other_keep_their_distance_while_they_re_form() {
     }
 }
 
+/// The drone that was alone has passed the obstacle and made a formation of its own. When it leads the others again, some of them
+/// have still to pass.
+#[test]
+fn a_drone_that_was_alone_lets_the_others_pass_before_it_re_forms() {
+    let cut = r#"{ kind = "partition", on = "queued", after_s = 1, for_s = 30, sides = [[0], [1, 2, 3, 4, 5, 6, 7]] }"#;
+    for seed in ["1", "2"] {
+        let keys = [("fault.0", cut), ("formation.start_jitter_m", "1"), ("seed", seed)];
+        let Ending { outcome, reason, .. } = fly("paper/s1-right", &keys);
+        assert_eq!(outcome, Some(Outcome::Reached), "seed {seed}: {reason}");
+    }
+}
+
 /// A fault that lasts to the end, on the leader and on a member, at three moments.
 fn to_the_end(kind: &str) -> impl Iterator<Item = Vec<String>> {
     let moments = ["leader-elected", "queued", "reforming"].into_iter();

@@ -1,6 +1,7 @@
 //! The keys of a scenario. Doc comments, ranges and defaults of these types make the JSON schema. The schema makes the
 //! checks and the key reference.
 
+use crate::energy_keys::EnergyKeys;
 use crate::faults::{Fault, Faults};
 use crate::guidance::Guidance;
 use crate::hosts::HostKeys;
@@ -9,6 +10,7 @@ use crate::objective::Objective;
 use crate::obstacle::Obstacle;
 use crate::pilots::{FreeTable, PilotKeys};
 use crate::radio_keys::RadioKeys;
+use crate::sensors::Sensors;
 use crate::strategy::Strategy;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,6 +50,9 @@ pub struct Scenario {
     /// The limits of a drone.
     #[serde(default)]
     pub drone: Drone,
+    /// What the power of a drone is computed from.
+    #[serde(default)]
+    pub energy: EnergyKeys,
     /// What a drone senses.
     #[serde(default)]
     pub sensors: Sensors,
@@ -180,12 +185,16 @@ pub enum FormationShape {
 pub struct Mission {
     /// What ends the mission.
     pub end: End,
+    /// With `end = "hold"`: what has to be in formation at the end.
+    pub parts: Parts,
     /// With `end = "hold"`: the formation stops once the x of its anchor is at least this.
     #[schemars(range(min = -1e6, max = 1e6))]
     pub stop_x_m: f64,
     /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y].
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub goal_m: Option<[f64; 2]>,
+    /// What groups do between two obstacle sets.
+    pub between: Between,
     /// Required with `end = "time"`: how long the mission lasts.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub duration_s: Option<f64>,
@@ -208,8 +217,10 @@ impl Default for Mission {
     fn default() -> Self {
         Self {
             end: End::Hold,
+            parts: Parts::One,
             stop_x_m: 100.0,
             goal_m: None,
+            between: Between::CloseUp,
             duration_s: None,
             reform_speed_max_mps: None,
             arrival_error_m: 0.8,
@@ -217,6 +228,29 @@ impl Default for Mission {
             tps_lambda: 0.0,
         }
     }
+}
+
+/// What has to be in formation at the end of a mission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parts {
+    /// All living drones, as one formation.
+    One,
+    /// Each part of the swarm by itself. A part is all living drones that their radios have connected for the last 10 s, over any number
+    /// of hops: two drones hear each other if neither of them is mute or deaf, no partition separates them, and they are within
+    /// `radio.range_m`. For a swarm that may be cut for ever.
+    Each,
+}
+
+/// What groups do between two obstacle sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Between {
+    /// They become one group again, and the formation closes.
+    CloseUp,
+    /// Each group flies on by itself to its part of the formation at the destination, which is `stop_x_m` or `goal_m`, and
+    /// splits again before the next set. The formation closes once the swarm has flown as far as that.
+    GoOn,
 }
 
 /// How slots are assigned to drones.
@@ -286,30 +320,6 @@ impl Default for Drone {
             drag_coefficient: 5.0 / 9.81,
             reaction_time_s: 0.0,
         }
-    }
-}
-
-/// What a drone senses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Sensors {
-    /// Greatest distance at which a drone senses the nearest point of an obstacle. At least the stopping distance at
-    /// nominal speed (the paper's E2) plus `avoidance.clearance_m`.
-    #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
-    pub detection_range_m: f64,
-    /// Whether drones sense their neighbours (id, relative position and velocity) within `sensors.ranging_m`.
-    /// Without it they keep their distances by messages alone (docs/safety.md).
-    pub ranging: bool,
-    /// Greatest distance at which drones sense neighbours. Absent: enough for two drones that fly at each other at the greatest
-    /// speed of the mission to stop at the safe distance (the safe distance plus v²/a, and what they fly until they brake), and
-    /// at least twice the safe distance.
-    #[schemars(range(max = 100_000.0), extend("exclusiveMinimum" = 0.0))]
-    pub ranging_m: Option<f64>,
-}
-
-impl Default for Sensors {
-    fn default() -> Self {
-        Self { detection_range_m: 90.0, ranging: true, ranging_m: None }
     }
 }
 

@@ -41,6 +41,7 @@
 
 mod broken_rule;
 mod check;
+mod energy_keys;
 mod error;
 mod fault_rules;
 mod faults;
@@ -64,8 +65,10 @@ mod reference;
 mod resolved;
 mod rules;
 mod schema_tree;
+mod sensors;
 mod strategy;
 
+pub use energy_keys::{EnergyKeys, Thrust};
 pub use error::{Issue, ScenarioErrors};
 pub use faults::{
     Failsafe, Fault, FaultEvent, FaultKind, FaultTarget, Faults, PartitionSides, Sensor, SidesWord, TargetError,
@@ -73,7 +76,7 @@ pub use faults::{
 pub use guidance::Guidance;
 pub use hosts::HostKeys;
 pub use keys::{
-    Avoidance, Drone, End, Formation, FormationShape, Mission, Protocol, Reformation, Scenario, Sensors, Time,
+    Avoidance, Between, Drone, End, Formation, FormationShape, Mission, Parts, Protocol, Reformation, Scenario, Time,
 };
 pub use limits::{MAX_DRONES, MAX_FAULTS, MAX_HOSTS, MAX_OBSTACLES, MAX_PILOTS};
 pub use objective::Objective;
@@ -82,4 +85,5 @@ pub use parse::ScenarioSource;
 pub use pilots::{DEFAULT_PILOT, FreeTable, PilotKeys};
 pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleKeys};
 pub use reference::{KeyDoc, keys, markdown, schema};
+pub use sensors::{OutlineSensing, Sensors};
 pub use strategy::{Strategy, StrategyError};

@@ -199,6 +199,12 @@ impl Scenario {
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))
     }
 
+    /// Greatest difference between a drone's clock and the time of the mission up to the mission's time limit, s.
+    #[must_use]
+    pub fn clock_error_max_s(&self) -> f64 {
+        self.sensors.clock_offset_max_s + self.sensors.clock_drift_max_ppm * 1e-6 * self.timeout_s()
+    }
+
     /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or 0.1 s, or longer where the beacons of all drones
     /// would take more than a quarter of the bandwidth.
     #[must_use]

@@ -1,7 +1,7 @@
 //! Rules between keys, and the geometry of start, goal and obstacles.
 
 use crate::broken_rule::{BrokenRule, quantity};
-use crate::keys::{End, Scenario};
+use crate::keys::{End, Parts, Scenario};
 use crate::name::is_name_char;
 use crate::node::number;
 use crate::strategy::Strategy;
@@ -134,6 +134,9 @@ impl Rules<'_> {
             &["mission.duration_s", "mission.end"],
             || "is missing: mission.end = \"time\" needs the duration of the mission".to_owned(),
         );
+        self.expect(mission.parts == Parts::One || mission.end == End::Hold, &["mission.parts", "mission.end"], || {
+            "found mission.parts = \"each\", expected it with mission.end = \"hold\" alone: two parts cannot share one goal".to_owned()
+        });
         if let (End::Time, Some(duration_s), Some(timeout_s)) =
             (mission.end, mission.duration_s, self.scenario.time.timeout_s)
         {

@@ -57,8 +57,9 @@ pub(crate) fn lengths(schema: &Json) -> String {
 
 /// The unit in the ending of a key's name. Indices behind the name are skipped.
 pub(crate) fn unit(path: &str) -> Option<&'static str> {
-    const ENDINGS: [(&str, &str); 8] = [
+    const ENDINGS: [(&str, &str); 9] = [
         ("_bps", "bit/s"),
+        ("_ppm", "10⁻⁶"),
         ("_db", "dB"),
         ("_mps2", "m/s²"),
         ("_mps", "m/s"),

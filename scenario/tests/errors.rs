@@ -123,6 +123,12 @@ fn broken_rules_between_keys_are_rejected() {
         ("[formation]\n[mission]\nend = \"goal\"", &["bad.toml:3:7: mission.goal_m: is missing"]),
         ("[formation]\n[mission]\nend = \"time\"", &["bad.toml:3:7: mission.duration_s: is missing"]),
         (
+            "[formation]\n[mission]\nend = \"goal\"\ngoal_m = [9, 0]\nparts = \"each\"",
+            &[
+                "bad.toml:5:9: mission.parts: found mission.parts = \"each\", expected it with mission.end = \"hold\" alone",
+            ],
+        ),
+        (
             "[formation]\n[mission]\nend = \"time\"\nduration_s = 9\n[time]\ntimeout_s = 8",
             &["bad.toml:4:14: mission.duration_s: found 9 s, expected at most time.timeout_s = 8 s"],
         ),

@@ -11,8 +11,10 @@ use skein_bench::clock::{self, ClockBench};
 use skein_bench::election::ElectionBench;
 use skein_bench::failover::FailoverBench;
 use skein_bench::parts::{self, Part, PartBench};
+use skein_bench::peers::{self, PeerBench};
 use skein_bench::pilots::{self, PilotBench};
 use skein_bench::runtime::{BaselinePeer, RuntimeBench};
+use skein_bench::split::SplitBench;
 use skein_bench::{BenchError, Context};
 use skein_runtime::PilotRegistry;
 use std::io::Write;
@@ -31,6 +33,10 @@ pub(crate) enum BenchCommand {
     Clock(ClockArgs),
     /// Benchmark pilots, built-in and own: fly one mission with each and compare the drone-steps per second
     Pilots(PilotsArgs),
+    /// Divide the world by space: what each part would do, and how large a swarm can be
+    Split(SplitArgs),
+    /// Compare with RVO2 on one core; needs Python with the module pyrvo
+    Peers(PeersArgs),
     /// Benchmark the radio model
     Radio(PartArgs),
     /// Benchmark the exact assignment of drones to routes
@@ -131,6 +137,41 @@ pub(crate) struct PilotsArgs {
     pub(crate) json: bool,
 }
 
+/// Arguments of `bench split`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "All parts are simulated one after the other in this thread. Each knows only its own drones and what it is sent of \
+others. docs/scale.md explains the columns.
+
+Example:
+  skein bench split --drones 64,256,1000 --parts 1,4,16"
+)]
+pub(crate) struct SplitArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: SplitBench,
+    /// Print one JSON object instead of the tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `bench peers`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Both fly the same grid in formation, in rounds one after the other, on the same core. CPU time is measured.
+
+Example:
+  skein bench peers --drones 64,1000 --python venv/bin/python"
+)]
+pub(crate) struct PeersArgs {
+    /// What is measured.
+    #[command(flatten)]
+    pub(crate) bench: PeerBench,
+    /// Print one JSON array
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Arguments of the benchmarks of parts.
 #[derive(Debug, Args)]
 pub(crate) struct PartArgs {
@@ -154,6 +195,8 @@ pub(crate) fn bench(command: Option<&BenchCommand>, registry: &PilotRegistry) ->
         Some(BenchCommand::Election(args)) => election(args, &context),
         Some(BenchCommand::Clock(args)) => clock(args, &context),
         Some(BenchCommand::Pilots(args)) => own_pilots(args, &context),
+        Some(BenchCommand::Split(args)) => split(args, &context),
+        Some(BenchCommand::Peers(args)) => with_peers(args, &context),
         Some(BenchCommand::Radio(args)) => part(Part::Radio, args, &context),
         Some(BenchCommand::Grouping(args)) => part(Part::Grouping, args, &context),
         Some(BenchCommand::Sense(args)) => part(Part::Sense, args, &context),
@@ -221,6 +264,21 @@ fn own_pilots(args: &PilotsArgs, context: &Context<'_>) -> Result<Option<Exit>, 
     let mission = args.scenario.as_ref().map(read).transpose()?;
     let Some(rows) = args.bench.run(mission.as_ref(), context).map_err(failure)? else { return Ok(None) };
     print_rows(args.json, &rows, pilots::table)
+}
+
+fn split(args: &SplitArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(report) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
+    if args.json {
+        print_line(serde_json::to_string(&report).map_err(Failure::environment)?)?;
+    } else {
+        print(report.table())?;
+    }
+    Ok(Some(Exit::Reached))
+}
+
+fn with_peers(args: &PeersArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let Some(rows) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
+    print_rows(args.json, &rows, peers::table)
 }
 
 fn part(part: Part, args: &PartArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {

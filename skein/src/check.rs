@@ -14,6 +14,7 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
     let drones = mission::drones(&scenario);
     let shards = skein_bus::shards(drones);
     let on_sight_mps = advice::speed_on_sight_mps(&scenario);
+    let kept = advice::kept_distances(&scenario);
     let warnings = advice::warnings(&scenario).map_err(Failure::usage)?;
     if args.json {
         let sets: Vec<_> = sets
@@ -24,7 +25,8 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         let plan = json!({
             "scenario": scenario.name, "strategy": scenario.strategy.to_string(), "seed": scenario.seed,
             "drones": drones, "processes": drones + 2, "services": services, "sets": sets,
-            "speed_on_sight_mps": on_sight_mps, "warnings": warnings,
+            "speed_on_sight_mps": on_sight_mps, "separation_kept_m": kept.separation_m,
+            "clearance_kept_m": kept.clearance_m, "warnings": warnings,
         });
         print_line(plan)?;
     } else {
@@ -39,6 +41,12 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
             text += &format!("set {number}      obstacles {ids}: {routes} routes, gate at x = {gate_x_m} m\n");
         }
         text += &format!("on sight   {on_sight_mps:.2} m/s at most: drones can stop within what they sense\n");
+        text += &format!(
+            "distances  {:.2} m between drones{}, {:.2} m to obstacles: what drones keep, with all margins\n",
+            kept.separation_m,
+            if kept.by_words { " by words" } else { "" },
+            kept.clearance_m
+        );
         for warning in &warnings {
             text += &format!("warning    {warning}\n");
         }

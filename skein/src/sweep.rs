@@ -12,9 +12,11 @@ use serde_json::json;
 use skein_report::table::check_parquet;
 use skein_runtime::PilotRegistry;
 use skein_sweep::{
-    Experiment, Grid, SceneBounds, Shard, Shards, Sweep, SweepEnd, SweepError, SweepReport, scene_toml, wide_scene_toml,
+    Experiment, FolderProgress, Grid, SceneBounds, Shard, Shards, Sweep, SweepEnd, SweepError, SweepProgress,
+    SweepReport, scene_toml, wide_scene_toml,
 };
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -29,6 +31,7 @@ Examples:
   skein sweep experiments/random-scenes.toml --jobs 2 --out /tmp/scenes --json
   skein sweep experiments/reaction.toml --set sensors.ranging=false
   skein sweep experiments/faults.toml --shard 2/7 --out /shared/faults/2
+  skein sweep progress /shared/faults/*
   skein sweep merge /shared/faults/* --out sweeps/faults"
 )]
 pub(crate) struct SweepArgs {
@@ -73,6 +76,19 @@ pub(crate) struct ResultArgs {
 pub(crate) enum SweepAction {
     /// Merge the shards of a sweep: the result is what one machine would have written
     Merge(MergeArgs),
+    /// Print how many runs are done, in all shards and in each; exit code 0 if all are, 1 if not
+    Progress(ProgressArgs),
+}
+
+/// Arguments of `sweep progress`.
+#[derive(Debug, Args)]
+pub(crate) struct ProgressArgs {
+    /// Folders of the shards, or of the sweep; those who fly may go on meanwhile
+    #[arg(required = true)]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Arguments of `sweep merge`.
@@ -97,7 +113,7 @@ pub(crate) struct SceneArgs {
     #[arg(value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: u64,
     /// Draw a wide scene: as hostile as a scene with a way can be
-    #[arg(long, conflicts_with_all = ["drones", "obstacles"])]
+    #[arg(long, conflicts_with_all = ["drones", "obstacles", "room"])]
     pub(crate) wide: bool,
     /// Least and greatest number of drones [default: 5..16]
     #[arg(long, value_name = "LEAST..MOST", value_parser = range)]
@@ -105,6 +121,9 @@ pub(crate) struct SceneArgs {
     /// Least and greatest number of obstacles [default: 1..4]
     #[arg(long, value_name = "LEAST..MOST", value_parser = range)]
     pub(crate) obstacles: Option<[u32; 2]>,
+    /// Distance of the last slot at the destination behind the last obstacle, m [default: drawn without the obstacles]
+    #[arg(long, value_name = "M")]
+    pub(crate) room: Option<u32>,
 }
 
 /// Parses a number of workers.
@@ -123,6 +142,7 @@ pub(crate) fn scene(args: &SceneArgs) -> Result<Exit, Failure> {
     let bounds = SceneBounds {
         drones: args.drones.unwrap_or(default.drones),
         obstacles: args.obstacles.unwrap_or(default.obstacles),
+        room_m: args.room,
     };
     let drawn = if args.wide {
         wide_scene_toml(args.seed)
@@ -144,6 +164,7 @@ pub(crate) fn in_experiment(file: &Path, error: &str) -> String {
 pub(crate) fn sweep(args: &SweepArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
     match (&args.action, &args.experiment) {
         (Some(SweepAction::Merge(args)), _) => merge(args),
+        (Some(SweepAction::Progress(args)), _) => progress(args),
         (None, Some(experiment)) => fly(args, experiment, pilots),
         (None, None) => Err(Failure::usage("expected an experiment file")),
     }
@@ -207,6 +228,36 @@ fn merge(args: &MergeArgs) -> Result<Exit, Failure> {
     let grid = shards.grid();
     let report = shards.write(&grid, &folder, args.results.parquet).map_err(failure)?;
     show(&report, &folder, &args.results)
+}
+
+/// Prints how far the shards of a sweep are.
+fn progress(args: &ProgressArgs) -> Result<Exit, Failure> {
+    let read = SweepProgress::read(&args.folders, SystemTime::now());
+    let found =
+        read.map_err(|error| if error.is_usage() { Failure::usage(error) } else { Failure::environment(error) })?;
+    if args.json {
+        output::print_line(serde_json::to_value(&found).map_err(Failure::environment)?)?;
+    } else {
+        output::print(progress_text(&found))?;
+    }
+    Ok(if found.is_complete() { Exit::Reached } else { Exit::NotReached })
+}
+
+fn progress_text(found: &SweepProgress) -> String {
+    let SweepProgress { experiment, done, runs, outcomes, folders, absent } = found;
+    let outcomes: Vec<String> = outcomes.iter().map(|(outcome, count)| format!("{count} {outcome}")).collect();
+    let outcomes = if outcomes.is_empty() { String::new() } else { format!(": {}", outcomes.join(", ")) };
+    let mut lines = vec![format!("{experiment}: {done} of {runs} runs are done{outcomes}")];
+    for FolderProgress { folder, shard, done, runs, idle_s } in folders {
+        let shard = shard.map_or("all runs".to_owned(), |shard| format!("shard {shard}"));
+        let last = idle_s.map_or(String::new(), |idle_s| format!(", the last one {idle_s:.0} s ago"));
+        lines.push(format!("{shard:<14} {done:>7} of {runs}{last}  {}", folder.display()));
+    }
+    if !absent.is_empty() {
+        let shards: Vec<String> = absent.iter().map(ToString::to_string).collect();
+        lines.push(format!("no folder of shard {}", shards.join(", ")));
+    }
+    lines.join("\n") + "\n"
 }
 
 fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {

@@ -54,6 +54,9 @@ pub enum SweepError {
     /// The folder to merge is not a shard's.
     #[error("{}: is not the folder of a shard, which `skein sweep --shard` makes", .0.display())]
     NotAShard(PathBuf),
+    /// The folder to look at is not a sweep's.
+    #[error("{}: is not the folder of a sweep or of a shard", .0.display())]
+    NoSweep(PathBuf),
     /// Two folders hold shards of different sweeps.
     #[error(
         "{} and {}: hold shards of different sweeps: the experiments, the overrides or the programs differ",
@@ -146,7 +149,7 @@ impl SweepError {
             E::Scenario(_) | E::Changed { .. } | E::OtherExperiment { .. } | E::OtherShard { .. } | E::NotASweep(_) => {
                 true
             }
-            E::NoShards | E::NotAShard(_) | E::OtherSweep { .. } | E::OtherProgram(_) => true,
+            E::NoShards | E::NotAShard(_) | E::NoSweep(_) | E::OtherSweep { .. } | E::OtherProgram(_) => true,
             E::Overlap { .. } | E::MissingRuns { .. } => true,
             _ => false,
         }
@@ -192,6 +195,16 @@ pub enum SceneError {
         /// Least value allowed.
         lowest: u32,
         /// Greatest value allowed.
+        highest: u32,
+    },
+    /// The distance of the destination behind the last obstacle is out of range.
+    #[error("room_m: found {found}, expected {lowest} to {highest}")]
+    Room {
+        /// As given, m.
+        found: u32,
+        /// Least value allowed, m.
+        lowest: u32,
+        /// Greatest value allowed, m.
         highest: u32,
     },
     /// No attempt gave a valid scene, which takes bounds with many obstacles.

@@ -112,6 +112,7 @@ enum Runtime {
 struct RawBounds {
     drones: Option<[u32; 2]>,
     obstacles: Option<[u32; 2]>,
+    room_m: Option<u32>,
 }
 
 /// Greatest number of seeds, and of values of one key.
@@ -401,6 +402,7 @@ fn bounds(written: &RawBounds) -> Result<SceneBounds, Problem> {
     let bounds = SceneBounds {
         drones: written.drones.unwrap_or(default.drones),
         obstacles: written.obstacles.unwrap_or(default.obstacles),
+        room_m: written.room_m,
     };
     Ok(bounds.checked()?)
 }

@@ -207,7 +207,8 @@ fn flags(bounds: SceneBounds) -> String {
         if [least, most] == default { String::new() } else { format!(" --{name} {least}..{most}") }
     };
     let default = SceneBounds::default();
-    flag("drones", bounds.drones, default.drones) + &flag("obstacles", bounds.obstacles, default.obstacles)
+    let room = bounds.room_m.map_or(String::new(), |room_m| format!(" --room {room_m}"));
+    flag("drones", bounds.drones, default.drones) + &flag("obstacles", bounds.obstacles, default.obstacles) + &room
 }
 
 /// Calls `read` with the names of a scenario file.

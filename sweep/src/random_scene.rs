@@ -20,6 +20,10 @@ pub struct SceneBounds {
     pub drones: [u32; 2],
     /// Number of obstacles, from 0 to 8.
     pub obstacles: [u32; 2],
+    /// How far the last slot at the destination is behind the last obstacle, m, from 40 to 10 000. `None`: the destination is drawn
+    /// without the obstacles, beyond the field in which they may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room_m: Option<u32>,
 }
 
 impl SceneBounds {
@@ -34,13 +38,18 @@ impl SceneBounds {
                 return Err(SceneError::Bounds { what, least, most, lowest, highest });
             }
         }
-        Ok(self)
+        match self.room_m {
+            Some(room_m) if !(LEAST_ROOM_M..=MOST_ROOM_M).contains(&room_m) => {
+                Err(SceneError::Room { found: room_m, lowest: LEAST_ROOM_M, highest: MOST_ROOM_M })
+            }
+            _ => Ok(self),
+        }
     }
 }
 
 impl Default for SceneBounds {
     fn default() -> Self {
-        Self { drones: [5, 16], obstacles: [1, 4] }
+        Self { drones: [5, 16], obstacles: [1, 4], room_m: None }
     }
 }
 
@@ -48,6 +57,10 @@ impl Default for SceneBounds {
 const CLEARANCE_M: f64 = 15.0;
 /// Planning distance of every scene, m.
 const PLANNING_M: f64 = 20.0;
+
+/// Bounds of a given distance of the destination behind the last obstacle, m. With less, its slots could not be reached.
+const LEAST_ROOM_M: u32 = 40;
+const MOST_ROOM_M: u32 = 10_000;
 
 /// A gap narrower than this is closed, in units of the narrowest passable gap.
 const CLOSED: f64 = 0.9;
@@ -124,7 +137,9 @@ fn scene(rng: &mut SplitMix64, seed: u64, bounds: SceneBounds, room_m: f64) -> O
     let extent = extent(shape, drones, spacing_m);
     let obstacles = obstacles(rng, count, extent.half_width_m)?;
     // Where the formation comes to rest: its last slot is beyond the planning distance of any obstacle that there may be.
-    let end_x_m = (field_end_m(bounds) + room_m + PLANNING_M + extent.depth_m).ceil();
+    let last_m = obstacles.iter().map(|obstacle| obstacle.shape.bounds().1.x).fold(FIELD_M, f64::max);
+    let behind_m = bounds.room_m.map(|room_m| last_m + f64::from(room_m));
+    let end_x_m = (behind_m.unwrap_or(field_end_m(bounds) + room_m + PLANNING_M) + extent.depth_m).ceil();
     let mission = match rng.integer(0, 2) {
         0 => format!("end = \"goal\"\ngoal_m = [{end_x_m}, 0]"),
         _ => format!("end = \"hold\"\nstop_x_m = {end_x_m}"),
@@ -264,6 +279,25 @@ mod tests {
     }
 
     #[test]
+    fn the_destination_can_lie_at_a_given_distance_behind_the_same_obstacles() {
+        let bounds = |room_m| SceneBounds { room_m, ..SceneBounds::default() }.checked();
+        let scene = |seed, room_m| random_scene(seed, bounds(room_m).unwrap(), &[]).unwrap();
+        for seed in 1..=60 {
+            let drawn = scene(seed, None);
+            for room_m in [40, 340] {
+                let given = scene(seed, Some(room_m));
+                assert_eq!((&given.obstacles, given.slots()), (&drawn.obstacles, drawn.slots()), "seed {seed}");
+                let front_m = given.mission.goal_m.map_or(given.mission.stop_x_m, |goal| goal[0]);
+                let last_m = front_m + given.slots().iter().map(|slot| slot.x).fold(0.0, f64::min);
+                let rear_m = given.shapes().unwrap().iter().map(|shape| shape.bounds().1.x).fold(FIELD_M, f64::max);
+                let found_m = last_m - rear_m;
+                assert!((0.0..1.0).contains(&(found_m - f64::from(room_m))), "seed {seed}: {found_m} m");
+            }
+        }
+        assert!(matches!(bounds(Some(39)), Err(SceneError::Room { found: 39, .. })));
+    }
+
+    #[test]
     fn the_destination_is_drawn_without_the_obstacles_and_lies_beyond_all_of_them() {
         let bounds = SceneBounds::default();
         let mut rooms = Vec::new();
@@ -288,7 +322,7 @@ mod tests {
 
     #[test]
     fn bounds_are_kept() {
-        let bounds = SceneBounds { drones: [3, 3], obstacles: [6, 6] };
+        let bounds = SceneBounds { drones: [3, 3], obstacles: [6, 6], ..SceneBounds::default() };
         for seed in 0..20 {
             let scenario = random_scene(seed, bounds, &[]).unwrap();
             assert_eq!((scenario.formation.drones, scenario.obstacles.len()), (3, 6));

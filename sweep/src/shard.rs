@@ -36,6 +36,12 @@ impl Shard {
         (runs + self.count - 1 - self.index) / self.count
     }
 
+    /// All shards of the sweep that this is a shard of.
+    #[must_use]
+    pub fn all(self) -> Vec<Self> {
+        (0..self.count).map(|index| Self { index, ..self }).collect()
+    }
+
     /// A name for the shard's folder, such as `2-of-7`.
     #[must_use]
     pub fn folder_name(self) -> String {

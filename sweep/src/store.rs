@@ -9,6 +9,7 @@ use skein_report::WorkFolder;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::time::SystemTime;
 
 const IDENTITY: &str = "experiment.json";
 const PART: &str = ".experiment.json.part";
@@ -62,6 +63,29 @@ impl ShardFolder {
         let mut file = folder.append(ROWS)?;
         let (rows, _) = read(&mut file, &folder.path().join(ROWS), identity.runs)?;
         Ok(Self { identity, missions, rows })
+    }
+}
+
+/// The folder of a sweep or of a shard, as it is looked at while it may be written to.
+#[derive(Debug)]
+pub(crate) struct FolderState {
+    pub(crate) identity: Identity,
+    pub(crate) rows: Vec<Row>,
+    /// When the last row was written.
+    pub(crate) written: Option<SystemTime>,
+}
+
+impl FolderState {
+    /// Looks at a folder without a lock: whoever flies its runs is not kept from it.
+    pub(crate) fn look(path: &Path) -> Result<Self, SweepError> {
+        let not_a_sweep = || SweepError::NoSweep(path.to_owned());
+        let folder = WorkFolder::open(path).map_err(|_| not_a_sweep())?;
+        let identity = read_identity(&folder).ok_or_else(not_a_sweep)?;
+        let path = folder.path().join(ROWS);
+        let Ok(mut file) = folder.read(ROWS) else { return Ok(Self { identity, rows: Vec::new(), written: None }) };
+        let (rows, _) = read(&mut file, &path, identity.runs)?;
+        let written = file.metadata().and_then(|data| data.modified()).ok().filter(|_| !rows.is_empty());
+        Ok(Self { identity, rows, written })
     }
 }
 

@@ -3,7 +3,6 @@
 use crate::params::{Failsafe, WorldParams};
 use crate::tuning::DESCENT_MPS;
 use skein_protocol::Vec3;
-use skein_protocol::energy::flight_power_w;
 
 /// The true state of one drone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,12 +56,12 @@ impl Body {
     }
 
     /// One tick of a living drone under an acceleration that [`admissible`] has limited (the paper's K1):
-    /// v' = v + a·dt, clipped to the greatest speed; p' = p + (v + v')/2·dt. The energy is that of the speed at the
-    /// start of the tick.
-    pub(crate) fn fly(&mut self, acceleration_mps2: Vec3, params: &WorldParams) {
+    /// v' = v + a·dt, clipped to the greatest speed; p' = p + (v + v')/2·dt. `push_mps2` is added to the acceleration, but is
+    /// not the drone's own. The energy is that of the speed at the start of the tick.
+    pub(crate) fn fly(&mut self, acceleration_mps2: Vec3, push_mps2: Vec3, params: &WorldParams) {
         let dt = params.dt_s();
-        self.energy_j += self.power_w() * dt;
-        self.glide(clip(self.velocity + acceleration_mps2 * dt, params.speed_max_mps), dt);
+        self.energy_j += params.energy.power_w(self.velocity, acceleration_mps2) * dt;
+        self.glide(clip(self.velocity + (acceleration_mps2 + push_mps2) * dt, params.speed_max_mps), dt);
     }
 
     /// One tick of a drone without a process: it brakes to a stop. Then it stays, or it descends, lands and is no
@@ -78,13 +77,10 @@ impl Body {
 
     /// One tick of a drone with a frozen process: it brakes to a stop and stays, whatever the failsafe is.
     pub(crate) fn hover(&mut self, params: &WorldParams) {
-        self.energy_j += self.power_w() * params.dt_s();
+        let before = self.velocity;
         self.brake(params);
-    }
-
-    /// The power of the present motion, W.
-    fn power_w(&self) -> f64 {
-        flight_power_w(self.velocity.norm(), self.velocity.z)
+        let braking_mps2 = (self.velocity - before) / params.dt_s();
+        self.energy_j += params.energy.power_w(before, braking_mps2) * params.dt_s();
     }
 
     /// The drone's process is gone.
@@ -145,6 +141,7 @@ mod tests {
     use super::*;
     use crate::testing::params;
     use proptest::prelude::*;
+    use skein_protocol::energy::flight_power_w;
 
     fn cruising() -> Body {
         Body::new(Vec3::new(0.0, 0.0, 50.0), Vec3::new(10.0, 0.0, 0.0))
@@ -154,7 +151,7 @@ mod tests {
     fn a_constant_acceleration_is_integrated_exactly() {
         let mut body = cruising();
         for _ in 0..50 {
-            body.fly(Vec3::new(0.0, 2.0, -1.0), &params());
+            body.fly(Vec3::new(0.0, 2.0, -1.0), Vec3::zeros(), &params());
         }
         assert!((body.position - Vec3::new(10.0, 1.0, 49.5)).norm() < 1e-9, "{}", body.position);
         assert!((body.velocity - Vec3::new(10.0, 2.0, -1.0)).norm() < 1e-9);
@@ -164,7 +161,7 @@ mod tests {
     fn speed_is_clipped() {
         let mut body = cruising();
         for _ in 0..500 {
-            body.fly(Vec3::new(5.0, 0.0, 0.0), &params());
+            body.fly(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros(), &params());
         }
         assert!((body.velocity - Vec3::new(20.0, 0.0, 0.0)).norm() < 1e-12);
     }
@@ -172,7 +169,7 @@ mod tests {
     #[test]
     fn energy_is_power_at_the_old_speed_times_the_tick() {
         let mut body = cruising();
-        body.fly(Vec3::new(5.0, 0.0, 0.0), &params());
+        body.fly(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros(), &params());
         assert_eq!(body.energy_j, flight_power_w(10.0, 0.0) * 0.02);
     }
 

@@ -151,9 +151,20 @@ impl DroneTable {
             }
             let command = admissible(process.slot().acceleration_mps2, params.acceleration_max_mps2);
             rejected += u64::from(command.is_none());
-            body.fly(command.unwrap_or_default() + wind_mps2(DroneId(id)), params);
+            body.fly(command.unwrap_or_default(), wind_mps2(DroneId(id)), params);
         }
         rejected
+    }
+
+    /// Takes a drone out of the table.
+    pub(crate) fn remove(&mut self, drone: usize) -> (Body, Process) {
+        (self.bodies.remove(drone), self.processes.remove(drone))
+    }
+
+    /// Puts a drone into the table, before the one that is at this place.
+    pub(crate) fn insert(&mut self, drone: usize, body: Body, process: Process) {
+        self.bodies.insert(drone, body);
+        self.processes.insert(drone, process);
     }
 
     /// The next tick begins: every process owes an answer.

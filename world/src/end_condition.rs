@@ -20,26 +20,48 @@ pub(crate) struct EndCondition {
     taken: Vec<bool>,
     /// Which drones have been past all obstacles. They may turn back later: the leader chooses where the slots are.
     past: Vec<bool>,
+    /// Memory for the places of the drones, world frame, m.
+    places: Vec<Vec2>,
 }
 
 impl EndCondition {
-    /// Whether the end condition is met. Without living drones it never is.
-    pub(crate) fn is_met(&mut self, params: &WorldParams, bodies: &[Body], stages: &Stages) -> bool {
-        let living = bodies.iter().filter(|body| body.is_alive()).count();
-        if living == 0 {
-            return false;
+    /// Whether the end condition is met by each of these sets of living drones, which together are all of them. Without living
+    /// drones it never is.
+    pub(crate) fn is_met(
+        &mut self,
+        params: &WorldParams,
+        bodies: &[Body],
+        stages: &Stages,
+        parts: &[Vec<usize>],
+    ) -> bool {
+        if let End::Hold { .. } = params.end {
+            self.note_past(stages.rear_x_m() + params.planning_distance_m, bodies);
+            if !self.holds(bodies) {
+                return false;
+            }
         }
-        self.form(living, params);
+        !parts.is_empty() && parts.iter().all(|part| self.is_closed(params, bodies, part))
+    }
+
+    /// Whether these drones stand in their formation.
+    fn is_closed(&mut self, params: &WorldParams, bodies: &[Body], part: &[usize]) -> bool {
+        let mut places = std::mem::take(&mut self.places);
+        places.clear();
+        places.extend(part.iter().map(|&drone| bodies[drone].position().xy()));
+        let closed = self.are_closed(params, &places);
+        self.places = places;
+        closed
+    }
+
+    /// Whether the drones at these places stand in their formation.
+    fn are_closed(&mut self, params: &WorldParams, places: &[Vec2]) -> bool {
+        self.form(places.len(), params);
         match params.end {
             End::Hold { stop_x_m } => {
-                self.note_past(stages.rear_x_m() + params.planning_distance_m, bodies);
-                if !self.holds(bodies) {
-                    return false;
-                }
-                let anchor = self.anchor(bodies, living);
-                anchor.x >= stop_x_m - params.arrival_error_m && self.filled(bodies, anchor, params.arrival_error_m)
+                let anchor = self.anchor(places);
+                anchor.x >= stop_x_m - params.arrival_error_m && self.filled(places, anchor, params.arrival_error_m)
             }
-            End::Goal { front_m } => self.filled(bodies, front_m, params.arrival_error_m),
+            End::Goal { front_m } => self.filled(places, front_m, params.arrival_error_m),
             // These ends do not depend on the formation.
             End::Time { .. } | End::Pilots => false,
         }
@@ -60,29 +82,28 @@ impl EndCondition {
     }
 
     /// Makes the slots for this number of drones, unless they are made already.
-    fn form(&mut self, living: usize, params: &WorldParams) {
-        if self.taken.len() == living {
+    fn form(&mut self, drones: usize, params: &WorldParams) {
+        if self.taken.len() == drones {
             return;
         }
-        self.taken = vec![false; living];
-        self.slots = params.shape.slots(living, params.spacing_m);
+        self.taken = vec![false; drones];
+        self.slots = params.shape.slots(drones, params.spacing_m);
         self.middle = self.slots.iter().sum::<Vec2>() / self.slots.len().max(1) as f64;
         let cell_m = params.spacing_m.max(params.arrival_error_m);
         self.grid.fill(cell_m, self.slots.iter().enumerate().map(|(i, &slot)| (i as u32, slot)));
     }
 
-    /// Where the front slot is when the formation fits the living drones best (least squares), m.
-    fn anchor(&self, bodies: &[Body], living: usize) -> Vec2 {
-        let sum: Vec2 = bodies.iter().filter(|body| body.is_alive()).map(|body| body.position().xy()).sum();
-        sum / living as f64 - self.middle
+    /// Where the front slot is when the formation fits the drones at these places best (least squares), m.
+    fn anchor(&self, places: &[Vec2]) -> Vec2 {
+        places.iter().sum::<Vec2>() / places.len() as f64 - self.middle
     }
 
-    /// Whether each living drone is within `error_m` of a slot that no other drone takes. Only its nearest slot is
-    /// tried: slots are farther apart than twice the error.
-    fn filled(&mut self, bodies: &[Body], anchor: Vec2, error_m: f64) -> bool {
+    /// Whether each of the drones at these places is within `error_m` of a slot that no other one takes. Only its nearest slot
+    /// is tried: slots are farther apart than twice the error.
+    fn filled(&mut self, places: &[Vec2], anchor: Vec2, error_m: f64) -> bool {
         self.taken.fill(false);
-        bodies.iter().filter(|body| body.is_alive()).all(|body| {
-            let place = body.position().xy() - anchor;
+        places.iter().all(|place| {
+            let place = place - anchor;
             let mut best: Option<(f64, usize)> = None;
             self.grid.each_near(place, |slot| {
                 let square = (self.slots[slot as usize] - place).norm_squared();
@@ -119,8 +140,31 @@ mod tests {
         WorldParams { end: End::Hold { stop_x_m }, ..params() }
     }
 
+    fn living(bodies: &[Body]) -> Vec<Vec<usize>> {
+        vec![(0..bodies.len()).filter(|&i| bodies[i].is_alive()).collect()]
+    }
+
     fn is_met(params: &WorldParams, bodies: &[Body], stages: &Stages) -> bool {
-        EndCondition::default().is_met(params, bodies, stages)
+        EndCondition::default().is_met(params, bodies, stages, &living(bodies))
+    }
+
+    #[test]
+    fn each_part_has_a_formation_of_its_own() {
+        // The second four drones stand in a formation of four, far from the first four.
+        let mut all = formed(Vec2::new(100.0, 0.0));
+        for drone in 4..8 {
+            let place = all[drone - 4].position() + Vec3::new(300.0, 20.0, 0.0);
+            all[drone] = Body::new(place, Vec3::zeros());
+        }
+        let halves = [vec![0, 1, 2, 3], vec![4, 5, 6, 7]];
+        let met = |params: &WorldParams, all: &[Body], parts: &[Vec<usize>]| {
+            EndCondition::default().is_met(params, all, &open(), parts)
+        };
+        assert!(met(&hold(100.0), &all, &halves) && !is_met(&hold(-1e9), &all, &open()));
+        assert!(!met(&hold(101.0), &all, &halves), "the first part is not far enough");
+        assert!(!met(&hold(-1e9), &all, &[]), "it is not known which drones are a part");
+        all[6] = moved(all[6], 2.0);
+        assert!(!met(&hold(100.0), &all, &halves));
     }
 
     fn open() -> Stages {
@@ -132,9 +176,10 @@ mod tests {
         let outline = Outline::new(&rectangle(0.0, 0.0, 10.0, 10.0));
         let stages = Stages::new(&[outline], 40.0);
         let (params, mut condition) = (hold(-1e9), EndCondition::default());
-        assert!(!condition.is_met(&params, &formed(Vec2::new(20.0, 0.0)), &stages));
-        assert!(condition.is_met(&params, &formed(Vec2::new(500.0, 0.0)), &stages));
-        assert!(condition.is_met(&params, &formed(Vec2::new(20.0, 0.0)), &stages));
+        let mut is_met = |all: &[Body]| condition.is_met(&params, all, &stages, &living(all));
+        assert!(!is_met(&formed(Vec2::new(20.0, 0.0))));
+        assert!(is_met(&formed(Vec2::new(500.0, 0.0))));
+        assert!(is_met(&formed(Vec2::new(20.0, 0.0))));
     }
 
     #[test]

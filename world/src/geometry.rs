@@ -76,6 +76,36 @@ impl Outline {
         }
     }
 
+    /// Whether the obstacle is in the way of a straight look from one point to the other.
+    pub(crate) fn hides(&self, from: Vec3, to: Vec3) -> bool {
+        let (low_m, high_m) = (from.z.min(to.z), from.z.max(to.z));
+        if high_m <= self.floor_m || low_m >= self.top_m {
+            return false;
+        }
+        let ends = [from.xy(), to.xy()];
+        let box_apart = ends[0].sup(&ends[1]).x < self.low.x
+            || ends[0].inf(&ends[1]).x > self.high.x
+            || ends[0].sup(&ends[1]).y < self.low.y
+            || ends[0].inf(&ends[1]).y > self.high.y;
+        !box_apart && (ends.iter().any(|end| self.nearest_on_outline(*end).1 <= 0.0) || self.crosses(ends))
+    }
+
+    /// Whether a segment comes within the rounding radius of an edge.
+    fn crosses(&self, ends: [Vec2; 2]) -> bool {
+        let look = Segment::new(Vector::new(ends[0].x, ends[0].y), Vector::new(ends[1].x, ends[1].y));
+        self.edges.iter().any(|edge| {
+            let (a, b) = (look.b - look.a, edge.b - edge.a);
+            let (turn, reach) = (a.perp_dot(b), edge.a - look.a);
+            let (t, u) = (reach.perp_dot(b) / turn, reach.perp_dot(a) / turn);
+            let meets = turn != 0.0 && (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u);
+            let near = |segment: &Segment, point: Vector| {
+                let foot = segment.project_local_point(point, true).point;
+                (point - foot).length_squared() <= self.radius_m * self.radius_m
+            };
+            meets || near(&look, edge.a) || near(&look, edge.b) || near(edge, look.a) || near(edge, look.b)
+        })
+    }
+
     /// How far an altitude is above the top or below the floor, m; negative between them.
     fn gap_m(&self, altitude_m: f64) -> f64 {
         (self.floor_m - altitude_m).max(altitude_m - self.top_m)
@@ -118,6 +148,19 @@ mod tests {
     use super::*;
     use crate::testing::rectangle;
     use proptest::prelude::*;
+
+    #[test]
+    fn an_obstacle_hides_what_is_behind_it() {
+        let at = |x: f64, y: f64| Vec3::new(x, y, 50.0);
+        let wall = Outline::new(&rectangle(50.0, 0.0, 5.0, 20.0));
+        assert!(wall.hides(at(0.0, 0.0), at(100.0, 0.0)) && wall.hides(at(0.0, 30.0), at(100.0, -30.0)));
+        assert!(!wall.hides(at(0.0, 0.0), at(40.0, 0.0)) && !wall.hides(at(0.0, 21.0), at(100.0, 21.0)));
+        assert!(!wall.hides(at(0.0, 21.0), at(46.0, 21.0)) && wall.hides(at(0.0, 0.0), at(48.0, 0.0)));
+        let disc = Outline::new(&ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap());
+        assert!(disc.hides(at(0.0, 9.0), at(100.0, 9.0)) && !disc.hides(at(0.0, 11.0), at(100.0, 11.0)));
+        let low = Outline::new(&rectangle(50.0, 0.0, 5.0, 20.0).between(0.0, 40.0).unwrap());
+        assert!(!low.hides(at(0.0, 0.0), at(100.0, 0.0)), "they look over it");
+    }
 
     fn nearest(shape: &ConvexShape, x: f64, y: f64) -> (Vec2, f64) {
         Outline::new(shape).nearest_on_outline(Vec2::new(x, y))

@@ -2,7 +2,8 @@
 
 use crate::body::Body;
 use crate::end_condition::EndCondition;
-use crate::params::{End, WorldParams};
+use crate::params::{End, PartsRule, WorldParams};
+use crate::parts::Parts;
 use crate::stages::Stages;
 use skein_protocol::record::Outcome;
 use skein_protocol::{DroneId, SimTime};
@@ -14,6 +15,8 @@ pub(crate) struct MissionState<'a> {
     pub(crate) bodies: &'a [Body],
     /// Whether there are living drones and the pilots of all of them say that the mission is done.
     pub(crate) all_done: bool,
+    /// The parts of the swarm; unused unless each of them has to be in formation by itself.
+    pub(crate) parts: &'a Parts,
     /// The obstacle sets.
     pub(crate) stages: &'a Stages,
     /// The time of the tick's end.
@@ -28,6 +31,8 @@ pub(crate) struct MissionState<'a> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MissionJudge {
     condition: EndCondition,
+    /// Memory for the living drones, as one part.
+    living: [Vec<usize>; 1],
     end: Option<(Outcome, String)>,
 }
 
@@ -70,13 +75,26 @@ impl MissionJudge {
         let met = match params.end {
             End::Time { duration_s } => living && state.end >= SimTime::from_secs(duration_s),
             End::Pilots => state.all_done,
-            End::Hold { .. } | End::Goal { .. } => self.condition.is_met(params, state.bodies, state.stages),
+            End::Hold { .. } | End::Goal { .. } => self.is_closed(params, state),
         };
         met.then(|| match params.end {
             End::Time { duration_s } => format!("the mission lasted its {duration_s} s"),
             End::Pilots => "all living drones say that they are done".to_owned(),
-            End::Hold { .. } | End::Goal { .. } => "the end condition is met".to_owned(),
+            End::Hold { .. } | End::Goal { .. } => match state.parts.count() {
+                0 | 1 => "the end condition is met".to_owned(),
+                parts => format!("the end condition is met by each of {parts} parts of the swarm"),
+            },
         })
+    }
+
+    fn is_closed(&mut self, params: &WorldParams, state: &MissionState<'_>) -> bool {
+        if let PartsRule::Each { .. } = params.parts {
+            return self.condition.is_met(params, state.bodies, state.stages, &state.parts.settled(state.end));
+        }
+        let [living] = &mut self.living;
+        living.clear();
+        living.extend((0..state.bodies.len()).filter(|&drone| state.bodies[drone].is_alive()));
+        !living.is_empty() && self.condition.is_met(params, state.bodies, state.stages, &self.living)
     }
 }
 

@@ -12,6 +12,8 @@
 //! - [`World`] composes machines with private state, one file each: the drone table, the sensor sweep, the fault engine,
 //!   the obstacle sets, the invariant monitor, the judge of the mission's end, the uplink, the counters, the digest.
 //!
+//! [`split`] divides a world by space into parts that know only their own drones and what is near them.
+//!
 //! The crate is pure: no clock, thread, process or randomness of the operating system. The same calls give the same
 //! bits. It does not know what drones think, whether a radio delivers a frame, or what a process is.
 //!
@@ -27,7 +29,7 @@
 //! use skein_protocol::slot::Slot;
 //! use skein_protocol::{DroneId, Vec3};
 //! use skein_world::faults::FaultPlan;
-//! use skein_world::{End, Failsafe, World, WorldParams};
+//! use skein_world::{End, EnergyModel, Failsafe, PartsRule, SensorErrors, World, WorldParams};
 //!
 //! let params = WorldParams {
 //!     dt_ns: 20_000_000,
@@ -41,13 +43,16 @@
 //!     planning_distance_m: 20.0,
 //!     detection_range_m: 90.0,
 //!     ranging_m: Some(50.0),
+//!     sensors: SensorErrors::default(),
 //!     channel: None,
 //!     locality: Locality::default(),
 //!     failsafe: Failsafe::Hover,
 //!     end: End::Hold { stop_x_m: 1000.0 },
+//!     parts: PartsRule::One,
 //!     arrival_error_m: 0.8,
 //!     shape: Shape::NestedV,
 //!     spacing_m: 35.0,
+//!     energy: EnergyModel::default(),
 //!     faults: FaultPlan::default(),
 //!     pilots: Vec::new(),
 //! };
@@ -72,6 +77,7 @@ mod counters;
 mod decision_log;
 mod drones;
 mod end_condition;
+mod energy_model;
 mod event_log;
 mod fault_plan;
 pub mod faults;
@@ -81,9 +87,13 @@ mod invariants;
 mod judge;
 mod neighbours;
 mod params;
+mod parts;
 mod process;
 mod sense_writer;
+mod sensor_errors;
 mod sensor_fault;
+mod sensor_model;
+pub mod split;
 mod stages;
 mod sweep;
 mod telemetry_log;
@@ -93,7 +103,10 @@ mod tick_digest;
 mod tick_record;
 mod tuning;
 mod uplink;
+mod view;
 mod world;
 
-pub use params::{End, Failsafe, WorldError, WorldParams};
+pub use energy_model::EnergyModel;
+pub use params::{End, Failsafe, PartsRule, WorldError, WorldParams};
+pub use sensor_errors::{ClockErrors, PositionError, RangingErrors, SensorErrors};
 pub use world::World;

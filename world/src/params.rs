@@ -1,6 +1,8 @@
 //! The parameters of a world. SI units, world frame.
 
+use crate::energy_model::EnergyModel;
 use crate::fault_plan::FaultPlan;
+use crate::sensor_errors::SensorErrors;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::SharedChannel;
@@ -15,6 +17,18 @@ pub enum Failsafe {
     Hover,
     /// Brakes to a stop and descends. Once it is down, it is no body any more.
     Land,
+}
+
+/// What has to be in formation at the end of a mission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PartsRule {
+    /// All living drones, as one formation.
+    One,
+    /// Each part of the swarm by itself. Drones are in one part if their radios connect them, over any number of hops.
+    Each {
+        /// Greatest distance of two drones that hear each other, m.
+        reach_m: f64,
+    },
 }
 
 /// When the mission is over.
@@ -65,6 +79,8 @@ pub struct WorldParams {
     pub detection_range_m: f64,
     /// Greatest distance at which a drone senses a neighbour, m; `None`: drones sense no neighbours.
     pub ranging_m: Option<f64>,
+    /// The errors of sensors and clocks.
+    pub sensors: SensorErrors,
     /// The channel that all drones share; `None`: bandwidth is no limit.
     pub channel: Option<SharedChannel>,
     /// Which frames can only be received near by. The downlink indexes those by place.
@@ -73,12 +89,16 @@ pub struct WorldParams {
     pub failsafe: Failsafe,
     /// When the mission is over.
     pub end: End,
+    /// What has to be in formation then, with [`End::Hold`].
+    pub parts: PartsRule,
     /// Largest slot error of a closed formation, m.
     pub arrival_error_m: f64,
     /// The shape of the formation.
     pub shape: Shape,
     /// The spacing of the formation, m.
     pub spacing_m: f64,
+    /// What the power of a drone is computed from.
+    pub energy: EnergyModel,
     /// The scheduled faults.
     pub faults: FaultPlan,
     /// Names of the drones' pilots, by id, for events.
@@ -148,12 +168,14 @@ impl WorldParams {
             ("ranging_m", self.ranging_m.unwrap_or(0.0)),
             ("arrival_error_m", self.arrival_error_m),
             ("spacing_m", self.spacing_m),
+            ("energy.wind_mps", self.energy.wind_mps.norm()),
         ];
+        let mut named = named.into_iter().chain(self.sensors.named());
         let rate = self.channel.map_or(1.0, |channel| channel.rate_bps);
         if rate.is_nan() || rate <= 0.0 {
             return Err(WorldError::Rate(rate));
         }
-        let bad = named.into_iter().find(|(_, value)| value.is_nan() || *value < 0.0);
+        let bad = named.find(|(_, value)| value.is_nan() || *value < 0.0);
         bad.map_or(Ok(()), |(name, value)| Err(WorldError::Parameter { name, value }))
     }
 }
@@ -172,5 +194,8 @@ mod tests {
         let error = WorldParams { clearance_m: -1.0, ..params() }.check().unwrap_err();
         assert_eq!(error.to_string(), "clearance_m is -1, expected a number of at least 0");
         assert!(WorldParams { ranging_m: Some(f64::NAN), ..params() }.check().is_err());
+        let sensors = SensorErrors { obstacle_error_max_m: -1.0, ..SensorErrors::default() };
+        let error = WorldParams { sensors, ..params() }.check().unwrap_err();
+        assert_eq!(error.to_string(), "obstacle_error_max_m is -1, expected a number of at least 0");
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::body::Body;
 use crate::sensor_fault::SensorFault;
+use crate::sensor_model::SensorModel;
 use crate::sweep::{Contact, SensorSweep};
 use skein_protocol::downlink::{Downlink, SensedNeighbour, SensedObstacle, SensedShape, SensesHeader};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, ObstacleId, Vec2, Vec3, raised};
+use skein_protocol::{DroneId, ObstacleId, SimTime, Vec2, Vec3, raised};
 
 /// Marks a shape that the downlink does not hold yet.
 const NOT_WRITTEN: u32 = u32::MAX;
@@ -25,13 +26,11 @@ impl SenseWriter {
     }
 
     /// Writes everything but the frames and the head. `drones` gives the incarnation and the sensor fault of each drone,
-    /// by id. Without `ranging_m` (m) no drone senses neighbours.
+    /// by id.
     pub(crate) fn write(
         &mut self,
-        bodies: &[Body],
+        sensed: &Sensed<'_>,
         drones: impl Iterator<Item = (u32, SensorFault)>,
-        sweep: &SensorSweep,
-        ranging_m: Option<f64>,
         down: &mut Downlink,
     ) {
         down.drones.clear();
@@ -39,17 +38,18 @@ impl SenseWriter {
         down.neighbours.clear();
         down.shapes.clear();
         self.places.fill(NOT_WRITTEN);
-        let mut contacts = sweep.contacts().iter().peekable();
-        for ((drone, body), (incarnation, sensor_fault)) in bodies.iter().enumerate().zip(drones) {
+        let mut contacts = sensed.sweep.contacts().iter().peekable();
+        for ((drone, body), (incarnation, sensor_fault)) in sensed.bodies.iter().enumerate().zip(drones) {
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
-                self.write_contact(contact, sensor_fault.position_error_m, down);
+                self.write_contact(contact, sensed, sensor_fault.position_error_m, down);
             }
-            if let (true, Some(range)) = (body.is_alive() && !sensor_fault.no_ranging, ranging_m) {
-                write_neighbours(body, bodies, sweep.neighbours_of(drone), range, down);
+            if body.is_alive() && !sensor_fault.no_ranging {
+                sensed.write_neighbours(drone, down);
             }
+            let position_error_m = sensor_fault.position_error_m + sensed.model.position_m(drone);
             down.drones.push(SensesHeader {
-                position_m: shifted(body.position(), sensor_fault.position_error_m),
+                position_m: shifted(body.position(), position_error_m),
                 velocity_mps: shifted(body.velocity(), sensor_fault.velocity_error_mps),
                 obstacle_first,
                 obstacle_count: down.obstacles.len() as u32 - obstacle_first,
@@ -59,26 +59,76 @@ impl SenseWriter {
                 incarnation,
                 link_faults: sensor_fault.link_faults,
                 extra_reaction_s: sensor_fault.extra_reaction_s,
-                broken: sensor_fault.broken(ranging_m.is_some()).to_wire(),
+                clock_error_ns: sensed.model.clock_ns(drone, sensed.now),
+                broken: sensor_fault.broken(sensed.ranging_m.is_some()).to_wire(),
                 reserved: 0,
             });
         }
     }
 
     /// A drone measures an obstacle relative to itself, so an error of its own position moves the obstacle with it.
-    fn write_contact(&mut self, contact: &Contact, error_m: Vec2, down: &mut Downlink) {
-        let obstacle = contact.obstacle as usize;
-        if self.places[obstacle] == NOT_WRITTEN {
+    /// `error_m`: that error, as far as it comes from a fault, m.
+    fn write_contact(&mut self, contact: &Contact, sensed: &Sensed<'_>, error_m: Vec2, down: &mut Downlink) {
+        let (drone, obstacle) = (contact.drone as usize, contact.obstacle as usize);
+        let (model, position) = (sensed.model, sensed.bodies[drone].position());
+        let mut nearest = contact.nearest;
+        let displaced_m = model.obstacle_m(drone, contact.obstacle).unwrap_or_default();
+        if displaced_m != Vec2::zeros() {
+            let aside = displaced_m.push(0.0);
+            nearest = sensed.sweep.outlines()[obstacle].nearest(position - aside);
+            nearest.point += aside;
+        }
+        let own_m = error_m + model.position_m(drone);
+        if self.places[obstacle] == NOT_WRITTEN || model.draws_own_outlines() {
             self.places[obstacle] = down.shapes.len() as u32;
-            let (shape, id) = (self.shapes[obstacle], ObstacleId(contact.obstacle));
-            down.shapes.push(SensedShape { shape, id, reserved: 0 });
+            let whole = &self.shapes[obstacle];
+            let shape = if model.draws_own_outlines() {
+                model.outline(whole, position.xy() - displaced_m).moved(own_m + displaced_m)
+            } else {
+                *whole
+            };
+            down.shapes.push(SensedShape { shape, id: ObstacleId(contact.obstacle), reserved: 0 });
         }
         down.obstacles.push(SensedObstacle {
-            nearest_m: shifted(contact.nearest.point, error_m),
-            distance_m: contact.nearest.distance_m,
+            nearest_m: shifted(nearest.point, own_m),
+            distance_m: nearest.distance_m,
             shape: self.places[obstacle],
             reserved: 0,
         });
+    }
+}
+
+/// What the senses of a tick are made from.
+#[derive(Clone, Copy)]
+pub(crate) struct Sensed<'a> {
+    /// The bodies of all drones, by id.
+    pub(crate) bodies: &'a [Body],
+    /// What is around them.
+    pub(crate) sweep: &'a SensorSweep,
+    /// Greatest distance at which a drone senses a neighbour, m; `None`: drones sense no neighbours.
+    pub(crate) ranging_m: Option<f64>,
+    /// The errors of this tick.
+    pub(crate) model: &'a SensorModel,
+    /// The time at which the tick begins.
+    pub(crate) now: SimTime,
+}
+
+impl Sensed<'_> {
+    fn write_neighbours(&self, drone: usize, down: &mut Downlink) {
+        let Some(range_m) = self.ranging_m else { return };
+        for &id in self.sweep.neighbours_of(drone) {
+            let other = id as usize;
+            if (self.bodies[other].position() - self.bodies[drone].position()).norm_squared() > range_m * range_m {
+                continue;
+            }
+            let measured = self.model.range(drone, other, self.bodies, self.sweep.outlines());
+            down.neighbours.extend(measured.map(|(position, velocity)| SensedNeighbour {
+                position_m: position.into(),
+                velocity_mps: velocity.into(),
+                drone: DroneId(id),
+                reserved: 0,
+            }));
+        }
     }
 }
 
@@ -87,26 +137,14 @@ fn shifted(value: Vec3, error: Vec2) -> [f64; 3] {
     raised(value.xy() + error, value.z)
 }
 
-fn write_neighbours(body: &Body, bodies: &[Body], ids: &[u32], range_m: f64, down: &mut Downlink) {
-    for &id in ids {
-        let other = &bodies[id as usize];
-        let position = other.position() - body.position();
-        if position.norm_squared() <= range_m * range_m {
-            let velocity_mps = (other.velocity() - body.velocity()).into();
-            let position_m = position.into();
-            down.neighbours.push(SensedNeighbour { position_m, velocity_mps, drone: DroneId(id), reserved: 0 });
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Outline;
+    use crate::sensor_errors::SensorErrors;
     use crate::sweep::SweepRange;
     use crate::testing::{bodies, rectangle};
     use proptest::prelude::*;
-    use skein_protocol::SimTime;
     use skein_protocol::wire::BrokenSensors;
 
     const RANGE: SweepRange = SweepRange { bodies_m: 66.0, detection_m: 90.0, clearance_m: 15.0 };
@@ -125,7 +163,9 @@ mod tests {
         let mut down = Downlink::default();
         sweep.sweep(bodies, RANGE);
         let drones = std::iter::repeat((1, sensor_fault));
-        SenseWriter::new(shapes).write(bodies, drones, &sweep, ranging_m, &mut down);
+        let model = SensorModel::new(SensorErrors::default(), 0.02, bodies.len());
+        let sensed = Sensed { bodies, sweep: &sweep, ranging_m, model: &model, now: SimTime::ZERO };
+        SenseWriter::new(shapes).write(&sensed, drones, &mut down);
         down.seal(0, SimTime::ZERO);
         down
     }

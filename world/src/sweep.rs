@@ -54,6 +54,11 @@ impl SensorSweep {
         self.neighbours.of(drone)
     }
 
+    /// The outlines of all obstacles, by id.
+    pub(crate) fn outlines(&self) -> &[Outline] {
+        &self.outlines
+    }
+
     /// The obstacles in detection range, by drone, then by obstacle.
     pub(crate) fn contacts(&self) -> &[Contact] {
         &self.contacts

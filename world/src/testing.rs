@@ -1,8 +1,10 @@
 //! Fixtures for this crate's tests.
 
 use crate::body::Body;
+use crate::energy_model::EnergyModel;
 use crate::fault_plan::FaultPlan;
-use crate::params::{End, Failsafe, WorldParams};
+use crate::params::{End, Failsafe, PartsRule, WorldParams};
+use crate::sensor_errors::SensorErrors;
 use crate::world::World;
 use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
@@ -25,13 +27,16 @@ pub(crate) fn params() -> WorldParams {
         planning_distance_m: 20.0,
         detection_range_m: 115.0,
         ranging_m: Some(66.0),
+        sensors: SensorErrors::default(),
         channel: None,
         locality: Locality::default(),
         failsafe: Failsafe::Hover,
         end: End::Hold { stop_x_m: 1e9 },
+        parts: PartsRule::One,
         arrival_error_m: 0.8,
         shape: Shape::NestedV,
         spacing_m: 35.0,
+        energy: EnergyModel::default(),
         faults: FaultPlan::default(),
         pilots: Vec::new(),
     }

@@ -1,6 +1,8 @@
 //! The digest of a mission: a hash over every tick's states, answers and frames, bit by bit.
 
+use crate::body::Body;
 use crate::drones::DroneTable;
+use crate::process::Process;
 use skein_protocol::Tick;
 use skein_protocol::digest::Digest;
 use skein_protocol::frame::AirFrame;
@@ -27,36 +29,53 @@ impl TickDigest {
     /// Folds one tick: its number, every drone's state and what it received, and the frames that were sent.
     pub(crate) fn fold(&mut self, tick: Tick, drones: &DroneTable, frames: &[AirFrame]) {
         self.words.clear();
-        self.word(tick);
+        word(&mut self.words, tick);
         for (body, process) in drones.bodies().iter().zip(drones.processes()) {
-            let (position, velocity) = (body.position(), body.velocity());
-            for value in [position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, body.energy_j()] {
-                self.word(value.to_bits());
-            }
-            self.word(u64::from(body.is_alive()));
-            if body.is_alive() {
-                let slot = process.slot();
-                self.word(u64::from(slot.heard));
-                for &count in &slot.dropped[..ALWAYS_FOLDED] {
-                    self.word(u64::from(count));
-                }
-                self.word(slot.heard_hash);
-                let later = std::iter::once(&slot.duplicates).chain(&slot.dropped[ALWAYS_FOLDED..]);
-                for (&count, which) in later.zip(1u64..).filter(|(count, _)| **count > 0) {
-                    self.word(which << 32 | u64::from(count));
-                }
-            }
+            Self::write_drone(&mut self.words, body, process);
         }
         self.digest.bytes(&self.words);
-        // Each frame is folded once here, not once per receiver: the hashes above say who received which frame.
+        self.fold_frames(frames);
+    }
+
+    /// As [`TickDigest::fold`], with the words of each drone by id.
+    pub(crate) fn fold_words<'a>(&mut self, tick: Tick, drones: impl Iterator<Item = &'a [u8]>, frames: &[AirFrame]) {
+        self.digest.word(tick);
+        drones.for_each(|words| _ = self.digest.bytes(words));
+        self.fold_frames(frames);
+    }
+
+    /// The words of one drone: its state and what it received.
+    pub(crate) fn write_drone(words: &mut Vec<u8>, body: &Body, process: &Process) {
+        let (position, velocity) = (body.position(), body.velocity());
+        for value in [position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, body.energy_j()] {
+            word(words, value.to_bits());
+        }
+        word(words, u64::from(body.is_alive()));
+        if !body.is_alive() {
+            return;
+        }
+        let slot = process.slot();
+        word(words, u64::from(slot.heard));
+        for &count in &slot.dropped[..ALWAYS_FOLDED] {
+            word(words, u64::from(count));
+        }
+        word(words, slot.heard_hash);
+        let later = std::iter::once(&slot.duplicates).chain(&slot.dropped[ALWAYS_FOLDED..]);
+        for (&count, which) in later.zip(1u64..).filter(|(count, _)| **count > 0) {
+            word(words, which << 32 | u64::from(count));
+        }
+    }
+
+    /// Each frame is folded once here, not once per receiver: the hashes of the drones say who received which frame.
+    fn fold_frames(&mut self, frames: &[AirFrame]) {
         for AirFrame { source, sequence, frame, .. } in frames {
             let len = frame.payload.len().min(frame.len as usize);
             self.digest.word(u64::from(source.0) << 32 | u64::from(*sequence)).word(u64::from(frame.kind));
             self.digest.bytes(&frame.payload[..len]);
         }
     }
+}
 
-    fn word(&mut self, value: u64) {
-        self.words.extend_from_slice(&value.to_le_bytes());
-    }
+fn word(words: &mut Vec<u8>, value: u64) {
+    words.extend_from_slice(&value.to_le_bytes());
 }

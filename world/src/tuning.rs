@@ -14,6 +14,10 @@ pub(crate) const PAIRWISE_MAX_BODIES: usize = 64;
 /// Chosen by hand: more than a restarted drone can still receive.
 pub(crate) const PLANS_KEPT: usize = 16;
 
+/// A swarm counts as cut once its parts have been the same for this long, s. 10. Chosen by hand: a swarm that meets again sooner
+/// has hardly noticed, since a leader is missed after one second by default, and after twelve on a bad link.
+pub(crate) const PARTED_S: f64 = 10.0;
+
 /// Tolerance for rounding when distances are checked, m. It is no softer limit. Chosen by hand, far above the rounding
 /// error of coordinates within 10⁶ m and far below any distance that matters.
 pub(crate) const ROUNDING_M: f64 = 1e-6;

@@ -9,8 +9,10 @@ use crate::faults::engine::FaultEngine;
 use crate::geometry::Outline;
 use crate::invariants::InvariantMonitor;
 use crate::judge::{MissionJudge, MissionState};
-use crate::params::{WorldError, WorldParams};
-use crate::sense_writer::SenseWriter;
+use crate::params::{PartsRule, WorldError, WorldParams};
+use crate::parts::Parts;
+use crate::sense_writer::{SenseWriter, Sensed};
+use crate::sensor_model::SensorModel;
 use crate::stages::Stages;
 use crate::sweep::{SensorSweep, SweepRange};
 use crate::telemetry_log::TelemetryLog;
@@ -20,7 +22,7 @@ use crate::uplink::Uplink;
 use skein_protocol::downlink::Downlink;
 use skein_protocol::frame::{AirFrame, Frame};
 use skein_protocol::nearby::Locality;
-use skein_protocol::record::{EventKind, FaultKind, Outcome, Percentiles, RecordView};
+use skein_protocol::record::{EventKind, FaultKind, Outcome, Percentiles, RecordView, Totals};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::telemetry::Telemetry;
@@ -50,8 +52,10 @@ pub struct World {
     monitor: InvariantMonitor,
     decisions: DecisionLog,
     judge: MissionJudge,
+    parts: Parts,
     uplink: Uplink,
     sense_writer: SenseWriter,
+    sensors: SensorModel,
     downlink: Downlink,
     counters: MissionCounters,
     digest: TickDigest,
@@ -80,8 +84,10 @@ impl World {
             sweep: SensorSweep::new(outlines),
             decisions: DecisionLog::new(starts.len()),
             judge: MissionJudge::default(),
+            parts: Parts::default(),
             uplink: Uplink::new(params.channel),
             sense_writer: SenseWriter::new(obstacles),
+            sensors: SensorModel::new(params.sensors, params.dt_s(), starts.len()),
             downlink: Downlink::default(),
             counters: MissionCounters::default(),
             digest: TickDigest::default(),
@@ -120,7 +126,14 @@ impl World {
         let (tick, faults) = (self.tick, self.faults.schedule());
         let processes = self.drones.processes().iter().zip(0..);
         let drones = processes.map(|(process, id)| (process.incarnation(), faults.sensor_fault(DroneId(id), tick)));
-        self.sense_writer.write(self.drones.bodies(), drones, &self.sweep, self.params.ranging_m, &mut self.downlink);
+        let sensed = Sensed {
+            bodies: self.drones.bodies(),
+            sweep: &self.sweep,
+            ranging_m: self.params.ranging_m,
+            model: &self.sensors,
+            now: self.now(),
+        };
+        self.sense_writer.write(&sensed, drones, &mut self.downlink);
         // A drone counts its own frames by their order. Without that order there is no index by place.
         let locality = if self.uplink.keeps_order() { self.params.locality } else { Locality::default() };
         self.downlink.index.build(locality, &self.downlink.frames);
@@ -241,7 +254,8 @@ impl World {
     /// from the opening of the first tick to the end of the last one, s. A mission that has not ended is aborted.
     pub fn finish(&mut self, stats: &LinkStats, wall_s: f64) {
         let (outcome, reason) = self.judge.abort("the mission was stopped");
-        let totals = Box::new(self.counters.close(stats, self.params.dt_s(), wall_s));
+        let parts = matches!(self.params.parts, PartsRule::Each { .. }).then(|| self.parts.count() as u32);
+        let totals = Box::new(Totals { parts, ..self.counters.close(stats, self.params.dt_s(), wall_s) });
         let stuck = if outcome == Outcome::Stuck { self.params.without_way.clone() } else { Vec::new() };
         self.log.push(self.now(), EventKind::End { outcome, reason, stuck, totals });
         self.log.end_tick();
@@ -305,6 +319,7 @@ impl World {
         if self.faults.begin_due(now, &mut self.drones, &self.stages, &mut self.log) {
             self.drop_unsensed_contacts();
         }
+        self.sensors.begin(self.tick, self.drones.bodies());
         self.follow_commands();
     }
 
@@ -372,9 +387,14 @@ impl World {
     }
 
     fn judge(&mut self, end: SimTime) {
+        if let PartsRule::Each { reach_m } = self.params.parts {
+            let faults = self.faults.schedule();
+            self.parts.look(end, self.drones.bodies(), |id| faults.standing(id).link_faults, reach_m);
+        }
         let state = MissionState {
             bodies: self.drones.bodies(),
             all_done: self.drones.all_done(),
+            parts: &self.parts,
             stages: &self.stages,
             end,
             awaits_restarts: self.faults.schedule().awaits_restarts(),

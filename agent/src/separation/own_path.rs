@@ -8,6 +8,8 @@ use skein_protocol::{SimTime, Vec2};
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnPath {
     now: SimTime,
+    /// Greatest error of `now`, s.
+    clock_error_s: f64,
     tick: u64,
     law: BrakingLaw,
     /// Paths are compared at the ticks whose number is a multiple of this.
@@ -28,10 +30,22 @@ impl OwnPath {
     pub fn new((tick, now): (u64, SimTime), given: Vec<Vec2>, velocity: Vec2, law: BrakingLaw, stride: u32) -> Self {
         let last = given.last().copied().unwrap_or_default();
         let braking = BrakingPath::new(last, velocity, law);
-        Self { now, tick, law, stride: u64::from(stride.max(1)), given, braking, velocity }
+        Self { now, clock_error_s: 0.0, tick, law, stride: u64::from(stride.max(1)), given, braking, velocity }
     }
 
-    /// When the path begins.
+    /// The same path by a clock that is wrong by up to `error_s`, s.
+    #[must_use]
+    pub fn with_clock_error(self, error_s: f64) -> Self {
+        Self { clock_error_s: error_s, ..self }
+    }
+
+    /// The earliest time at which the path can begin.
+    #[must_use]
+    pub fn earliest(&self) -> SimTime {
+        self.now.after(-self.clock_error_s)
+    }
+
+    /// When the path begins, by the drone's clock.
     #[must_use]
     pub fn now(&self) -> SimTime {
         self.now
@@ -67,12 +81,13 @@ impl OwnPath {
     /// The least distance that the path keeps from a line at the compared ticks, m; negative on the wrong side.
     #[must_use]
     pub fn distance_m(&self, line: &SeparatingLine, side: Side) -> f64 {
-        let rests = (line.rests_after_s(self.now) / self.law.dt_s).ceil() as u64;
+        let rests = ((line.rests_after_s(self.now) + self.clock_error_s) / self.law.dt_s).ceil() as u64;
         let last = (self.given.len() as u64 + u64::from(self.braking.ticks())).max(rests);
         let mut ticks = (self.stride - self.tick % self.stride) % self.stride;
         let mut least_m = f64::INFINITY;
         loop {
-            let offset_m = line.offset_m(self.now, ticks as f64 * self.law.dt_s);
+            let span_s = ticks as f64 * self.law.dt_s;
+            let offset_m = line.nearest_offset_m(side, self.now, span_s, self.clock_error_s);
             least_m = least_m.min(side.sign() * (line.normal().dot(&self.at(ticks)) - offset_m));
             if ticks >= last {
                 return least_m;

@@ -141,6 +141,21 @@ impl SeparatingLine {
         self.stop_m - (left_mps * left_mps / (2.0 * self.deceleration_mps2)).copysign(self.speed_mps)
     }
 
+    /// The same for a clock that is wrong by up to `error_s`: of all offsets that the line may have then, the one that is nearest to
+    /// the drone on `side`, m.
+    #[must_use]
+    pub fn nearest_offset_m(&self, side: Side, now: SimTime, span_s: f64, error_s: f64) -> f64 {
+        if error_s == 0.0 {
+            return self.offset_m(now, span_s);
+        }
+        // A line never turns back, so the extreme offsets are those at the two ends.
+        let ends = [span_s - error_s, span_s + error_s].map(|span_s| self.offset_m(now, span_s));
+        match side {
+            Side::Front => ends[0].max(ends[1]),
+            Side::Back => ends[0].min(ends[1]),
+        }
+    }
+
     /// Time from `now` until the line stops, s; 0 if it is at rest.
     #[must_use]
     pub fn rests_after_s(&self, now: SimTime) -> f64 {
@@ -179,6 +194,18 @@ mod tests {
         assert!((line.rests_after_s(now) - 4.0).abs() < 1e-5);
         let from_the_front = SeparatingLine::resting(now, Vec2::x(), 50.0).arriving(-40.0, 5.0, 5.0);
         assert!((from_the_front.offset_m(now, 0.0) - 90.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_wrong_clock_brings_a_moving_line_nearer() {
+        let now = SimTime::from_secs(2.0);
+        let line = SeparatingLine::resting(now, Vec2::x(), 50.0).arriving(40.0, 5.0, 5.0);
+        let at = |span_s| line.offset_m(now, span_s);
+        assert_eq!(line.nearest_offset_m(Side::Front, now, 1.0, 0.5), at(1.5), "it comes from behind");
+        assert_eq!(line.nearest_offset_m(Side::Back, now, 1.0, 0.5), at(0.5));
+        assert_eq!(line.nearest_offset_m(Side::Back, now, 1.0, 0.0), at(1.0));
+        let resting = SeparatingLine::resting(now, Vec2::x(), 50.0);
+        assert_eq!(resting.nearest_offset_m(Side::Front, now, 1.0, 9.0), 50.0, "a line at rest needs no clock");
     }
 
     #[test]

@@ -132,6 +132,14 @@ impl SeparationPair {
         true
     }
 
+    /// Binds a drone that has no line to its first one, to which its path keeps. Returns whether it did.
+    pub fn open(&mut self, line: SeparatingLine) -> bool {
+        let Some(number) = self.next_number().filter(|_| self.bound.is_empty()) else { return false };
+        self.bound.push(NumberedLine { number, line });
+        self.newest = number;
+        true
+    }
+
     /// The next number that no drone has used. Drones in front use even numbers, and drones at the back odd ones.
     fn next_number(&self) -> Option<u32> {
         let parity = u32::from(self.side == Side::Back);
@@ -139,7 +147,9 @@ impl SeparationPair {
         if next % 2 == parity { Some(next) } else { next.checked_add(1) }
     }
 
-    fn is_bound_to(&self, number: u32) -> bool {
+    /// Whether the drone is bound to the line with this number.
+    #[must_use]
+    pub fn is_bound_to(&self, number: u32) -> bool {
         self.bound.iter().any(|known| known.number == number) || self.implied.contains(&number)
     }
 

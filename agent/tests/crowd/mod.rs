@@ -1,6 +1,8 @@
 //! Crowds of drones that all follow the safety rule of `skein_agent::braking_filter`, for any commands that they want.
 #![allow(clippy::unwrap_used, dead_code)]
 
+pub(crate) mod blind;
+pub(crate) mod errors;
 pub(crate) mod words;
 
 use skein_agent::braking_filter::{BrakingFilter, BrakingFilterParams, Moving, OwnMotion};

@@ -1,5 +1,6 @@
 //! Crowds that sense no neighbours. Their drones keep apart by the lines of `skein_agent::separation`, over an adverse radio.
 
+use super::errors::Errors;
 use super::{Crowd, Flown, Keyed, Wish, shape_distance_m};
 use bytemuck::Zeroable;
 use skein_agent::braking_filter::{BrakingFilter, OwnMotion};
@@ -27,15 +28,16 @@ pub(crate) struct Adversary {
 }
 
 /// A message on its way.
-struct Sent {
-    arrives: u64,
+pub(crate) struct Sent {
+    pub(crate) arrives: u64,
     from: usize,
-    message: Message,
+    pub(crate) message: Message,
 }
 
 /// A crowd and its radio.
 struct Talk {
     adversary: Adversary,
+    errors: Errors,
     incarnations: Vec<u32>,
     /// What each drone knows of the lines; `None` while it is dead.
     separations: Vec<Option<Separations>>,
@@ -64,28 +66,34 @@ impl Crowd {
         velocity
     }
 
-    fn now(&self) -> SimTime {
-        SimTime::from_secs(self.tick as f64 * self.params.dt_s)
+    /// The time by the clock of a drone.
+    fn now(&self, i: usize, errors: &Errors) -> SimTime {
+        SimTime::from_secs(self.tick as f64 * self.params.dt_s).after(errors.clock_s(i))
     }
 
-    /// The positions of a drone after each of its pending commands, from its present position on, and its velocity then.
-    fn given(&self, i: usize) -> (Vec<Vec2>, Vec2) {
-        let (mut body, mut given) = (self.bodies[i], vec![self.bodies[i].0]);
+    /// The positions that a drone reads after each of its pending commands, from its present position on, and its velocity then.
+    fn given(&self, i: usize, errors: &Errors) -> (Vec<Vec2>, Vec2) {
+        let error_m = errors.position_m(i);
+        let (mut body, mut given) = (self.bodies[i], vec![self.bodies[i].0 + error_m]);
         for command in &self.pending[i] {
             body = self.fly(body, *command);
-            given.push(body.0);
+            given.push(body.0 + error_m);
         }
         (given, body.1)
     }
 
-    fn own_path(&self, i: usize) -> OwnPath {
-        let (given, velocity) = self.given(i);
-        OwnPath::new((self.tick, self.now()), given, velocity, self.params.law(), self.params.stride())
+    fn own_path(&self, i: usize, errors: &Errors) -> OwnPath {
+        let (given, velocity) = self.given(i, errors);
+        let path =
+            OwnPath::new((self.tick, self.now(i, errors)), given, velocity, self.params.law(), self.params.stride());
+        path.with_clock_error(errors.allowed.clock_s)
     }
 
     /// One tick of drone `i`, which hears, makes lines, and gives a command.
     fn step_by_words(&mut self, i: usize, filter: &mut BrakingFilter, wish: Wish, talk: &mut Talk, random: &mut Keyed) {
-        let (given, velocity) = self.given(i);
+        let (given, velocity) = self.given(i, &talk.errors);
+        let (now, own_error_m) = (self.now(i, &talk.errors), talk.errors.position_m(i));
+        let outlines = talk.errors.outlines(i, self.bodies[i].0, &self.obstacles);
         let braking = self.params.law().braking(velocity);
         let acceleration = match talk.exchange(self, i, random) {
             None => braking,
@@ -94,15 +102,15 @@ impl Crowd {
                 let position = given.last().copied().unwrap();
                 let own = OwnMotion {
                     tick: self.tick,
-                    now: self.now(),
-                    sensed_position: self.bodies[i].0,
+                    now,
+                    sensed_position: self.bodies[i].0 + own_error_m,
                     sensed_velocity: self.bodies[i].1,
                     position,
                     velocity,
                     speed_limit_mps: f64::INFINITY,
                     lag: self.lag,
                 };
-                let obstacles = self.obstacles.iter().map(|shape| (shape, shape_distance_m(shape, position)));
+                let obstacles = outlines.iter().map(|shape| (shape, shape_distance_m(shape, position)));
                 let wanted = self.wish(i, wish, random);
                 filter.filter(&own, wanted, obstacles, std::iter::empty(), lines.lines())
             }
@@ -112,11 +120,12 @@ impl Crowd {
 }
 
 impl Talk {
-    fn new(crowd: &Crowd, adversary: Adversary, start_velocity: Vec2) -> Self {
+    fn new(crowd: &Crowd, adversary: Adversary, errors: Errors, start_velocity: Vec2) -> Self {
         let n = crowd.bodies.len();
         let starts_m: Arc<[Vec2]> = crowd.bodies.iter().map(|body| body.0).collect();
         let mut talk = Self {
             adversary,
+            errors,
             incarnations: vec![1; n],
             separations: Vec::new(),
             peers: (0..n).map(|_| Peers::new(n as u32, 2.0)).collect(),
@@ -134,17 +143,18 @@ impl Talk {
             incarnation: self.incarnations[i],
             starts_m: Arc::clone(&self.starts_m),
             start_velocity: self.start_velocity,
-            keep_m: crowd.params.keep_m(),
+            keep_m: crowd.params.keep_m() + 2.0 * self.errors.allowed.position_m,
             braking_mps2: crowd.params.braking_mps2,
             period_s: BEACON_S,
             dt_s: crowd.params.dt_s,
         };
-        Separations::new(params, crowd.now())
+        Separations::new(params, crowd.now(i, &self.errors))
     }
 
     /// Hears what has arrived, says what is due, and returns the lines; `None` if the drone is dead.
     fn exchange(&mut self, crowd: &Crowd, i: usize, random: &mut Keyed) -> Option<&Separations> {
-        let path = crowd.own_path(i);
+        let path = crowd.own_path(i, &self.errors);
+        let (now, position) = (crowd.now(i, &self.errors), crowd.bodies[i].0 + self.errors.position_m(i));
         let heard: Vec<Sent> = self.air[i].extract_if(.., |sent| sent.arrives <= crowd.tick).collect();
         let separations = self.separations[i].as_mut()?;
         let peers = &mut self.peers[i];
@@ -153,7 +163,7 @@ impl Talk {
             match message {
                 Message::Pose(pose) => {
                     separations.hear_incarnation(source, pose.incarnation);
-                    peers.hear(crowd.now(), source, pose);
+                    peers.hear(now, source, Pose { stamp: pose.stamp.min(now), ..pose });
                 }
                 Message::Separation(lines) => separations.hear(source, &lines, &path),
                 _ => {}
@@ -161,9 +171,9 @@ impl Talk {
         }
         let period = ((BEACON_S / crowd.params.dt_s).round() as u64).max(1);
         if crowd.tick % period == i as u64 % period {
-            let (position, velocity) = crowd.bodies[i];
+            let velocity = crowd.bodies[i].1;
             let pose = Pose {
-                stamp: crowd.now(),
+                stamp: now,
                 position_m: raised(position, 0.0),
                 velocity_mps: raised(velocity, 0.0),
                 incarnation: self.incarnations[i],
@@ -196,7 +206,7 @@ impl Talk {
 }
 
 impl Adversary {
-    fn transmit(&self, crowd: &Crowd, from: usize, message: Message, random: &mut Keyed) -> Vec<Sent> {
+    pub(crate) fn transmit(&self, crowd: &Crowd, from: usize, message: Message, random: &mut Keyed) -> Vec<Sent> {
         let copies = if random.unit() < self.loss { 0 } else { 1 + usize::from(random.unit() < DOUBLED) };
         let mut arrives = || crowd.tick + 1 + (random.within(0.0, self.delay_s) / crowd.params.dt_s) as u64;
         (0..copies).map(|_| Sent { arrives: arrives(), from, message }).collect()
@@ -206,19 +216,34 @@ impl Adversary {
 /// Flies a crowd by word alone.
 pub(crate) fn fly_by_words(
     seed: u64,
-    (drones, density): (usize, f64),
+    size: (usize, f64),
     ticks: usize,
     (wish, lag): (Wish, u32),
     adversary: Adversary,
 ) -> Flown {
+    fly_with_errors(seed, size, ticks, (wish, lag), adversary, Errors::none)
+}
+
+/// Flies a crowd by words, whose drones have wrong positions, clocks and outlines.
+pub(crate) fn fly_with_errors(
+    seed: u64,
+    (drones, density): (usize, f64),
+    ticks: usize,
+    (wish, lag): (Wish, u32),
+    adversary: Adversary,
+    errors: impl FnOnce(&Crowd) -> Errors,
+) -> Flown {
     let mut crowd = Crowd::random(seed, drones, density, lag);
     let mut random = Keyed(seed ^ 0xabcdef);
     let velocity = crowd.with_one_velocity(&mut random);
-    let mut talk = Talk::new(&crowd, adversary, velocity);
-    let mut filters = vec![BrakingFilter::new(crowd.params); crowd.bodies.len()];
+    let errors = errors(&crowd);
+    let filter = BrakingFilter::new(crowd.params).with_errors(errors.allowed);
+    let mut talk = Talk::new(&crowd, adversary, errors, velocity);
+    let mut filters = vec![filter; crowd.bodies.len()];
     let (mut least_m, mut flown_m) = (crowd.least_m(), 0.0);
     for _ in 0..ticks {
         talk.restart(&crowd, &mut random);
+        talk.errors.step();
         for (i, filter) in filters.iter_mut().enumerate() {
             crowd.step_by_words(i, filter, wish, &mut talk, &mut random);
         }

@@ -22,6 +22,7 @@ impl Trial {
         let time_s = is_united.then(|| swarm.now_s());
         let (frames, terms) = (swarm.frames() as f64 / f64::from(self.drones), swarm.terms());
         let false_leaders = swarm.false_leaders();
+        let (bytes, hops) = (swarm.bytes(), swarm.hops());
         let end_s = swarm.now_s() + WATCH_S;
         while is_united && swarm.now_s() < end_s {
             swarm.step();
@@ -29,6 +30,8 @@ impl Trial {
                 return None;
             }
         }
-        Some(Elected { time_s, frames, false_leaders, later: swarm.terms() - terms })
+        let watched = swarm.bytes() - bytes;
+        let bytes_per_s = watched as f64 / (swarm.living().max(1) as f64 * WATCH_S);
+        Some(Elected { time_s, frames, false_leaders, later: swarm.terms() - terms, bytes_per_s, hops })
     }
 }

@@ -30,6 +30,10 @@ pub struct ElectionRow {
     false_leaders: f64,
     /// Terms that began in the ten seconds after, on average.
     later_terms: f64,
+    /// What a living drone sent in these ten seconds: the median, bytes/s.
+    bytes_per_s: Option<f64>,
+    /// Hops between the two drones that are farthest from each other: the median.
+    hops: f64,
 }
 
 impl ElectionRow {
@@ -54,10 +58,12 @@ impl ElectionRow {
             frames_per_drone: any(median(elected().map(|one| one.frames))),
             false_leaders: mean(|one| one.false_leaders),
             later_terms: mean(|one| one.later),
+            bytes_per_s: any(median(elected().map(|one| one.bytes_per_s))),
+            hops: median(all.iter().map(|one| one.hops as f64)),
         }
     }
 
-    fn cells(&self) -> [String; 10] {
+    fn cells(&self) -> [String; 12] {
         let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
         [
             self.topology.name().to_owned(),
@@ -70,19 +76,33 @@ impl ElectionRow {
             number(self.frames_per_drone, 0),
             format!("{:.1}", self.false_leaders),
             format!("{:.1}", self.later_terms),
+            format!("{:.0}", self.hops),
+            number(self.bytes_per_s, 0),
         ]
     }
 }
 
-const HEAD: [&str; 10] =
-    ["topology", "drones", "loss", "failing", "elected", "p50_s", "max_s", "frames/drone", "false", "later"];
+const HEAD: [&str; 12] = [
+    "topology",
+    "drones",
+    "loss",
+    "failing",
+    "elected",
+    "p50_s",
+    "max_s",
+    "frames/drone",
+    "false",
+    "later",
+    "hops",
+    "bytes/s",
+];
 
 /// The rows as a text table.
 pub(super) fn table(rows: &[ElectionRow]) -> String {
-    let lines: Vec<[String; 10]> =
+    let lines: Vec<[String; 12]> =
         std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(ElectionRow::cells)).collect();
     let width = |i: usize| lines.iter().map(|line| line[i].len()).max().unwrap_or(0);
-    let padded = |line: &[String; 10]| {
+    let padded = |line: &[String; 12]| {
         let fields = line.iter().enumerate().map(|(i, field)| format!("{field:<width$}", width = width(i)));
         fields.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };

@@ -1,9 +1,10 @@
 //! The state machines of leadership over a simulated radio.
 
-use super::topology::{parts, uniform};
+use super::topology::{longest_way, parts, uniform};
 use super::trial::Trial;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
+use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{Ballot, DroneId, Message, SimTime, Vec2};
 use skein_runtime::mission::{dt_ns, pilot_params};
 use skein_scenario::Scenario;
@@ -31,6 +32,7 @@ pub(super) struct Swarm {
     deaths: Vec<(u64, usize)>,
     sent: Vec<(usize, Message)>,
     frames: u64,
+    bytes: u64,
     /// The drones that lead or led, by their terms.
     leaders: BTreeMap<Ballot, DroneId>,
 }
@@ -55,6 +57,7 @@ impl Swarm {
             links,
             sent: Vec::new(),
             frames: 0,
+            bytes: 0,
             leaders: BTreeMap::new(),
             trial,
         }
@@ -71,6 +74,22 @@ impl Swarm {
     /// Frames that all drones have sent.
     pub(super) fn frames(&self) -> u64 {
         self.frames
+    }
+
+    /// Bytes that all drones have sent, the head of each frame included.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Number of drones that live.
+    pub(super) fn living(&self) -> usize {
+        self.drones.iter().flatten().count()
+    }
+
+    /// Hops between the two living drones of one part that are farthest from each other.
+    pub(super) fn hops(&self) -> usize {
+        let alive: Vec<bool> = self.drones.iter().map(Option::is_some).collect();
+        longest_way(&self.links, &alive)
     }
 
     /// Number of terms so far.
@@ -105,6 +124,7 @@ impl Swarm {
         let mut sent = Vec::new();
         for (from, message) in std::mem::take(&mut self.sent) {
             self.frames += 1;
+            self.bytes += HEAD_BYTES + u64::from(message.encode().len);
             for &to in &self.links[from] {
                 let Some(leading) = &mut self.drones[to] else { continue };
                 let words = [self.trial.seed, LOSS, self.frames, to as u64];

@@ -4,6 +4,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use skein_protocol::Vec2;
 use skein_protocol::digest::Digest;
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 /// Distance between neighbours, m.
@@ -107,6 +108,27 @@ pub(super) fn parts(links: &[Vec<usize>], alive: &[bool]) -> Vec<Vec<usize>> {
     parts
 }
 
+/// Hops between the two living drones of one part that are farthest from each other.
+pub(super) fn longest_way(links: &[Vec<usize>], alive: &[bool]) -> usize {
+    let from = |first: usize| {
+        let mut hops = vec![None; links.len()];
+        hops[first] = Some(0_usize);
+        let mut queue = VecDeque::from([first]);
+        let mut farthest = 0;
+        while let Some(drone) = queue.pop_front() {
+            farthest = hops[drone].unwrap_or(0);
+            for &to in links[drone].iter().filter(|&&to| alive[to]) {
+                if hops[to].is_none() {
+                    hops[to] = Some(farthest + 1);
+                    queue.push_back(to);
+                }
+            }
+        }
+        farthest
+    };
+    (0..links.len()).filter(|&drone| alive[drone]).map(from).max().unwrap_or(0)
+}
+
 /// A number from 0 to 1 that these words determine.
 pub(super) fn uniform(words: &[u64]) -> f64 {
     let mut digest = Digest::default();
@@ -143,5 +165,6 @@ mod tests {
     fn a_dead_drone_cuts_a_line() {
         let links = Topology::Line.links(&Topology::Line.places(5, 1));
         assert_eq!(parts(&links, &[true, true, false, true, true]), [vec![0, 1], vec![3, 4]]);
+        assert_eq!((longest_way(&links, &[true; 5]), longest_way(&links, &[true, true, true, false, true])), (4, 2));
     }
 }

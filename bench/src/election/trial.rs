@@ -28,4 +28,8 @@ pub(super) struct Elected {
     pub(super) false_leaders: usize,
     /// Terms that began while the swarm was watched afterwards.
     pub(super) later: usize,
+    /// What a living drone sent in that time, on average, bytes/s.
+    pub(super) bytes_per_s: f64,
+    /// Hops between the two drones that are farthest from each other.
+    pub(super) hops: usize,
 }

@@ -5,9 +5,9 @@ mod baseline;
 mod case;
 mod flight;
 mod measurement;
-mod process_stats;
+pub(crate) mod process_stats;
 mod report;
-mod workload;
+pub(crate) mod workload;
 
 pub use baseline::BaselinePeer;
 pub use case::Case;

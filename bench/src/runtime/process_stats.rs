@@ -4,15 +4,15 @@ use std::path::Path;
 
 /// CPU time and context switches of processes since they started.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CpuUsage {
-    pub(super) cpu_ns: u64,
-    pub(super) switches: u64,
+pub(crate) struct CpuUsage {
+    pub(crate) cpu_ns: u64,
+    pub(crate) switches: u64,
 }
 
 impl CpuUsage {
     /// Of all threads that one process has now; zero if it is gone. What Linux says of a process itself is about its first
     /// thread.
-    pub(super) fn of(pid: u32) -> Self {
+    pub(crate) fn of(pid: u32) -> Self {
         let threads = std::fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
         Self::sum(threads.map(|thread| Self::of_thread(&thread.path())))
     }
@@ -34,12 +34,12 @@ impl CpuUsage {
     }
 
     /// Of several processes together.
-    pub(super) fn of_all(pids: &[u32]) -> Self {
+    pub(crate) fn of_all(pids: &[u32]) -> Self {
         Self::sum(pids.iter().map(|&pid| Self::of(pid)))
     }
 
     /// The difference to an earlier value.
-    pub(super) fn since(self, before: Self) -> Self {
+    pub(crate) fn since(self, before: Self) -> Self {
         Self {
             cpu_ns: self.cpu_ns.saturating_sub(before.cpu_ns),
             switches: self.switches.saturating_sub(before.switches),
@@ -47,23 +47,23 @@ impl CpuUsage {
     }
 
     /// CPU time per agent-step, µs.
-    pub(super) fn us_per_step(self, steps: f64) -> f64 {
+    pub(crate) fn us_per_step(self, steps: f64) -> f64 {
         self.cpu_ns as f64 / 1000.0 / steps
     }
 }
 
 /// Memory of processes, MiB.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Memory {
+pub(crate) struct Memory {
     /// Resident set size.
-    pub(super) rss_mib: f64,
+    pub(crate) rss_mib: f64,
     /// Proportional set size: shared pages are divided among the processes that share them.
-    pub(super) pss_mib: f64,
+    pub(crate) pss_mib: f64,
 }
 
 impl Memory {
     /// Of several processes together.
-    pub(super) fn of_all(pids: &[u32]) -> Self {
+    pub(crate) fn of_all(pids: &[u32]) -> Self {
         let mut all = Self::default();
         for pid in pids {
             let rollup = std::fs::read_to_string(format!("/proc/{pid}/smaps_rollup")).unwrap_or_default();
@@ -79,7 +79,7 @@ impl Memory {
 }
 
 /// Number of entries of a folder whose names begin with `prefix`.
-pub(super) fn entries(folder: &Path, prefix: &str) -> usize {
+pub(crate) fn entries(folder: &Path, prefix: &str) -> usize {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     listed.filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix)).count()
 }

@@ -13,25 +13,25 @@ const WARM_UP_TICKS: u64 = 60;
 const COOL_DOWN_TICKS: u64 = 80;
 
 /// A swarm of some size, and how long it flies.
-pub(super) struct Workload {
+pub(crate) struct Workload {
     /// Size of the swarm.
-    pub(super) drones: u32,
+    pub(crate) drones: u32,
     /// A grid in formation flight.
-    pub(super) scenario: Scenario,
+    pub(crate) scenario: Scenario,
     /// First tick that is measured.
-    pub(super) from: u64,
+    pub(crate) from: u64,
     /// Tick at which the measurement ends.
-    pub(super) until: u64,
+    pub(crate) until: u64,
     /// Bytes that the world sends to all drones per tick, on average.
-    pub(super) down_len: usize,
+    pub(crate) down_len: usize,
     /// Bytes of these that one drone reads.
-    pub(super) read_len: usize,
+    pub(crate) read_len: usize,
 }
 
 impl Workload {
     /// A grid in formation flight at the paper's spacing. `ticks` are measured; without it, fewer ticks the more drones
     /// there are, and a third of them if `quick`.
-    pub(super) fn new(drones: u32, quick: bool, ticks: Option<u64>) -> Result<Self, BenchError> {
+    pub(crate) fn new(drones: u32, quick: bool, ticks: Option<u64>) -> Result<Self, BenchError> {
         let window = (240_000 / u64::from(drones.saturating_add(16))).clamp(240, 12_000);
         let window = ticks.unwrap_or(if quick { window / 3 } else { window });
         let until = WARM_UP_TICKS + window;
@@ -52,12 +52,12 @@ impl Workload {
     }
 
     /// Number of ticks that are measured.
-    pub(super) fn window(&self) -> u64 {
+    pub(crate) fn window(&self) -> u64 {
         self.until - self.from
     }
 
     /// Number of ticks of the whole flight.
-    pub(super) fn all_ticks(&self) -> u64 {
+    pub(crate) fn all_ticks(&self) -> u64 {
         self.until + COOL_DOWN_TICKS
     }
 }

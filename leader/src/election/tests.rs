@@ -24,7 +24,7 @@ fn tick(drone: &mut Election, now_s: f64, closer: usize) -> Option<Leadership> {
 }
 
 fn sign(drone: &mut Election, now_s: f64, ballot: Ballot, scope: GroupId, named: bool) {
-    drone.handle(at(now_s), 0, Input::Sign { ballot, scope, named });
+    drone.handle(at(now_s), 0, Input::Sign { ballot, scope, named, stamp: Some(at(now_s)) });
 }
 
 /// Ticks a drone every 20 ms until it says something of this kind.
@@ -225,4 +225,41 @@ fn a_slow_link_gets_more_time_to_answer() {
     assert_eq!(slow(0.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::PreVote));
     assert!(slow(3.4, &mut drone).is_none(), "two delays for the answer, one for the claim of the other drone");
     assert_eq!(slow(3.5, &mut drone).map(|said| said.kind()), Some(LeadershipKind::Claim));
+}
+
+/// A heartbeat of this term that was passed on `hops` times.
+fn heartbeat(stamp_s: f64, ballot: Ballot, hops: u16) -> Input {
+    let kind = LeadershipKind::Heartbeat.to_wire() as u16;
+    Input::Heard(Leadership { stamp: at(stamp_s), ballot, kind, hops, group: N, epoch: 0, heir: DroneId::NONE })
+}
+
+#[test]
+fn a_repeated_heartbeat_is_no_sign_of_life_whenever_it_is_heard() {
+    let mut drone = machine(1);
+    let patience_s = |drone: &Election| drone.silence_s();
+    drone.handle(at(5.0), 0, heartbeat(1.0, ballot(1, 0), 3));
+    let alone_s = 5.0 + patience_s(&drone);
+    for step in 1..40 {
+        drone.handle(at(5.0 + 0.1 * f64::from(step)), 0, heartbeat(1.0, ballot(1, 0), 2));
+        drone.handle(at(5.0 + 0.1 * f64::from(step)), 0, heartbeat(0.9, ballot(1, 0), 2));
+    }
+    assert!(drone.has_leader(at(alone_s - 0.001)) && !drone.has_leader(at(alone_s + 0.001)));
+    // The next one is a sign, although the leader's clock is four seconds behind.
+    drone.handle(at(9.0), 0, heartbeat(1.2, ballot(1, 0), 3));
+    assert!(drone.has_leader(at(alone_s + 0.01)));
+}
+
+#[test]
+fn a_pre_vote_is_rejected_by_what_is_newer_and_not_by_what_was_heard_later() {
+    let (mut near, mut far) = (machine(1), machine(2));
+    near.handle(at(1.1), 0, heartbeat(1.0, ballot(1, 0), 1));
+    far.handle(at(3.0), 0, heartbeat(1.0, ballot(1, 0), 9));
+    let (asked, pre_vote) = until_said(&mut near, 1.1, 0, LeadershipKind::PreVote);
+    assert!(far.handle(at(asked), 0, Input::Heard(pre_vote)).is_none(), "it heard the same message later");
+    far.handle(at(asked), 0, heartbeat(2.0, ballot(1, 0), 9));
+    let rejection = far.handle(at(asked), 0, Input::Heard(pre_vote)).unwrap();
+    near.handle(at(asked), 0, Input::Heard(rejection));
+    // As if it had heard that message itself, 0.1 s after it was sent.
+    let alone_s = 2.1 + near.silence_s();
+    assert!(near.has_leader(at(alone_s - 0.001)) && !near.has_leader(at(alone_s + 0.001)));
 }

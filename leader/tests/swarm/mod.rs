@@ -8,7 +8,7 @@ use skein_leader::election::ElectionParams;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
 use skein_leader::params::LeadingParams;
-use skein_leader::params::{Destination, PlannerParams, Strategy};
+use skein_leader::params::{Between, Destination, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::digest::Digest;
@@ -70,6 +70,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             safe_distance_m: 20.0,
             course_y_m: 0.0,
             destination: Destination::Hold { stop_x_m: f64::INFINITY },
+            between: Between::CloseUp,
             debounce_s: p.debounce_s,
         },
         beacon_period_s: p.beacon_s,

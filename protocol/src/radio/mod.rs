@@ -176,10 +176,7 @@ impl Radio {
     /// compare its own [`Radio::reach_m`].
     #[must_use]
     pub fn locality(&self) -> Locality {
-        let reach_m = |kind| {
-            let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(kind);
-            self.rules.iter().rev().find(general).map_or(&self.channel, |rule| &rule.channel).reach_m()
-        };
+        let reach_m = |kind| self.general_channel(kind).reach_m();
         let cell_m = reach_m(Topic::Pose as u16);
         let local = |kind: u16| cell_m.is_finite() && reach_m(kind) <= cell_m;
         let built_in = Topic::ALL.into_iter().filter(|topic| local(*topic as u16));
@@ -187,6 +184,19 @@ impl Radio {
         let (mut named, other) = self.own_kinds();
         named.push(other);
         if named.into_iter().all(local) { locality.with_own(cell_m) } else { locality }
+    }
+
+    /// The channel model of a topic, by the rules for all senders and all receivers.
+    fn general_channel(&self, kind: u16) -> &ChannelModel {
+        let general = |rule: &&Rule| rule.from.is_none() && rule.to.is_none() && rule.is_about(kind);
+        self.rules.iter().rev().find(general).map_or(&self.channel, |rule| &rule.channel)
+    }
+
+    /// Distance at which half of all beacons are heard, m; infinite if the range is not limited. Only rules for all senders and all
+    /// receivers count.
+    #[must_use]
+    pub fn beacon_range_m(&self) -> f64 {
+        self.general_channel(Topic::Pose as u16).range.map_or(f64::INFINITY, |range| range.half_m)
     }
 
     /// Greatest distance at which `receiver` can hear any topic that pilots define, m; infinite without a hard range.

@@ -44,7 +44,14 @@ fn q1_without_the_queue_law_drones_pass_side_by_side() {
 
 #[test]
 fn g1_groups_split_again_and_two_groups_of_different_parents_share_the_gap_in_one_queue() {
-    let flown = fly_file("paper/forest", &[]);
+    for between in ["go-on", "close-up"] {
+        let flown = fly_file("paper/forest", &[("mission.between", between)]);
+        split_again(&flown);
+    }
+}
+
+/// At 70 s there are four groups, and two of them, of different parents, pass the gap in one queue.
+fn split_again(flown: &Flown) {
     let mut members: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (drone, row) in flown.at(70.0).iter().enumerate() {
         members.entry(row.group.to_string()).or_default().push(drone);

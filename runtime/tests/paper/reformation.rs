@@ -33,10 +33,14 @@ fn a5_e6_the_formation_is_deformed_and_closes_with_each_method() {
 }
 
 #[test]
-fn a5_the_formation_closes_between_two_obstacle_sets() {
+fn a5_the_formation_closes_between_two_obstacle_sets_unless_groups_go_on() {
     let slots = centred(&scenario("paper/forest", &[]).slots());
-    let flown = fly_file("paper/forest", &[]);
-    let between = disturbance(&flown, &slots, flown.detected_s(1) - 1.0);
+    let fly = |between| fly_file("paper/forest", &[("mission.between", between)]);
+    let (closes, goes_on) = (fly("close-up"), fly("go-on"));
+    let between = disturbance(&closes, &slots, closes.detected_s(1) - 1.0);
     assert!(between.0 < 3.0 && between.1 < 0.1, "{between:?} before the second set");
-    assert!(disturbance(&flown, &slots, 50.0).0 > 90.0);
+    assert!(disturbance(&closes, &slots, 50.0).0 > 90.0);
+    // If groups go on, each of them has closed its ranks, but they are far from each other.
+    let apart = disturbance(&goes_on, &slots, goes_on.detected_s(1) - 1.0);
+    assert!(apart.0 > 30.0, "{apart:?} before the second set");
 }

@@ -31,9 +31,29 @@ impl KeyedRng {
         ((u128::from(self.next()) * count as u128) >> 64) as usize
     }
 
+    /// A uniform number from 0 to 1, without 1.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A uniform number from −1 to 1, without 1.
+    pub(crate) fn symmetric(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// A uniform vector of at most this length.
+    pub(crate) fn disc(&mut self, length: f64) -> Vec2 {
+        loop {
+            let vector = Vec2::new(self.symmetric(), self.symmetric());
+            if vector.norm_squared() <= 1.0 {
+                return vector * length;
+            }
+        }
+    }
+
     /// A normal number with standard deviation 1, as the sum of twelve uniform numbers. It is within ±6.
     fn normal(&mut self) -> f64 {
-        (0..12).map(|_| (self.next() >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 
     /// A vector whose coordinates are normal with this standard deviation.
@@ -65,6 +85,15 @@ mod tests {
         // Five standard deviations of a binomial with p = 0.2, n = 10 000.
         assert!(counts.iter().all(|&count: &i32| (count - 2000).abs() < 200), "{counts:?}");
         assert_eq!(KeyedRng::new(3, [0; 3]).one_of(0), 0);
+    }
+
+    #[test]
+    fn a_disc_is_filled_evenly() {
+        let drawn: Vec<Vec2> = (0..10_000).map(|i| KeyedRng::new(9, [i, 0, 1]).disc(2.0)).collect();
+        assert!(drawn.iter().all(|v| v.norm() <= 2.0));
+        // Half of the area is within 2/√2. Five standard deviations of a binomial with p = 0.5, n = 10 000.
+        let inner = drawn.iter().filter(|v| v.norm_squared() <= 2.0).count() as i32;
+        assert!((inner - 5000).abs() < 250, "{inner}");
     }
 
     #[test]

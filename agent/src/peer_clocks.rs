@@ -1,0 +1,93 @@
+//! What the stamps of other drones mean by this drone's clock.
+
+use skein_protocol::payload::{Leadership, Pose};
+use skein_protocol::{DroneId, MessageRef, SimTime};
+use std::collections::BTreeMap;
+
+/// Estimates how far the clocks of the others are apart from this drone's, from the least time that a message seemed to take. What a
+/// drone learns by it decides how well it flies; the safety rule allows for every clock error within the bound.
+#[derive(Clone, Debug)]
+pub(crate) struct PeerClocks {
+    /// Greatest difference of two clocks, ns; 0 for exact clocks.
+    bound_ns: i64,
+    /// The least time that a message of each drone seemed to take, ns.
+    least_ns: BTreeMap<DroneId, i64>,
+}
+
+/// A message whose stamp is by this drone's clock.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Restamped {
+    Pose(Pose),
+    Leadership(Leadership),
+}
+
+impl Restamped {
+    pub(crate) fn message(&self) -> MessageRef<'_> {
+        match self {
+            Self::Pose(pose) => MessageRef::Pose(pose),
+            Self::Leadership(leadership) => MessageRef::Leadership(leadership),
+        }
+    }
+}
+
+impl PeerClocks {
+    /// Nothing heard. `error_s`: greatest error of a clock, s.
+    pub(crate) fn new(error_s: f64) -> Self {
+        Self { bound_ns: (2.0 * error_s * 1e9).ceil() as i64, least_ns: BTreeMap::new() }
+    }
+
+    /// The same message with its stamp by this drone's clock; `None` if its stamps need no change.
+    pub(crate) fn restamp(&mut self, now: SimTime, source: DroneId, message: MessageRef<'_>) -> Option<Restamped> {
+        if self.bound_ns == 0 {
+            return None;
+        }
+        match message {
+            MessageRef::Pose(pose) => {
+                Some(Restamped::Pose(Pose { stamp: self.by_own_clock(now, source, pose.stamp), ..*pose }))
+            }
+            MessageRef::Leadership(said) => {
+                // The stamp of a message that was passed on is by the clock of another drone.
+                let direct = said.ballot.claimant == source;
+                let stamp = if direct { self.by_own_clock(now, source, said.stamp) } else { said.stamp.min(now) };
+                Some(Restamped::Leadership(Leadership { stamp, ..*said }))
+            }
+            _ => None,
+        }
+    }
+
+    fn by_own_clock(&mut self, now: SimTime, source: DroneId, stamp: SimTime) -> SimTime {
+        let took_ns = now.0.saturating_sub(stamp.0);
+        let least_ns = self.least_ns.entry(source).or_insert(took_ns);
+        *least_ns = took_ns.min(*least_ns);
+        SimTime(stamp.0.saturating_add((*least_ns).clamp(-self.bound_ns, self.bound_ns)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn heard(clocks: &mut PeerClocks, now_s: f64, stamp_s: f64) -> Option<f64> {
+        let pose = Pose { stamp: SimTime::from_secs(stamp_s), ..Pose::zeroed() };
+        match clocks.restamp(SimTime::from_secs(now_s), DroneId(1), MessageRef::Pose(&pose))? {
+            Restamped::Pose(pose) => Some(pose.stamp.secs()),
+            Restamped::Leadership(_) => None,
+        }
+    }
+
+    #[test]
+    fn a_stamp_from_the_future_becomes_one_of_now() {
+        let mut clocks = PeerClocks::new(1.0);
+        assert_eq!(heard(&mut clocks, 10.0, 11.5), Some(10.0), "its clock is at least 1.5 s ahead");
+        assert_eq!(heard(&mut clocks, 10.3, 11.5), Some(10.0), "this beacon took 0.3 s longer");
+        assert_eq!(heard(&mut clocks, 11.0, 30.0), Some(28.0), "no clock is that far ahead");
+        assert_eq!(heard(&mut PeerClocks::new(0.0), 10.0, 11.5), None, "clocks are exact");
+    }
+
+    #[test]
+    fn the_delay_of_a_radio_is_not_taken_for_a_clock_error() {
+        let mut clocks = PeerClocks::new(0.01);
+        assert!((heard(&mut clocks, 12.0, 10.0).unwrap() - 10.02).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,54 @@
+//! A drone that gives up its place in a queue keeps its route and flies behind all others.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use bytemuck::Zeroable;
+use skein_agent::route_follower::RouteFollower;
+use skein_leader::ledger::Ledger;
+use skein_leader::obstacles::{Obstacles, set_array};
+use skein_leader::routes::RouteParams;
+use skein_protocol::payload::{Assignment, Plan, QueuePlace};
+use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
+
+const HERE: Vec2 = Vec2::new(100.0, -60.0);
+
+/// The ledger of drone 1 after the plan with this epoch past a wall: it is first on route 0.
+fn hear_plan(ledger: &mut Ledger, epoch: u32) {
+    let mut obstacles = Obstacles::new(4, 40.0);
+    let wall = ConvexShape::rectangle(Vec2::new(200.0, 0.0), Vec2::new(10.0, 80.0), 0.0).unwrap();
+    obstacles.learn(SimTime::ZERO, ObstacleId(0), wall, DroneId(0));
+    let id = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch };
+    let (set, set_count) = set_array(&[ObstacleId(0)]);
+    let phase = Phase::Avoid.to_wire();
+    ledger
+        .hear_plan(&Plan { id, group: GroupId::ALL, phase, members: 4, set, set_count, ..Plan::zeroed() }, &obstacles);
+    ledger.hear_assignment(&Assignment { id, drone: DroneId(1), ..Assignment::zeroed() }, &obstacles);
+}
+
+fn first_place(route: &RouteFollower) -> (u16, u16) {
+    let open = route.open_places(route.places(HERE));
+    let place = open.iter().find(|place| place.set != 0).unwrap();
+    (place.route, place.rank)
+}
+
+#[test]
+fn a_place_that_was_given_up_comes_back_with_the_next_plan_alone() {
+    let mut ledger = Ledger::new(DroneId(1), 4, RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 });
+    let mut route = RouteFollower::new(DroneId(1), 0.0);
+    route.give_up_place();
+    hear_plan(&mut ledger, 1);
+    route.update(&ledger, HERE, &[]);
+    assert_eq!(first_place(&route), (0, 0), "without a place there was nothing to give up");
+    let path_m = route.steering(HERE).unwrap().total_m;
+    route.give_up_place();
+    assert_eq!(first_place(&route), (0, QueuePlace::NO_RANK));
+    // A silent drone nearby has the path drawn again.
+    let body = skein_leader::routes::Body { centre_m: Vec2::new(50.0, 0.0), radius_m: 5.0 };
+    route.update(&ledger, HERE, &[body]);
+    assert_eq!(first_place(&route), (0, QueuePlace::NO_RANK));
+    assert!((route.steering(HERE).unwrap().total_m - path_m).abs() < 1e-9, "the route is the same");
+    hear_plan(&mut ledger, 2);
+    route.update(&ledger, HERE, &[]);
+    assert_eq!(first_place(&route), (0, 0));
+}

@@ -1,0 +1,104 @@
+//! Between two obstacle sets groups close up to one formation, or each goes on by itself (the paper's G1).
+#![allow(clippy::unwrap_used, reason = "test helpers")]
+
+mod swarm;
+
+use skein_leader::leading::Leading;
+use skein_leader::params::{Between, Destination};
+use skein_protocol::{DroneId, GroupId, Phase, SimTime, Vec2};
+use std::collections::BTreeSet;
+use swarm::air::{Air, Swarm};
+use swarm::{DEFAULT, params, wall};
+
+const DRONES: u32 = 8;
+
+/// Eight drones in a column before two walls. The first wall is passed after 45 s, the second one is sensed after 60 s and passed
+/// after 103 s.
+fn before_two_walls(between: Between, loss: f64) -> Swarm {
+    let mut swarm = Swarm::new(DEFAULT, Air { seed: 3, loss, ..Air::default() }, DRONES as usize);
+    let machine = |me| {
+        let mut params = params(&DEFAULT, DRONES, me, 1, SimTime::ZERO);
+        params.planner.between = between;
+        params.planner.destination = Destination::Hold { stop_x_m: 900.0 };
+        Some(Leading::new(&params))
+    };
+    swarm.drones = (0..DRONES).map(machine).collect();
+    swarm.scenery = vec![wall(1, 120.0), wall(2, 700.0)];
+    swarm
+}
+
+/// By group: its drones, and the plan that they obey.
+fn groups(swarm: &Swarm) -> BTreeSet<(GroupId, Vec<DroneId>, GroupId, Phase)> {
+    let group = |of: GroupId| {
+        let side = swarm.side(0);
+        let drones: Vec<_> = side.iter().filter(|(_, l)| l.group() == of).collect();
+        let plan = drones[0].1.obeyed().unwrap().plan;
+        assert!(drones.iter().all(|(_, l)| l.obeyed().unwrap().plan.id == plan.id), "{of} obeys two plans");
+        (of, drones.iter().map(|(id, _)| *id).collect(), plan.group, plan.phase())
+    };
+    let all: BTreeSet<GroupId> = swarm.side(0).iter().map(|(_, l)| l.group()).collect();
+    all.into_iter().map(group).collect()
+}
+
+#[test]
+fn groups_close_up_between_two_sets() {
+    let mut swarm = before_two_walls(Between::CloseUp, 0.0);
+    swarm.run(50.0);
+    assert_eq!(swarm.disunion(0), None);
+    assert!(groups(&swarm).iter().all(|(_, _, scope, phase)| (*scope, *phase) == (GroupId::ALL, Phase::Reform)));
+}
+
+#[test]
+fn groups_go_on_by_themselves_split_again_and_close_up_at_the_destination() {
+    for loss in [0.0, 0.3] {
+        let mut swarm = before_two_walls(Between::GoOn, loss);
+        swarm.run(20.0);
+        let parts = groups(&swarm);
+        assert_eq!(parts.len(), 2, "{parts:?}");
+        swarm.run(30.0);
+        let names = |groups: &BTreeSet<(GroupId, Vec<DroneId>, GroupId, Phase)>| {
+            groups.iter().map(|(group, drones, ..)| (*group, drones.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(names(&groups(&swarm)), names(&parts), "the groups stay as they are");
+        assert!(groups(&swarm).iter().all(|(group, _, scope, phase)| (scope, *phase) == (group, Phase::Cruise)));
+        swarm.run(30.0);
+        let again = groups(&swarm);
+        assert!(again.iter().all(|(_, _, scope, phase)| *scope != GroupId::ALL && *phase == Phase::Avoid), "{again:?}");
+        swarm.run(30.0);
+        assert_eq!(swarm.disunion(0), None);
+        assert!(groups(&swarm).iter().all(|(_, _, scope, phase)| (*scope, *phase) == (GroupId::ALL, Phase::Reform)));
+    }
+}
+
+#[test]
+fn a_group_flies_straight_to_the_part_of_the_formation_that_its_drones_will_take() {
+    let mut swarm = before_two_walls(Between::GoOn, 0.0);
+    swarm.run(50.0);
+    let mut ends = Vec::new();
+    for (_, leading) in swarm.side(0).iter().filter(|(_, l)| l.is_leader()) {
+        let plan = leading.obeyed().unwrap().plan;
+        let (anchor, velocity) = plan.anchor_at(swarm.now());
+        assert!((velocity.norm() - 10.0).abs() < 1e-9, "at nominal speed");
+        let (stop, still) = plan.anchor_at(swarm.now().after(1000.0));
+        assert!((stop - Vec2::new(900.0, 0.0)).norm() < 1e-6 && still == Vec2::zeros(), "{stop}");
+        let (way, towards) = ((stop - anchor).normalize(), velocity.normalize());
+        assert!((way - towards).norm() < 1e-9, "{way} {towards}");
+        let slots = leading.obeyed().unwrap().parts.iter().map(|part| (part.slot_m[0] as i64, part.slot_m[1] as i64));
+        ends.extend(slots);
+    }
+    ends.sort_unstable();
+    ends.dedup();
+    assert_eq!(ends.len(), DRONES as usize, "no two drones of any group have the same place");
+}
+
+#[test]
+fn a_swarm_that_has_flown_as_far_as_its_destination_closes_up_at_once() {
+    let mut swarm = before_two_walls(Between::GoOn, 0.0);
+    swarm.scenery.pop();
+    swarm.run(90.0);
+    assert!(groups(&swarm).iter().all(|(_, _, scope, _)| *scope != GroupId::ALL));
+    // The anchor is at 900 m after 97 s.
+    swarm.run(12.0);
+    assert_eq!(swarm.disunion(0), None);
+    assert!(groups(&swarm).iter().all(|(.., phase)| *phase == Phase::Reform));
+}
