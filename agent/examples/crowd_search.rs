@@ -48,11 +48,7 @@ fn by_words(lag: u32, drone_ticks: usize) -> usize {
         let mut random = Keyed(seed);
         let drones = 2 + (random.unit() * random.unit() * 48.0) as usize;
         let (density, wish) = (random.within(0.7, 4.0), WISHES[(seed % 5) as usize]);
-        let adversary = Adversary {
-            delay_s: random.within(0.0, 3.0),
-            loss: random.within(0.0, 0.8),
-            restarts: random.within(-0.2, 0.2),
-        };
+        let adversary = Adversary::random(&mut random);
         fly_by_words(seed, (drones, density), 1000, (wish, lag), adversary)
     })
 }
@@ -64,11 +60,7 @@ fn with_errors(allowed: bool, drone_ticks: usize) -> usize {
         let mut random = Keyed(seed);
         let drones = 2 + (random.unit() * random.unit() * 48.0) as usize;
         let (density, wish) = (random.within(0.7, 4.0), WISHES[(seed % 5) as usize]);
-        let adversary = Adversary {
-            delay_s: random.within(0.0, 3.0),
-            loss: random.within(0.0, 0.8),
-            restarts: random.within(-0.2, 0.2),
-        };
+        let adversary = Adversary::random(&mut random);
         let errors = |crowd: &Crowd| {
             let errors = Errors::random(crowd, seed);
             if allowed { errors } else { errors.unallowed() }

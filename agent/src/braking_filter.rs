@@ -62,8 +62,6 @@ use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
-/// Added to the clearance, m, so that rounding errors do not break it.
-const CLEARANCE_ROUNDING_M: f64 = 1e-3;
 /// Rounds in which half-planes are added. After them the command is moved towards full braking.
 const ROUNDS: usize = 8;
 /// Number of halvings of the interval between full braking and the command that was found.
@@ -322,7 +320,7 @@ impl BrakingFilter {
             }
         }
         for shape in obstacles {
-            for hit in params.hits(&errors, own, candidate, shape).into_iter().flatten() {
+            for hit in candidate.hits(&params, &errors, own, shape).into_iter().flatten() {
                 plane(hit.normal, candidate.path.pull_back_at(hit.share, hit.normal), hit.missing_m);
             }
         }
@@ -375,31 +373,20 @@ struct Hit {
     missing_m: f64,
 }
 
-impl BrakingFilterParams {
-    /// Speed limit after this tick, m/s. It is never lower than the speed that full braking reaches.
-    fn speed_limit_mps(&self, own: &OwnMotion) -> f64 {
-        let braked = own.velocity.norm() - self.braking_mps2 * self.dt_s;
-        own.speed_limit_mps.min(self.speed_max_mps).max(braked)
-    }
-
-    /// The distance from the outline of an obstacle that is allowed without a further look, m.
-    fn clear_m(&self) -> f64 {
-        self.clearance_m + CLEARANCE_ROUNDING_M
-    }
-
+impl Candidate {
     /// How the candidate's braking path violates the distance to an outline that is sensed with errors: in up to four ways.
     fn hits(
         &self,
+        params: &BrakingFilterParams,
         errors: &SensingErrors,
         own: &OwnMotion,
-        candidate: &Candidate,
         shape: &ConvexShape,
     ) -> [Option<Hit>; 4] {
         if *errors == SensingErrors::default() {
-            return [self.hit(own, candidate, shape), None, None, None];
+            return [self.hit(params, own, shape), None, None, None];
         }
-        let keep_m = self.clear_m() + errors.obstacle_m;
-        let (from, to) = (own.position + candidate.path.start(), own.position + candidate.path.end());
+        let keep_m = params.clear_m() + errors.obstacle_m;
+        let (from, to) = (own.position + self.path.start(), own.position + self.path.end());
         let mut nearest = segment_to_core(shape, from, to);
         if errors.partial_outlines {
             // Only a convex set that holds the place from which the drone looks is certainly nearest to a point in view.
@@ -419,7 +406,7 @@ impl BrakingFilterParams {
                 None,
             ];
         }
-        let braked = BrakingPath::new(own.position, own.velocity, self.law());
+        let braked = BrakingPath::new(own.position, own.velocity, params.law());
         let near = segment_to_core(shape, braked.start(), braked.end());
         let braked_m = near.distance_m - shape.radius_m;
         if errors.obstacle_m > 0.0 && braked_m < keep_m {
@@ -432,15 +419,15 @@ impl BrakingFilterParams {
     }
 
     /// The violation of the distance to `shape` by the candidate's braking path, if there is one.
-    fn hit(&self, own: &OwnMotion, candidate: &Candidate, shape: &ConvexShape) -> Option<Hit> {
-        let (from, to) = (own.position + candidate.path.start(), own.position + candidate.path.end());
+    fn hit(&self, params: &BrakingFilterParams, own: &OwnMotion, shape: &ConvexShape) -> Option<Hit> {
+        let (from, to) = (own.position + self.path.start(), own.position + self.path.end());
         let nearest = segment_to_core(shape, from, to);
-        let keep_m = self.clear_m();
+        let keep_m = params.clear_m();
         let distance_m = nearest.distance_m - shape.radius_m;
         if distance_m >= keep_m {
             return None;
         }
-        let braked = BrakingPath::new(own.position, own.velocity, self.law());
+        let braked = BrakingPath::new(own.position, own.velocity, params.law());
         // A drone that is already too close may come no closer than full braking brings it.
         let braked_m = segment_to_core(shape, braked.start(), braked.end()).distance_m - shape.radius_m;
         let missing_m = keep_m.min(braked_m) - distance_m;

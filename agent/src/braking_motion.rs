@@ -5,6 +5,8 @@ use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
+/// Added to the clearance, m, so that rounding errors do not break it.
+const CLEARANCE_ROUNDING_M: f64 = 1e-3;
 
 /// Constants of the rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,6 +93,17 @@ impl BrakingFilterParams {
         let late_s = f64::from(lag + 2) * self.dt_s;
         let brake = self.braking_mps2;
         (brake * late_s).hypot((2.0 * brake * room_m.max(0.0)).sqrt()) - brake * late_s
+    }
+
+    /// Speed limit after this tick, m/s. It is never lower than the speed that full braking reaches.
+    pub(crate) fn speed_limit_mps(&self, own: &OwnMotion) -> f64 {
+        let braked = own.velocity.norm() - self.braking_mps2 * self.dt_s;
+        own.speed_limit_mps.min(self.speed_max_mps).max(braked)
+    }
+
+    /// The distance from the outline of an obstacle that is allowed without a further look, m.
+    pub(crate) fn clear_m(&self) -> f64 {
+        self.clearance_m + CLEARANCE_ROUNDING_M
     }
 
     /// Upper bound on the distance that a drone flies until it stops, if it may accelerate for `ticks` ticks, m.

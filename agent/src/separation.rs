@@ -80,6 +80,12 @@ struct Known {
     opens: bool,
 }
 
+impl Known {
+    fn new(pair: SeparationPair, peer: DroneId, changed: SimTime, agreed: bool) -> Self {
+        Self { pair, peer, heard: None, said: SimTime::ZERO, changed, seen: None, agreed, opens: false }
+    }
+}
+
 /// What a drone ranges of another one, world frame. It may be wrong in any way: it helps to place lines well, and nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
@@ -111,16 +117,7 @@ impl Separations {
                 0 | 1 => SeparationPair::new(side, params.first_line(me.min(peer), me.max(peer))),
                 _ => SeparationPair::restarted(side, incarnation),
             };
-            Known {
-                pair,
-                peer,
-                heard: None,
-                said: SimTime::ZERO,
-                changed: now,
-                seen: None,
-                agreed: incarnation < 2,
-                opens: false,
-            }
+            Known::new(pair, peer, now, incarnation < 2)
         });
         Self { known: known.collect(), params, ranges: false, order: Vec::new() }
     }
@@ -131,16 +128,7 @@ impl Separations {
         let (me, incarnation) = (params.me, params.incarnation);
         let known = params.others().map(|peer| {
             let pair = SeparationPair::restarted(side_of(me, peer), incarnation);
-            Known {
-                pair,
-                peer,
-                heard: None,
-                said: SimTime::ZERO,
-                changed: now,
-                seen: None,
-                agreed: false,
-                opens: false,
-            }
+            Known::new(pair, peer, now, false)
         });
         Self { known: known.collect(), params, ranges: true, order: Vec::new() }
     }

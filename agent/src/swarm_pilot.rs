@@ -607,7 +607,6 @@ impl RolloutPilot for SwarmPilot {
         let planned = self.leading.planned_sets().iter().find(|planned| planned.tag == set)?;
         let &SetPlace { drone, leader, group, route, rank } = planned.parts.get(self.params.me)?;
         let slot_m = self.leading.part().map_or([0.0; 2], |part| part.slot_m);
-        let arrival_s = 0.0;
         Some(Assignment {
             id: planned.stamp,
             scope: planned.scope,
@@ -615,10 +614,9 @@ impl RolloutPilot for SwarmPilot {
             drone,
             leader,
             slot_m,
-            arrival_s,
             route,
             rank,
-            reserved: 0,
+            ..Assignment::zeroed()
         })
     }
 

@@ -59,7 +59,9 @@ impl AdaptiveTimeout {
 
     /// The longest silence that is not yet significant, s: `base_s`, or more if gaps are long or vary.
     pub(crate) fn timeout_s(&self, base_s: f64) -> f64 {
-        let longest_s = MAX_TIMEOUTS * base_s.max(self.mean_s);
+        // Of fewer gaps, a single long one could make the mean longer than the base.
+        let mean_s = if f64::from(self.gaps) >= MAX_TIMEOUTS { self.mean_s } else { 0.0 };
+        let longest_s = MAX_TIMEOUTS * base_s.max(mean_s);
         (self.mean_s + TIMEOUT_DEVIATIONS * self.deviation_s).clamp(base_s, longest_s)
     }
 }
@@ -99,6 +101,15 @@ mod tests {
             timeout.hear(now, 0.015, f64::INFINITY);
         }
         assert!(timeout.timeout_s(0.06) < 0.0601, "{timeout:?}");
+    }
+
+    #[test]
+    fn one_long_gap_among_few_does_not_raise_the_bound() {
+        let long = |regular: usize| after(std::iter::repeat_n(0.02, regular).chain([0.7])).timeout_s(0.06);
+        assert!(long(1) <= MAX_TIMEOUTS * 0.06 + 1e-9, "{}", long(1));
+        assert!(long(400) <= MAX_TIMEOUTS * 0.06 + 1e-9, "{}", long(400));
+        // A source that is always heard rarely is given longer.
+        assert!(after(std::iter::repeat_n(0.5, 400)).timeout_s(0.06) > 0.49);
     }
 
     #[test]

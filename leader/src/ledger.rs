@@ -138,8 +138,8 @@ impl Ledger {
         &self.sets
     }
 
-    /// Takes the obstacles that all drones of the obeyed formation have passed: those of the sets that a formation of the whole swarm has ended since
-    /// the last call.
+    /// Takes the obstacles that all drones of the obeyed formation have passed: those of the sets that a formation of the whole
+    /// swarm has ended since the last call.
     pub fn take_ended(&mut self) -> Vec<ObstacleId> {
         std::mem::take(&mut self.ended)
     }

@@ -245,12 +245,7 @@ fn failover(args: &FailoverArgs, context: &Context<'_>) -> Result<Option<Exit>, 
 
 fn election(args: &ElectionArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
     let Some(report) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
-    if args.json {
-        print_line(serde_json::to_string(&report).map_err(Failure::environment)?)?;
-    } else {
-        print(report.table())?;
-    }
-    Ok(Some(Exit::Reached))
+    print_report(args.json, &report, || report.table())
 }
 
 fn clock(args: &ClockArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
@@ -268,12 +263,7 @@ fn own_pilots(args: &PilotsArgs, context: &Context<'_>) -> Result<Option<Exit>, 
 
 fn split(args: &SplitArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
     let Some(report) = args.bench.run(context).map_err(failure)? else { return Ok(None) };
-    if args.json {
-        print_line(serde_json::to_string(&report).map_err(Failure::environment)?)?;
-    } else {
-        print(report.table())?;
-    }
-    Ok(Some(Exit::Reached))
+    print_report(args.json, &report, || report.table())
 }
 
 fn with_peers(args: &PeersArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
@@ -284,6 +274,15 @@ fn with_peers(args: &PeersArgs, context: &Context<'_>) -> Result<Option<Exit>, F
 fn part(part: Part, args: &PartArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
     let Some(figures) = args.bench.run(part, context).map_err(failure)? else { return Ok(None) };
     print_rows(args.json, &figures, parts::table)
+}
+
+fn print_report<T: Serialize>(json: bool, report: &T, table: impl Fn() -> String) -> Result<Option<Exit>, Failure> {
+    if json {
+        print_line(serde_json::to_string(report).map_err(Failure::environment)?)?;
+    } else {
+        print(table())?;
+    }
+    Ok(Some(Exit::Reached))
 }
 
 fn print_rows<T: Serialize>(json: bool, rows: &[T], table: fn(&[T]) -> String) -> Result<Option<Exit>, Failure> {

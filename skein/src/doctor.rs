@@ -6,6 +6,7 @@ use clap::Args;
 use rustix::process::{Resource, getrlimit};
 use serde_json::json;
 use std::fs;
+use std::io::Read;
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
@@ -35,6 +36,9 @@ const OTHER_FILES: u64 = 64;
 const OTHER_PROCESSES: u64 = 2;
 /// Threads of a run besides the first ones of its processes: the one that writes the record. The limits count threads.
 const OTHER_THREADS: u64 = 1;
+
+/// Room for the status of a process, bytes, so that one call reads it.
+const STATUS_BYTES: usize = 4096;
 
 /// A limit of the machine.
 struct Limit {
@@ -113,13 +117,15 @@ fn processes() -> Limit {
     let others = OTHER_PROCESSES + OTHER_THREADS - 1;
     let all = number("/proc/sys/kernel/pid_max");
     let group = number("/sys/fs/cgroup/pids.max");
-    let bounds = [
-        getrlimit(Resource::Nproc).current.map(|most| (most, threads_of_user())),
-        group.map(|most| (most, number("/sys/fs/cgroup/pids.current").unwrap_or(0))),
-        all.map(|most| (most, threads_of_machine())),
-    ];
+    let threads = threads_of_machine();
+    let bounds =
+        [group.map(|most| (most, number("/sys/fs/cgroup/pids.current").unwrap_or(0))), all.map(|most| (most, threads))];
     let room = |(most, taken): &(u64, u64)| most.saturating_sub(*taken);
-    let (least, taken) = bounds.into_iter().flatten().min_by_key(room).unwrap_or((u64::MAX, 0));
+    let others_least = bounds.into_iter().flatten().min_by_key(room).unwrap_or((u64::MAX, 0));
+    // A user has at most the threads of the machine. They are counted only if the user's limit could be the least.
+    let of_user = getrlimit(Resource::Nproc).current.filter(|&most| room(&(most, threads)) < room(&others_least));
+    let of_user = of_user.map(|most| (most, threads_of_user()));
+    let (least, taken) = of_user.into_iter().chain([others_least]).min_by_key(room).unwrap_or(others_least);
     Limit {
         name: "processes",
         has: format!("{least}, {taken} of them in use"),
@@ -138,9 +144,10 @@ fn threads_of_user() -> u64 {
         name.to_string_lossy().parse::<u32>().is_ok() && process.metadata().is_ok_and(|meta| meta.uid() == user)
     });
     own.map(|process| {
-        let status = fs::read_to_string(process.path().join("status")).unwrap_or_default();
+        let mut status = String::with_capacity(STATUS_BYTES);
+        let read = fs::File::open(process.path().join("status")).and_then(|mut file| file.read_to_string(&mut status));
         let threads = status.lines().find_map(|line| line.strip_prefix("Threads:")?.trim().parse::<u64>().ok());
-        threads.unwrap_or(0)
+        read.ok().and(threads).unwrap_or(0)
     })
     .sum()
 }

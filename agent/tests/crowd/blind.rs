@@ -161,13 +161,7 @@ pub(crate) fn fly_blind(
             let command = crowd.decide(i, &members[i], &mut filters[i], failures.waits, wanted);
             crowd.pending[i].push_back(command);
         }
-        for i in 0..n {
-            let command = crowd.pending[i].pop_front().unwrap();
-            let next = crowd.fly(crowd.bodies[i], command);
-            flown_m += (next.0 - crowd.bodies[i].0).norm();
-            crowd.bodies[i] = next;
-        }
-        crowd.tick += 1;
+        flown_m += crowd.fly_pending();
         least_m = least_m.min(crowd.least_m());
     }
     Flown { least_m, drone_ticks: ticks * n, mean_m: flown_m / n.max(1) as f64 }

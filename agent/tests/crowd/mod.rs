@@ -185,6 +185,19 @@ impl Crowd {
         (position + (velocity + next) * (self.params.dt_s / 2.0), next)
     }
 
+    /// Each drone obeys its oldest pending command for a tick. Returns the length of all ways together, m.
+    fn fly_pending(&mut self) -> f64 {
+        let mut flown_m = 0.0;
+        for i in 0..self.bodies.len() {
+            let command = self.pending[i].pop_front().unwrap();
+            let next = self.fly(self.bodies[i], command);
+            flown_m += (next.0 - self.bodies[i].0).norm();
+            self.bodies[i] = next;
+        }
+        self.tick += 1;
+        flown_m
+    }
+
     /// One tick of all drones. Each drone decides by what it senses at the start of the tick. `freezes`: share of the time in which the
     /// process of a drone is stopped. The body of such a drone brakes fully, and its commands are void.
     fn step(&mut self, filters: &mut [BrakingFilter], wish: Wish, freezes: f64, random: &mut Keyed) {

@@ -27,6 +27,13 @@ pub(crate) struct Adversary {
     pub(crate) restarts: f64,
 }
 
+impl Adversary {
+    /// Delays up to 3 s, up to 80 % lost; half of the crowds have restarts.
+    pub(crate) fn random(random: &mut Keyed) -> Self {
+        Self { delay_s: random.within(0.0, 3.0), loss: random.within(0.0, 0.8), restarts: random.within(-0.2, 0.2) }
+    }
+}
+
 /// A message on its way.
 pub(crate) struct Sent {
     pub(crate) arrives: u64,
@@ -247,13 +254,7 @@ pub(crate) fn fly_with_errors(
         for (i, filter) in filters.iter_mut().enumerate() {
             crowd.step_by_words(i, filter, wish, &mut talk, &mut random);
         }
-        for i in 0..crowd.bodies.len() {
-            let command = crowd.pending[i].pop_front().unwrap();
-            let next = crowd.fly(crowd.bodies[i], command);
-            flown_m += (next.0 - crowd.bodies[i].0).norm();
-            crowd.bodies[i] = next;
-        }
-        crowd.tick += 1;
+        flown_m += crowd.fly_pending();
         least_m = least_m.min(crowd.least_m());
     }
     let n = crowd.bodies.len();
