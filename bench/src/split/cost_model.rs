@@ -1,5 +1,6 @@
 //! What a tick costs a part, as a formula with measured factors.
 
+use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use skein_runtime::PartTick;
 use std::time::Duration;
@@ -7,6 +8,8 @@ use std::time::Duration;
 /// Means over the measured ticks of one part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PartMeans {
+    /// Drones of the whole swarm.
+    pub swarm: f64,
     /// Its drones.
     pub drones: f64,
     /// Bodies of other parts that it knew of.
@@ -56,10 +59,11 @@ impl PartSums {
         self.sum.digest_bytes += tick.digest_bytes as f64;
     }
 
-    /// The means.
-    pub(super) fn means(&self) -> PartMeans {
+    /// The means, for a part of a swarm of `swarm` drones.
+    pub(super) fn means(&self, swarm: u32) -> PartMeans {
         let mean = |sum: f64| sum / self.ticks.max(1.0);
         PartMeans {
+            swarm: f64::from(swarm),
             drones: mean(self.sum.drones),
             halo_bodies: mean(self.sum.halo_bodies),
             frames: mean(self.sum.frames),
@@ -75,13 +79,16 @@ impl PartSums {
     }
 }
 
-/// What a tick costs a part: so much per drone and per frame, and so much per drone and per byte sent for the exchange.
+/// What a tick costs a part: so much per drone, per frame, and for each pair of one of its drones and any drone of the swarm. In
+/// addition, the exchange costs so much per drone and per byte sent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CostModel {
     /// Per agent-step, its world's share included, µs.
     pub drone_us: f64,
     /// Per frame that the part goes through, µs.
     pub frame_us: f64,
+    /// Per agent-step and drone of the swarm, µs: what a drone hears and keeps of each other drone.
+    pub pair_us: f64,
     /// Per drone, to choose what others are told of it and to sort it in, µs.
     pub exchange_drone_us: f64,
     /// Per byte that is sent to other parts, to choose it and to sort it in, µs.
@@ -91,58 +98,84 @@ pub struct CostModel {
 impl CostModel {
     /// The factors that fit these parts best: least squares of the relative errors.
     pub(super) fn fit(parts: &[PartMeans]) -> Self {
-        let work = fit(parts.iter().map(|part| ([part.drones, part.frames], part.work_us)));
-        let exchange = fit(parts.iter().map(|part| ([part.drones, part.sent_bytes], part.exchange_us)));
-        Self { drone_us: work[0], frame_us: work[1], exchange_drone_us: exchange[0], exchange_byte_us: exchange[1] }
+        let [drone_us, frame_us, pair_us] = fit(parts.iter().map(|part| (work_terms(part), part.work_us)));
+        let exchange = parts.iter().map(|part| ([part.drones, part.sent_bytes], part.exchange_us));
+        let [exchange_drone_us, exchange_byte_us] = fit(exchange);
+        Self { drone_us, frame_us, pair_us, exchange_drone_us, exchange_byte_us }
     }
 
     /// What it says that a part computes in a tick, µs.
     #[must_use]
     pub fn part_us(&self, part: &PartMeans) -> f64 {
-        self.drone_us * part.drones
-            + self.frame_us * part.frames
-            + self.exchange_drone_us * part.drones
-            + self.exchange_byte_us * part.sent_bytes
+        let [drones, frames, pairs] = work_terms(part);
+        let work_us = self.drone_us * drones + self.frame_us * frames + self.pair_us * pairs;
+        work_us + self.exchange_drone_us * part.drones + self.exchange_byte_us * part.sent_bytes
     }
 }
 
-/// The two factors, neither below 0, whose weighted sum is closest to the values, each error relative to its value.
-fn fit(samples: impl Iterator<Item = ([f64; 2], f64)> + Clone) -> [f64; 2] {
-    let scaled = samples.filter(|(_, y)| *y > 0.0).map(|([a, b], y)| [a / y, b / y]);
-    let sum = |of: fn([f64; 2]) -> f64| scaled.clone().map(of).sum::<f64>();
-    let (aa, ab, bb) = (sum(|[a, _]| a * a), sum(|[a, b]| a * b), sum(|[_, b]| b * b));
-    let (a, b) = (sum(|[a, _]| a), sum(|[_, b]| b));
-    let alone = |y: f64, yy: f64| if yy > 0.0 { y / yy } else { 0.0 };
-    let determinant = aa * bb - ab * ab;
-    if determinant <= 1e-9 * aa * bb {
-        return [alone(a, aa), 0.0];
+/// What the work of a part grows with.
+fn work_terms(part: &PartMeans) -> [f64; 3] {
+    [part.drones, part.frames, part.drones * part.swarm]
+}
+
+/// The factors, none below 0, whose weighted sum is closest to the values, each error relative to its value. All sets of factors
+/// above 0 are tried.
+fn fit<const N: usize>(samples: impl Iterator<Item = ([f64; N], f64)>) -> [f64; N] {
+    let (mut squares, mut sums) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+    for (terms, value) in samples.filter(|(_, value)| *value > 0.0) {
+        let row = SVector::from(terms) / value;
+        squares += row * row.transpose();
+        sums += row;
     }
-    let both = [(a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant];
-    match both {
-        [first, _] if first < 0.0 => [0.0, alone(b, bb)],
-        [_, second] if second < 0.0 => [alone(a, aa), 0.0],
-        _ => both,
+    let mut best = ([0.0; N], 0.0);
+    for set in 1..1_u32 << N {
+        let Some(factors) = fit_of(set, &squares, &sums).filter(|factors| factors.min() >= 0.0) else { continue };
+        let error = factors.dot(&(squares * factors)) - 2.0 * factors.dot(&sums);
+        if error < best.1 {
+            best = (factors.into(), error);
+        }
     }
+    best.0
+}
+
+/// The factors of the terms in `set`, one bit each; the others are 0. `None` if the samples do not determine them.
+fn fit_of<const N: usize>(set: u32, squares: &SMatrix<f64, N, N>, sums: &SVector<f64, N>) -> Option<SVector<f64, N>> {
+    let chosen = |i: usize| set >> i & 1 == 1;
+    let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| match (chosen(i), chosen(j), i == j) {
+        // Scaled, so that terms of any size can be told from none.
+        (true, true, _) => squares[(i, j)] / (squares[(i, i)] * squares[(j, j)]).sqrt(),
+        (_, _, same) => f64::from(u8::from(same)),
+    });
+    let scale = SVector::<f64, N>::from_fn(|i, _| if chosen(i) { squares[(i, i)].sqrt() } else { 1.0 });
+    let wanted = SVector::<f64, N>::from_fn(|i, _| if chosen(i) { sums[i] / scale[i] } else { 0.0 });
+    let found = matrix.cholesky()?.solve(&wanted).component_div(&scale);
+    found.iter().all(|factor| factor.is_finite()).then_some(found)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn part(drones: f64, frames: f64, sent_bytes: f64) -> PartMeans {
-        let (work_us, exchange_us) = (2.0 * drones + 0.5 * frames, 0.1 * drones + 0.01 * sent_bytes);
-        PartMeans { drones, frames, sent_bytes, work_us, exchange_us, ..PartMeans::default() }
+    fn part(swarm: f64, drones: f64, frames: f64, sent_bytes: f64) -> PartMeans {
+        let work_us = 2.0 * drones + 0.5 * frames + 0.03 * drones * swarm;
+        let exchange_us = 0.1 * drones + 0.01 * sent_bytes;
+        PartMeans { swarm, drones, frames, sent_bytes, work_us, exchange_us, ..PartMeans::default() }
     }
 
     #[test]
     fn the_factors_of_a_formula_are_found() {
-        let parts = [part(64.0, 13.0, 100.0), part(16.0, 200.0, 4000.0), part(1000.0, 210.0, 900.0)];
+        let parts = [
+            part(64.0, 64.0, 13.0, 100.0),
+            part(64.0, 16.0, 200.0, 4000.0),
+            part(1000.0, 1000.0, 210.0, 900.0),
+            part(1000.0, 250.0, 150.0, 100.0),
+        ];
         let model = CostModel::fit(&parts);
-        let found = [model.drone_us, model.frame_us, model.exchange_drone_us, model.exchange_byte_us];
-        for (found, wanted) in found.into_iter().zip([2.0, 0.5, 0.1, 0.01]) {
-            assert!((found - wanted).abs() < 1e-9, "{model:?}");
+        let found = [model.drone_us, model.frame_us, model.pair_us, model.exchange_drone_us, model.exchange_byte_us];
+        for (found, wanted) in found.into_iter().zip([2.0, 0.5, 0.03, 0.1, 0.01]) {
+            assert!((found - wanted).abs() < 1e-6, "{model:?}");
         }
-        assert!((model.part_us(&parts[0]) - parts[0].work_us - parts[0].exchange_us).abs() < 1e-9);
+        assert!((model.part_us(&parts[0]) - parts[0].work_us - parts[0].exchange_us).abs() < 1e-6);
     }
 
     #[test]
@@ -151,5 +184,6 @@ mod tests {
         let found = fit(samples.into_iter());
         assert!(found[0] > 0.0 && found[1] == 0.0, "{found:?}");
         assert_eq!(fit([([2.0, 0.0], 4.0)].into_iter()), [2.0, 0.0]);
+        assert_eq!(fit::<2>(std::iter::empty()), [0.0, 0.0]);
     }
 }

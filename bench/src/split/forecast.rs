@@ -88,6 +88,7 @@ pub(super) fn part_of(drones: f64, parts: f64, habits: &Habits) -> PartMeans {
     let (bodies, senders) = (ring(habits.ranging_m), ring(habits.radio_m));
     let sent_frames = senders * habits.frames_per_drone;
     PartMeans {
+        swarm: drones,
         drones: own,
         halo_bodies: bodies,
         frames: habits.frames_per_drone * own + sent_frames,
@@ -111,7 +112,7 @@ mod tests {
         radio_m: 100.0,
     };
     const MODEL: CostModel =
-        CostModel { drone_us: 2.0, frame_us: 0.5, exchange_drone_us: 0.1, exchange_byte_us: 0.001 };
+        CostModel { drone_us: 2.0, frame_us: 0.5, pair_us: 0.0, exchange_drone_us: 0.1, exchange_byte_us: 0.001 };
     const WIRE: Wire = Wire { round_trip_us: 100.0, byte_us: 0.0008 };
 
     #[test]

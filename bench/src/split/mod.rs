@@ -96,7 +96,7 @@ fn measure(workload: &Workload, parts: u32, context: &Context<'_>) -> Result<Opt
             sums.iter_mut().zip(done).for_each(|(sums, part)| sums.add(part));
         }
     }
-    let means = sums.iter().map(PartSums::means).collect();
+    let means = sums.iter().map(|sums| sums.means(workload.drones)).collect();
     Ok(Some(SplitRow::new(workload.drones, workload.window(), swarm.digest(), means)))
 }
 

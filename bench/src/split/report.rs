@@ -117,11 +117,11 @@ impl SplitReport {
         if let (Some(model), Some(loopback), Some(network), Some(habits)) =
             (self.model, self.loopback, self.network, self.habits)
         {
-            let CostModel { drone_us, frame_us, exchange_drone_us, exchange_byte_us } = model;
+            let CostModel { drone_us, frame_us, pair_us, exchange_drone_us, exchange_byte_us } = model;
             writeln!(
                 out,
-                "\nµs per agent-step {drone_us:.3}, per frame {frame_us:.3}; to exchange: per drone {exchange_drone_us:.4}, per \
-                 byte {exchange_byte_us:.5}"
+                "\nµs per agent-step {drone_us:.3}, per frame {frame_us:.3}, per agent-step and drone of the swarm {pair_us:.5}; \
+                 to exchange: per drone {exchange_drone_us:.4}, per byte {exchange_byte_us:.5}"
             )?;
             writeln!(
                 out,
