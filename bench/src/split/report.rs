@@ -137,7 +137,7 @@ impl SplitReport {
         writeln!(
             out,
             "{:>9}{:>7}{:>12}{:>12}{:>13}{:>12}{:>12}{:>12}{:>14}",
-            "drones", "parts", "part ms", "leader ms", "network ms", "digest ms", "halo kB", "ticks/s", "without ×"
+            "drones", "parts", "part ms", "leader ms", "network ms", "digest ms", "halo kB", "tick ms", "without ms"
         )?;
         for forecast in &self.forecasts {
             let Forecast { drones, parts, part_ms, leader_ms, network_ms, digest_ms, .. } = forecast;
@@ -145,8 +145,8 @@ impl SplitReport {
                 out,
                 "{drones:>9}{parts:>7}{part_ms:>12.2}{leader_ms:>12.2}{network_ms:>13.2}{digest_ms:>12.2}{:>12.1}{:>12.1}{:>14.1}",
                 forecast.halo_bytes / 1e3,
-                forecast.ticks_per_s,
-                forecast.ticks_per_s_without,
+                1e3 / forecast.ticks_per_s,
+                1e3 / forecast.ticks_per_s_without,
             )?;
         }
         Ok(())
