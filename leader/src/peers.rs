@@ -62,6 +62,9 @@ pub struct Peers {
     stamps: Vec<SimTime>,
     /// What is known of each of them, in the same order.
     last: Vec<Peer>,
+    /// Those that were heard without a relay, ascending: all that may still count as heard so, and some that no longer do. In a wide
+    /// swarm they are few.
+    near: Vec<DroneId>,
 }
 
 impl Peers {
@@ -78,6 +81,7 @@ impl Peers {
             ids: Vec::new(),
             stamps: Vec::new(),
             last: Vec::new(),
+            near: Vec::new(),
         }
     }
 
@@ -99,8 +103,15 @@ impl Peers {
         if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
             return;
         }
-        match self.place(source) {
+        let place = self.place(source);
+        if direct.is_some() && place.is_ok_and(|place| now.since(self.last[place].direct) > self.timeout_s) {
+            self.note_near(source);
+        }
+        match place {
             Err(place) => {
+                if direct.is_some() {
+                    self.note_near(source);
+                }
                 let timeout = self.prior(now, direct.is_some());
                 let silence_s = patience_s(&timeout, self.timeout_s);
                 let peer = Peer { silence_s, timeout, direct: direct.unwrap_or(NEVER), pose };
@@ -132,6 +143,13 @@ impl Peers {
         }
     }
 
+    /// Adds a peer to those heard without a relay.
+    fn note_near(&mut self, peer: DroneId) {
+        if let Err(place) = self.near.binary_search(&peer) {
+            self.near.insert(place, peer);
+        }
+    }
+
     /// What is assumed of the gaps between the beacons of a peer. Those that are passed on come rarely.
     fn prior(&self, now: SimTime, direct: bool) -> AdaptiveTimeout {
         if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.timeout_s) }
@@ -141,6 +159,11 @@ impl Peers {
     fn look_for_silence(&mut self, now: SimTime) {
         self.next_look = now.after(LOOK_TIMEOUTS * self.timeout_s);
         self.quiet_until = self.last.iter().map(Peer::lives_until).min().unwrap_or(SimTime::MAX);
+        // No silence is significant only after longer.
+        let longest_s = MAX_TIMEOUTS * self.timeout_s;
+        let mut near = std::mem::take(&mut self.near);
+        near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
+        self.near = near;
     }
 
     /// Whether no peer is silent for too long, which needs no look at each.
@@ -172,7 +195,8 @@ impl Peers {
 
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
-        self.known().filter(move |(_, known)| known.is_direct(now)).map(|(id, known)| (id, &known.pose))
+        let near = self.near.iter().filter_map(|&id| Some((id, self.get(id)?)));
+        near.filter(move |(_, known)| known.is_direct(now)).map(|(id, known)| (id, &known.pose))
     }
 
     /// What drone `me` says in [`Pose::hears`].
@@ -196,6 +220,7 @@ impl Peers {
             self.ids.remove(place);
             self.stamps.remove(place);
             self.last.remove(place);
+            self.near.retain(|near| *near != peer);
         }
     }
 

@@ -27,11 +27,15 @@ impl<T> Default for Roster<T> {
 }
 
 impl<T: OfDrone> Roster<T> {
-    /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id.
+    /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id; if all but one have,
+    /// it may be one less.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        match (self.0.get(drone.index()), self.0.last()) {
-            (Some(part), _) if part.drone() == drone => Ok(drone.index()),
-            (_, Some(last)) if last.drone() >= drone => self.0.binary_search_by_key(&drone, OfDrone::drone),
+        let guess = |index: usize| self.0.get(index).is_some_and(|part| part.drone() == drone).then_some(index);
+        if let Some(index) = guess(drone.index()).or_else(|| guess(drone.index().checked_sub(1)?)) {
+            return Ok(index);
+        }
+        match self.0.last() {
+            Some(last) if last.drone() >= drone => self.0.binary_search_by_key(&drone, OfDrone::drone),
             _ => Err(self.0.len()),
         }
     }
