@@ -8,7 +8,7 @@ use support::process::{Role, is_alive, pid_of, read, state};
 use support::{Flight, Place, eventually, faults};
 
 /// Every kind of fault in a short flight that ends by time-out: the value of `--set fault.0=…`, and what the summary must say.
-const KINDS: [(&str, &str, Option<u64>); 10] = [
+const KINDS: [(&str, &str, Option<u64>); 13] = [
     ("kind=\"kill\", on=\"detected\", target=\"leader\"", "kill", Some(0)),
     ("kind=\"freeze\", at_s=3, drone=4, for_s=2", "freeze", Some(4)),
     ("kind=\"restart\", on=\"queued\", target=\"member\", for_s=1.5", "restart", Some(1)),
@@ -18,6 +18,13 @@ const KINDS: [(&str, &str, Option<u64>); 10] = [
     ("kind=\"partition\", at_s=2, sides=[[0, 1, 2], [3, 4, 5, 6]], for_s=4", "partition", None),
     ("kind=\"blind\", at_s=2, drone=0, for_s=4", "blind", Some(0)),
     ("kind=\"noise\", at_s=1, drone=3, position_std_m=0.2, velocity_bias_mps=[0.1, 0]", "noise", Some(3)),
+    ("kind=\"ranging\", at_s=1, drone=2, ranging_dropout_share=0.4, ranging_std_m=1", "ranging", Some(2)),
+    (
+        "kind=\"gnss\", at_s=1, drone=5, position_bias_m=[0, 0.5], position_drift_mps=[0.02, 0], for_s=6",
+        "gnss",
+        Some(5),
+    ),
+    ("kind=\"clock\", at_s=2, target=\"leader\", clock_offset_s=0.4, clock_drift_ppm=-100, for_s=5", "clock", Some(0)),
     ("kind=\"wind\", at_s=1, wind_mps2=[0, 0.3], gust_mps2=0.4, for_s=6", "wind", None),
 ];
 

@@ -58,8 +58,8 @@ pub struct SwarmPilot {
     /// The end of the planned route, while a known obstacle blocks it (world frame, m).
     detour_to: Option<Vec2>,
     reaction: ReactionDelay,
-    /// When the drone was stepped last.
-    stepped: Option<SimTime>,
+    /// The tick in which the drone was stepped last.
+    stepped: Option<u64>,
     predictor: StatePredictor,
     escape: Escape,
     straggler: Straggler,
@@ -446,8 +446,8 @@ impl SwarmPilot {
 
     /// After ticks without a step, and after a restart, the drone has been braked by its failsafe. Its pending commands are void.
     fn brake_after_a_gap(&mut self, senses: &Senses<'_>) {
-        let missed = match self.stepped.replace(senses.now) {
-            Some(before) => senses.now.since(before) > 1.5 * self.params.dt_s,
+        let missed = match self.stepped.replace(senses.tick) {
+            Some(before) => senses.tick > before + 1,
             None => self.params.incarnation > 1,
         };
         if missed {

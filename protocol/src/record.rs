@@ -197,6 +197,12 @@ pub enum FaultKind {
     Partition,
     /// The drone senses no obstacles, no neighbours, or neither of them.
     Blind,
+    /// What the drone ranges of its neighbours is worse or missing.
+    Ranging,
+    /// The position that the drone reads of itself is biased, or drifts.
+    Gnss,
+    /// The drone's clock jumps, or drifts.
+    Clock,
     /// The drone receives a wrong position or velocity of its own.
     Noise,
     /// Wind pushes the drone.

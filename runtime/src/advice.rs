@@ -50,6 +50,16 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),
         enclosed(&no_way),
+        beyond_the_margin(
+            "the position that a drone reads of itself",
+            (scenario.position_error_possible_m(), scenario.position_error_max_m()),
+            ("sensors.position_error_max_m", "m"),
+        ),
+        beyond_the_margin(
+            "a drone's clock",
+            (scenario.clock_error_possible_s(), scenario.clock_error_max_s()),
+            ("sensors.clock_error_max_s", "s"),
+        ),
     ];
     Ok(found.into_iter().flatten().collect())
 }
@@ -138,6 +148,16 @@ fn stops_unseen(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<St
     })
 }
 
+/// An error of a sensor that can be greater, with its faults, than the margins allow for. `key`: what bounds it, and its unit.
+fn beyond_the_margin(what: &str, (possible, allowed): (f64, f64), (key, unit): (&str, &str)) -> Option<String> {
+    (possible > allowed + 1e-9).then(|| {
+        format!(
+            "{what} may be wrong by {possible:.3} {unit} with all faults, but the margins allow for {allowed:.3} {unit}: the flight is \
+             outside the safety statement; raise {key} to {possible:.3} at least"
+        )
+    })
+}
+
 fn enclosed(drones: &[u32]) -> Option<String> {
     let ids: Vec<String> = drones.iter().map(u32::to_string).collect();
     (!ids.is_empty()).then(|| {
@@ -176,6 +196,33 @@ mod tests {
         assert!((said.separation_m - (1.01 * 35.0 + 12.0)).abs() < 1e-9, "{said:?}");
         assert!(ranged.separation_m < 38.0, "{ranged:?}");
         assert!(warned("[sensors]\nposition_std_m = 2\nranging = false\n").contains("sensors.position_error_max_m"));
+    }
+
+    #[test]
+    fn faults_of_sensors_add_to_the_margins_or_are_warned_of() {
+        let fault = |keys: &str| format!("[[fault]]\nat_s = 5\ndrone = 1\n{keys}");
+        let gnss = fault("kind = \"gnss\"\nposition_bias_m = [3, 4]\n");
+        assert_eq!(warned(&gnss), "", "the margins allow for it");
+        let less = warned(&format!("[sensors]\nposition_error_max_m = 4\nposition_std_m = 0.5\n{gnss}"));
+        assert!(less.contains("wrong by 6.500 m with all faults, but the margins allow for 4.000 m"), "{less}");
+        assert_eq!(warned(&format!("[sensors]\nposition_error_max_m = 6.5\nposition_std_m = 0.5\n{gnss}")), "");
+        let noise = warned(&fault("kind = \"noise\"\nposition_bias_m = [3, 4]\n"));
+        assert!(noise.contains("5.000 m with all faults, but the margins allow for 0.000 m"), "{noise}");
+        let clock = fault("kind = \"clock\"\nclock_offset_s = -1\n");
+        assert_eq!(warned(&clock), "");
+        let less = warned(&format!("[sensors]\nclock_error_max_s = 0.5\n{clock}"));
+        assert!(
+            less.contains("wrong by 1.000 s") && less.contains("raise sensors.clock_error_max_s to 1.000"),
+            "{less}"
+        );
+    }
+
+    #[test]
+    fn a_fault_of_ranging_leaves_the_distances_to_words() {
+        let text =
+            "[formation]\ndrones = 8\n[[fault]]\nkind = \"ranging\"\nat_s = 5\ndrone = 1\nranging_dropout_share = 1\n";
+        let scenario = Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &[]).unwrap();
+        assert!(kept_distances(&scenario).by_words);
     }
 
     #[test]

@@ -2,7 +2,10 @@
 
 use skein_protocol::{DroneId, Vec2};
 use skein_scenario::{Fault as Keys, FaultEvent, FaultKind, FaultTarget, Scenario, Sensor};
-use skein_world::faults::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, Wind};
+use skein_world::RangingErrors;
+use skein_world::faults::{
+    ClockDrift, Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, PositionDrift, Wind,
+};
 
 /// How long a gust lasts if the scenario does not say, s. The key `gust_s` documents this default.
 const GUST_S: f64 = 1.0;
@@ -49,6 +52,24 @@ fn effect(keys: &Keys, drones: u32) -> FaultEffect {
             obstacles: keys.sensor != Some(Sensor::Ranging),
             ranging: keys.sensor != Some(Sensor::Obstacles),
         },
+        FaultKind::Ranging => FaultEffect::Ranging(RangingErrors {
+            std_m: keys.ranging_std_m.unwrap_or(0.0),
+            bearing_std_rad: keys.ranging_bearing_std_rad.unwrap_or(0.0),
+            velocity_std_mps: keys.ranging_velocity_std_mps.unwrap_or(0.0),
+            outlier_share: keys.ranging_outlier_share.unwrap_or(0.0),
+            outlier_m: keys.ranging_outlier_m.unwrap_or(0.0),
+            dropout_share: keys.ranging_dropout_share.unwrap_or(0.0),
+            ..RangingErrors::default()
+        }),
+        FaultKind::Gnss => FaultEffect::Gnss(PositionDrift {
+            bias_m: vector(keys.position_bias_m),
+            drift_mps: vector(keys.position_drift_mps),
+            max_m: keys.position_error_max_m.unwrap_or(f64::INFINITY),
+        }),
+        FaultKind::Clock => FaultEffect::Clock(ClockDrift {
+            offset_s: keys.clock_offset_s.unwrap_or(0.0),
+            drift_ppm: keys.clock_drift_ppm.unwrap_or(0.0),
+        }),
         FaultKind::Noise => FaultEffect::Noise(Noise {
             position_bias_m: vector(keys.position_bias_m),
             position_std_m: keys.position_std_m.unwrap_or(0.0),

@@ -95,7 +95,7 @@ fn sensor_errors(scenario: &Scenario) -> SensorErrors {
         position: PositionError {
             std_m: sensors.position_std_m,
             correlation_s: sensors.position_correlation_s,
-            max_m: sensors.position_error_max_m(),
+            max_m: scenario.position_noise_max_m(),
         },
         ranging: RangingErrors {
             std_m: sensors.ranging_std_m,
@@ -185,14 +185,14 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         detection_range_m: scenario.sensors.detection_range_m,
         speed_max_mps: drone.speed_max_mps,
         ranging_m: scenario.ranging_m(),
-        apart_by_words: scenario.sensors.apart_by_words(),
+        apart_by_words: scenario.apart_by_words(),
         sensing: SensingErrors {
-            position_m: scenario.sensors.position_error_max_m(),
+            position_m: scenario.position_error_max_m(),
             obstacle_m: scenario.sensors.obstacle_error_max_m,
             clock_s: scenario.clock_error_max_s(),
             partial_outlines: scenario.sensors.outline == OutlineSensing::Seen,
         },
-        starts_m: if scenario.sensors.apart_by_words() { scenario.starts().into() } else { [].into() },
+        starts_m: if scenario.apart_by_words() { scenario.starts().into() } else { [].into() },
         braking: Braking { deceleration_mps2: scenario.braking_mps2(), reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
         election: ElectionParams {

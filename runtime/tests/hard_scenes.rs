@@ -70,6 +70,14 @@ fn real_sensors_break_no_distance() {
     }
 }
 
+/// Sensors and clocks that fail in flight without saying so.
+#[test]
+fn silent_faults_of_sensors_break_no_distance() {
+    for strategy in ["shortest-path", "congestion-aware-paper", "congestion-aware"] {
+        assert_reached("sensor-faults", strategy);
+    }
+}
+
 #[test]
 fn drones_whose_ranging_fails_agree_on_lines_and_fly_on() {
     for strategy in ["shortest-path", "congestion-aware-paper"] {

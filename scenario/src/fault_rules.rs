@@ -110,23 +110,36 @@ impl FaultRules<'_> {
 
     /// Keys that only some kinds allow, and keys that some kinds need.
     fn keys_of_kind(&mut self) {
-        use FaultKind::{Blind, Freeze, HostCut, HostDown, Noise, Partition, Restart, Slow, Wind};
+        use FaultKind::{
+            Blind, Clock, Freeze, Gnss, HostCut, HostDown, Noise, Partition, Ranging, Restart, Slow, Wind,
+        };
         let fault = self.fault;
-        let keys = [
-            ("reaction_time_s", fault.reaction_time_s.is_some(), Slow),
-            ("sides", fault.sides.is_some(), Partition),
-            ("sensor", fault.sensor.is_some(), Blind),
-            ("position_bias_m", fault.position_bias_m.is_some(), Noise),
-            ("position_std_m", fault.position_std_m.is_some(), Noise),
-            ("velocity_bias_mps", fault.velocity_bias_mps.is_some(), Noise),
-            ("velocity_std_mps", fault.velocity_std_mps.is_some(), Noise),
-            ("wind_mps2", fault.wind_mps2.is_some(), Wind),
-            ("gust_mps2", fault.gust_mps2.is_some(), Wind),
-            ("gust_s", fault.gust_s.is_some(), Wind),
+        let keys: [(&str, bool, &[FaultKind]); 20] = [
+            ("reaction_time_s", fault.reaction_time_s.is_some(), &[Slow]),
+            ("sides", fault.sides.is_some(), &[Partition]),
+            ("sensor", fault.sensor.is_some(), &[Blind]),
+            ("ranging_std_m", fault.ranging_std_m.is_some(), &[Ranging]),
+            ("ranging_bearing_std_rad", fault.ranging_bearing_std_rad.is_some(), &[Ranging]),
+            ("ranging_velocity_std_mps", fault.ranging_velocity_std_mps.is_some(), &[Ranging]),
+            ("ranging_outlier_share", fault.ranging_outlier_share.is_some(), &[Ranging]),
+            ("ranging_outlier_m", fault.ranging_outlier_m.is_some(), &[Ranging]),
+            ("ranging_dropout_share", fault.ranging_dropout_share.is_some(), &[Ranging]),
+            ("position_bias_m", fault.position_bias_m.is_some(), &[Noise, Gnss]),
+            ("position_std_m", fault.position_std_m.is_some(), &[Noise]),
+            ("velocity_bias_mps", fault.velocity_bias_mps.is_some(), &[Noise]),
+            ("velocity_std_mps", fault.velocity_std_mps.is_some(), &[Noise]),
+            ("position_drift_mps", fault.position_drift_mps.is_some(), &[Gnss]),
+            ("position_error_max_m", fault.position_error_max_m.is_some(), &[Gnss]),
+            ("clock_offset_s", fault.clock_offset_s.is_some(), &[Clock]),
+            ("clock_drift_ppm", fault.clock_drift_ppm.is_some(), &[Clock]),
+            ("wind_mps2", fault.wind_mps2.is_some(), &[Wind]),
+            ("gust_mps2", fault.gust_mps2.is_some(), &[Wind]),
+            ("gust_s", fault.gust_s.is_some(), &[Wind]),
         ];
-        for (key, _, kind) in keys.iter().filter(|(_, is, kind)| *is && *kind != fault.kind) {
+        for (key, _, kinds) in keys.iter().filter(|(_, is, kinds)| *is && !kinds.contains(&fault.kind)) {
             let found = fault.kind.word();
-            self.expect(false, &[key], || format!("belongs to kind = {:?}, found kind = {found:?}", kind.word()));
+            let words: Vec<String> = kinds.iter().map(|kind| format!("{:?}", kind.word())).collect();
+            self.expect(false, &[key], || format!("belongs to kind = {}, found kind = {found:?}", words.join(" or ")));
         }
         self.expect(fault.host.is_none() || matches!(fault.kind, HostDown | HostCut), &["host"], || {
             format!("belongs to kind = \"host-down\" or \"host-cut\", found kind = {:?}", fault.kind.word())
@@ -135,6 +148,16 @@ impl FaultRules<'_> {
         let needed: &[&str] = match fault.kind {
             Slow => &["reaction_time_s"],
             Partition => &["sides"],
+            Ranging => &[
+                "ranging_dropout_share",
+                "ranging_std_m",
+                "ranging_bearing_std_rad",
+                "ranging_velocity_std_mps",
+                "ranging_outlier_share",
+                "ranging_outlier_m",
+            ],
+            Gnss => &["position_bias_m", "position_drift_mps"],
+            Clock => &["clock_offset_s", "clock_drift_ppm"],
             Noise => &["position_std_m", "position_bias_m", "velocity_std_mps", "velocity_bias_mps"],
             Wind => &["wind_mps2", "gust_mps2"],
             _ => &[],

@@ -80,7 +80,26 @@ pub struct Fault {
     pub sides: Option<PartitionSides>,
     /// With `kind = "blind"`: the sensor that measures nothing; absent: both.
     pub sensor: Option<Sensor>,
-    /// With `kind = "noise"`: constant error of the position that the drone reads of itself, [x, y].
+    /// With `kind = "ranging"`: standard deviation of the distance to a neighbour. Of this and the other `ranging_` keys, the
+    /// greatest of `[sensors]` and of the faults in force counts.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub ranging_std_m: Option<f64>,
+    /// With `kind = "ranging"`: standard deviation of the direction to a neighbour.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub ranging_bearing_std_rad: Option<f64>,
+    /// With `kind = "ranging"`: standard deviation of each coordinate of a neighbour's velocity.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub ranging_velocity_std_mps: Option<f64>,
+    /// With `kind = "ranging"`: share of the measurements whose distance is too long.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub ranging_outlier_share: Option<f64>,
+    /// With `kind = "ranging"`: mean excess of such a distance.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub ranging_outlier_m: Option<f64>,
+    /// With `kind = "ranging"`: share of the measurements that are missing. With 1, the drone senses no neighbours and does not know it.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub ranging_dropout_share: Option<f64>,
+    /// With `kind = "noise"` and `kind = "gnss"`: constant error of the position that the drone reads of itself, [x, y].
     #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub position_bias_m: Option<[f64; 2]>,
     /// With `kind = "noise"`: standard deviation of each coordinate of that position, drawn anew in each tick.
@@ -92,6 +111,19 @@ pub struct Fault {
     /// With `kind = "noise"`: standard deviation of each coordinate of that velocity, drawn anew in each tick.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub velocity_std_mps: Option<f64>,
+    /// With `kind = "gnss"`: what is added to the error of the position in each second of the fault, [x, y].
+    #[schemars(inner(range(min = -100.0, max = 100.0)))]
+    pub position_drift_mps: Option<[f64; 2]>,
+    /// With `kind = "gnss"`: greatest error of the position by this fault: it grows no further. Absent: what bias and drift make in
+    /// the duration of the fault, or up to the time limit of the mission.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub position_error_max_m: Option<f64>,
+    /// With `kind = "clock"`: what the drone's clock jumps ahead when the fault begins; negative: back.
+    #[schemars(range(min = -10.0, max = 10.0))]
+    pub clock_offset_s: Option<f64>,
+    /// With `kind = "clock"`: what the clock gains from then on, in millionths; negative: loses.
+    #[schemars(range(min = -10_000.0, max = 10_000.0))]
+    pub clock_drift_ppm: Option<f64>,
     /// With `kind = "wind"`: the acceleration that is added to the commanded one, [x, y].
     #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub wind_mps2: Option<[f64; 2]>,
@@ -122,10 +154,20 @@ impl Fault {
             reaction_time_s: None,
             sides: None,
             sensor: None,
+            ranging_std_m: None,
+            ranging_bearing_std_rad: None,
+            ranging_velocity_std_mps: None,
+            ranging_outlier_share: None,
+            ranging_outlier_m: None,
+            ranging_dropout_share: None,
             position_bias_m: None,
             position_std_m: None,
             velocity_bias_mps: None,
             velocity_std_mps: None,
+            position_drift_mps: None,
+            position_error_max_m: None,
+            clock_offset_s: None,
+            clock_drift_ppm: None,
             wind_mps2: None,
             gust_mps2: None,
             gust_s: None,
@@ -153,6 +195,12 @@ pub enum FaultKind {
     Partition,
     /// The drone senses no obstacles, no neighbours, or neither.
     Blind,
+    /// What the drone ranges of its neighbours is worse or missing. It does not know that.
+    Ranging,
+    /// The position that the drone reads of itself is biased, or drifts. It does not know that.
+    Gnss,
+    /// The drone's clock jumps, or drifts. It does not know that.
+    Clock,
     /// The drone reads a wrong position and velocity of itself.
     Noise,
     /// Wind accelerates the drone.
@@ -176,6 +224,9 @@ impl FaultKind {
             Self::Mute => "mute",
             Self::Partition => "partition",
             Self::Blind => "blind",
+            Self::Ranging => "ranging",
+            Self::Gnss => "gnss",
+            Self::Clock => "clock",
             Self::Noise => "noise",
             Self::Wind => "wind",
             Self::HostDown => "host-down",

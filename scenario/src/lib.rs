@@ -43,6 +43,7 @@ mod broken_rule;
 mod check;
 mod energy_keys;
 mod error;
+mod fault_bounds;
 mod fault_rules;
 mod faults;
 mod guidance;

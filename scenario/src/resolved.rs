@@ -1,6 +1,8 @@
 //! What a scenario can do: it is parsed from text, and gives the values that follow from its keys.
 
 use crate::error::ScenarioErrors;
+use crate::fault_bounds;
+use crate::faults::FaultKind;
 use crate::hosts::HostKeys;
 use crate::keys::{End, FormationShape, Scenario};
 use crate::parse::{self, ScenarioSource};
@@ -199,10 +201,49 @@ impl Scenario {
         self.sensors.ranging_m.unwrap_or(enough_m.max(2.0 * drone.safe_distance_m))
     }
 
-    /// Greatest difference between a drone's clock and the time of the mission up to the mission's time limit, s.
+    /// Whether drones keep their distances by messages: they have no sensor that ranges neighbours, or it is not ideal, or a fault
+    /// makes it worse. A drone does not know when such a fault begins, so it flies this way from the start.
+    #[must_use]
+    pub fn apart_by_words(&self) -> bool {
+        !self.sensors.ranges_enough() || self.fault_plan.iter().any(|fault| fault.kind == FaultKind::Ranging)
+    }
+
+    /// Greatest error of the position that a drone reads of itself, with which the safety rule counts, m.
+    #[must_use]
+    pub fn position_error_max_m(&self) -> f64 {
+        let spread_m = self.sensors.position_spread_m();
+        self.sensors.position_error_max_m.unwrap_or_else(|| spread_m + fault_bounds::gnss_m(self))
+    }
+
+    /// Greatest length of the position error that is no fault, m.
+    #[must_use]
+    pub fn position_noise_max_m(&self) -> f64 {
+        let spread_m = self.sensors.position_spread_m();
+        let bound_m = self.sensors.position_error_max_m.unwrap_or(spread_m);
+        if self.fault_plan.iter().any(|fault| fault.kind == FaultKind::Gnss) { bound_m.min(spread_m) } else { bound_m }
+    }
+
+    /// Greatest error of the position that a drone can read of itself with all sensors and faults as the scenario has them, m. If it
+    /// exceeds [`Self::position_error_max_m`], the margins do not cover it.
+    #[must_use]
+    pub fn position_error_possible_m(&self) -> f64 {
+        let noise_m = if self.sensors.position_std_m > 0.0 { self.position_noise_max_m() } else { 0.0 };
+        noise_m + fault_bounds::position_m(self)
+    }
+
+    /// Greatest difference between a drone's clock and the time of the mission up to the mission's time limit, with which the safety
+    /// rule counts, s.
     #[must_use]
     pub fn clock_error_max_s(&self) -> f64 {
-        self.sensors.clock_offset_max_s + self.sensors.clock_drift_max_ppm * 1e-6 * self.timeout_s()
+        self.sensors.clock_error_max_s.unwrap_or_else(|| self.clock_error_possible_s())
+    }
+
+    /// Greatest such difference with all clocks and faults as the scenario has them, s. If it exceeds [`Self::clock_error_max_s`],
+    /// the margins do not cover it.
+    #[must_use]
+    pub fn clock_error_possible_s(&self) -> f64 {
+        let own_s = self.sensors.clock_offset_max_s + self.sensors.clock_drift_max_ppm * 1e-6 * self.timeout_s();
+        own_s + fault_bounds::clock_s(self)
     }
 
     /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or 0.1 s, or longer where the beacons of all drones

@@ -63,7 +63,8 @@ pub struct Sensors {
     #[schemars(range(min = 0.0, max = 100_000.0))]
     pub position_correlation_s: f64,
     /// Greatest error of that position: the process is cut off there, and the safety rule counts with it. Absent: three times
-    /// `position_std_m`.
+    /// `position_std_m`, and what the `gnss` faults of one drone can add. In a scenario with such faults the process is cut off at three
+    /// times `position_std_m` at the latest.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub position_error_max_m: Option<f64>,
     /// Greatest offset of a drone's clock at the start. Each drone has an offset of its own, drawn by the seed.
@@ -72,6 +73,10 @@ pub struct Sensors {
     /// Greatest drift of a drone's clock, in millionths. Each drone has a drift of its own, drawn by the seed.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub clock_drift_max_ppm: f64,
+    /// Greatest difference between a drone's clock and the time of the mission that the safety rule counts with. Absent: what offset
+    /// and drift make up to the time limit of the mission, and what the `clock` faults of one drone can add.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub clock_error_max_s: Option<f64>,
 }
 
 /// What a drone senses of an outline.
@@ -106,6 +111,7 @@ impl Default for Sensors {
             position_error_max_m: None,
             clock_offset_max_s: 0.0,
             clock_drift_max_ppm: 0.0,
+            clock_error_max_s: None,
         }
     }
 }
@@ -124,16 +130,16 @@ impl Sensors {
         errors.iter().all(|error| *error == 0.0) && self.ranging_field_rad >= TAU && !self.ranging_occlusion
     }
 
-    /// Whether drones keep their distances by messages: they have no sensor that ranges neighbours, or it is not ideal.
+    /// Whether what drones range of their neighbours keeps them apart: they have a sensor for it, and it is ideal.
     #[must_use]
-    pub fn apart_by_words(&self) -> bool {
-        !self.ranging || !self.ranges_ideally()
+    pub fn ranges_enough(&self) -> bool {
+        self.ranging && self.ranges_ideally()
     }
 
-    /// Greatest error of the position that a drone reads of itself, m.
+    /// The bound of the position error by its standard deviation alone, m.
     #[must_use]
-    pub fn position_error_max_m(&self) -> f64 {
-        self.position_error_max_m.unwrap_or(POSITION_BOUND * self.position_std_m)
+    pub fn position_spread_m(&self) -> f64 {
+        POSITION_BOUND * self.position_std_m
     }
 }
 
@@ -143,13 +149,13 @@ mod tests {
 
     #[test]
     fn a_sensor_that_is_not_ideal_leaves_the_distances_to_words() {
-        assert!(!Sensors::default().apart_by_words());
-        assert!(Sensors { ranging: false, ..Sensors::default() }.apart_by_words());
-        assert!(Sensors { ranging_std_m: 0.1, ..Sensors::default() }.apart_by_words());
-        assert!(Sensors { ranging_field_rad: 6.0, ..Sensors::default() }.apart_by_words());
-        assert!(Sensors { ranging_occlusion: true, ..Sensors::default() }.apart_by_words());
+        assert!(Sensors::default().ranges_enough());
+        assert!(!Sensors { ranging: false, ..Sensors::default() }.ranges_enough());
+        assert!(!Sensors { ranging_std_m: 0.1, ..Sensors::default() }.ranges_enough());
+        assert!(!Sensors { ranging_field_rad: 6.0, ..Sensors::default() }.ranges_enough());
+        assert!(!Sensors { ranging_occlusion: true, ..Sensors::default() }.ranges_enough());
         let own = Sensors { position_std_m: 1.0, clock_offset_max_s: 1.0, ..Sensors::default() };
-        assert!(!own.apart_by_words(), "what it ranges needs neither its position nor its clock");
-        assert_eq!((own.position_error_max_m(), Sensors::default().position_error_max_m()), (3.0, 0.0));
+        assert!(own.ranges_enough(), "what it ranges needs neither its position nor its clock");
+        assert_eq!((own.position_spread_m(), Sensors::default().position_spread_m()), (3.0, 0.0));
     }
 }

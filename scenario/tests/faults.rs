@@ -30,11 +30,14 @@ fn every_kind_is_read_and_survives_json_and_toml() {
         [[fault]]\nkind = \"blind\"\nat_s = 1\ndrone = 0\nsensor = \"ranging\"\n\
         [[fault]]\nkind = \"noise\"\nat_s = 1\ndrone = 0\nposition_bias_m = [1, 0]\n\
         [[fault]]\nkind = \"wind\"\nat_s = 1\ngust_mps2 = 0.2\n\
+        [[fault]]\nkind = \"ranging\"\nat_s = 1\ndrone = 0\nranging_dropout_share = 0.5\nranging_std_m = 1\n\
+        [[fault]]\nkind = \"gnss\"\nat_s = 1\ndrone = 0\nposition_drift_mps = [0.1, 0]\nposition_error_max_m = 2\n\
+        [[fault]]\nkind = \"clock\"\nat_s = 1\ndrone = 0\nclock_offset_s = -1\nclock_drift_ppm = 20\n\
         [[fault]]\nkind = \"host-down\"\nat_s = 1\nhost = \"a\"\n\
         [[fault]]\nkind = \"host-cut\"\nat_s = 1\nfor_s = 2\nhost = \"b\"\n\
         [[host]]\nname = \"a\"\ndrones = 2\n[[host]]\nname = \"b\"\ndrones = 1\nconnect = \"tls/10.0.0.2:1\"\n";
     let scenario = parse(&format!("{HEAD}{faults}"), &[]).unwrap_or_else(|errors| panic!("{errors}"));
-    assert_eq!(scenario.fault_plan.len(), 13);
+    assert_eq!(scenario.fault_plan.len(), 16);
     assert_eq!(scenario.hosts_of_drones()[1..4], [Some("a".to_owned()), Some("b".to_owned()), None]);
     let json = serde_json::to_value(&scenario).unwrap();
     assert_eq!(Scenario::from_json(&json, SOURCE).unwrap(), scenario);
@@ -46,6 +49,36 @@ fn every_kind_is_read_and_survives_json_and_toml() {
     let sides = |index: usize| scenario.fault_plan[index].sides.as_ref().unwrap().of(8);
     assert_eq!(sides(6), [vec![0, 1, 2, 3], vec![4, 5, 6, 7]]);
     assert_eq!(sides(7), [vec![0, 1], vec![7]]);
+}
+
+/// What the margins count with is derived from the faults of one drone, unless a key says it.
+#[test]
+fn the_bounds_of_errors_follow_from_the_faults() {
+    let scenario = |lines: &str| parse(&format!("{HEAD}{lines}"), &[]).unwrap_or_else(|errors| panic!("{errors}"));
+    let position = |lines: &str| scenario(lines).position_error_max_m();
+    let clock = |lines: &str| scenario(lines).clock_error_max_s();
+    let bias = |who: &str| format!("[[fault]]\nkind = \"gnss\"\nat_s = 1\nposition_bias_m = [0, 2]\n{who}\n");
+    let (one, other) = (bias("drone = 1"), bias("drones = [2, 2]"));
+    assert_eq!(position(&one), 2.0);
+    assert_eq!(position(&format!("{one}{other}")), 2.0, "different drones");
+    assert_eq!(position(&format!("{one}{other}{one}")), 4.0, "one drone has two faults");
+    assert_eq!(position(&format!("{one}{}", bias("target = \"leader\""))), 4.0, "that drone may lead");
+    let noisy = format!("[sensors]\nposition_std_m = 1\n{one}");
+    assert_eq!((position(&noisy), scenario(&noisy).position_noise_max_m()), (5.0, 3.0));
+    let given = format!("[sensors]\nposition_std_m = 1\nposition_error_max_m = 4\n{one}");
+    let given = scenario(&given);
+    assert_eq!((given.position_error_max_m(), given.position_noise_max_m()), (4.0, 3.0));
+    assert_eq!(given.position_error_possible_m(), 5.0);
+    let drift =
+        "[time]\ntimeout_s = 100\n[[fault]]\nkind = \"gnss\"\nat_s = 20\ndrone = 0\nposition_drift_mps = [-0.1, 0]\n";
+    assert_eq!(position(drift), 8.0, "up to the time limit");
+    assert_eq!(position(&format!("{drift}for_s = 10\n")), 1.0);
+    assert_eq!(position(&format!("{drift}position_bias_m = [6, 0]\n")), 6.0, "it drifts past the truth");
+    assert_eq!(position(&format!("{drift}position_error_max_m = 3\n")), 3.0);
+    let jump = "[time]\ntimeout_s = 100\n[sensors]\nclock_offset_max_s = 0.5\n[[fault]]\nkind = \"clock\"\nat_s = 0\ndrone = 0\n\
+        clock_offset_s = -1\nclock_drift_ppm = -10000\n";
+    assert_eq!(clock(jump), 2.5);
+    assert_eq!(clock(&jump.replace("[sensors]", "[sensors]\nclock_error_max_s = 1")), 1.0);
 }
 
 #[test]
@@ -103,6 +136,27 @@ fn an_invalid_fault_is_rejected_with_its_place() {
             "belongs to kind = \"slow\", found kind = \"deaf\"",
         ),
         ("kind = \"noise\"\nat_s = 1\ndrone = 1", "kind = \"noise\" needs position_std_m or position_bias_m or"),
+        (
+            "kind = \"ranging\"\nat_s = 1\ndrone = 1",
+            "kind = \"ranging\" needs ranging_dropout_share or ranging_std_m or",
+        ),
+        (
+            "kind = \"gnss\"\nat_s = 1\ndrone = 1\nposition_error_max_m = 1",
+            "kind = \"gnss\" needs position_bias_m or position_drift_mps",
+        ),
+        ("kind = \"clock\"\nat_s = 1\ndrone = 1", "kind = \"clock\" needs clock_offset_s or clock_drift_ppm"),
+        (
+            "kind = \"clock\"\nat_s = 1\ndrone = 1\nclock_offset_s = 11",
+            "f.toml:10:18: fault.0.clock_offset_s: found 11, expected a number from -10 to 10 (s)",
+        ),
+        (
+            "kind = \"ranging\"\nat_s = 1\ndrone = 1\nranging_dropout_share = 1.5",
+            "fault.0.ranging_dropout_share: found 1.5, expected a number from 0 to 1",
+        ),
+        (
+            "kind = \"clock\"\nat_s = 1\ndrone = 1\nclock_offset_s = 1\nposition_bias_m = [1, 0]",
+            "fault.0.position_bias_m: belongs to kind = \"noise\" or \"gnss\", found kind = \"clock\"",
+        ),
         ("kind = \"host-down\"\nat_s = 1\nhost = \"a\"", "fault.0.host: found \"a\": expected the name of a host, and"),
         (
             "kind = \"host-down\"\nat_s = 1\n[[host]]\nname = \"b\"\ndrones = 8",

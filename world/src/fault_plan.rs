@@ -1,5 +1,6 @@
 //! The faults that a scenario schedules: what happens to which drones, and when.
 
+use crate::sensor_errors::RangingErrors;
 use skein_protocol::record::FaultKind;
 use skein_protocol::{DroneId, GroupId, Vec2};
 
@@ -56,6 +57,12 @@ pub enum FaultEffect {
         /// The ranging sensor, which measures neighbours.
         ranging: bool,
     },
+    /// What the drone ranges of its neighbours is as bad as this, or worse. Latency, field of view and occlusion are ignored.
+    Ranging(RangingErrors),
+    /// The position that the drone reads of itself is biased, or drifts.
+    Gnss(PositionDrift),
+    /// The drone's clock jumps, or drifts.
+    Clock(ClockDrift),
     /// The drone reads a wrong position and velocity of itself.
     Noise(Noise),
     /// Wind accelerates the drone.
@@ -73,6 +80,40 @@ pub struct Noise {
     pub velocity_bias_mps: Vec2,
     /// Standard deviation of each coordinate of the velocity, m/s. The error is drawn anew in each tick.
     pub velocity_std_mps: f64,
+}
+
+/// An error of the position that a drone reads of itself. World frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionDrift {
+    /// The error when the fault begins, m.
+    pub bias_m: Vec2,
+    /// What is added in each second, m/s.
+    pub drift_mps: Vec2,
+    /// Greatest length of the error, m; may be infinite.
+    pub max_m: f64,
+}
+
+impl PositionDrift {
+    /// The error this long after the fault has begun, m.
+    pub(crate) fn after_m(&self, seconds: f64) -> Vec2 {
+        (self.bias_m + self.drift_mps * seconds).cap_magnitude(self.max_m)
+    }
+}
+
+/// An error of a drone's clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClockDrift {
+    /// What the clock jumps ahead when the fault begins, s.
+    pub offset_s: f64,
+    /// What it gains from then on, in millionths.
+    pub drift_ppm: f64,
+}
+
+impl ClockDrift {
+    /// The error this long after the fault has begun, s.
+    pub(crate) fn after_s(&self, seconds: f64) -> f64 {
+        self.offset_s + self.drift_ppm * 1e-6 * seconds
+    }
 }
 
 /// An acceleration that is added to the commanded one. World frame.
@@ -170,6 +211,9 @@ impl FaultEffect {
             Self::Mute => FaultKind::Mute,
             Self::Partition(_) => FaultKind::Partition,
             Self::Blind { .. } => FaultKind::Blind,
+            Self::Ranging(_) => FaultKind::Ranging,
+            Self::Gnss(_) => FaultKind::Gnss,
+            Self::Clock(_) => FaultKind::Clock,
             Self::Noise(_) => FaultKind::Noise,
             Self::Wind(_) => FaultKind::Wind,
         }
@@ -193,6 +237,16 @@ impl FaultEffect {
                 (true, false) => "senses no obstacles".to_owned(),
                 _ => "senses no neighbours".to_owned(),
             },
+            Self::Ranging(r) => format!(
+                "ranges with a share of {} missing and {} too long by {} m, ± {} m, ± {} rad, ± {} m/s",
+                r.dropout_share, r.outlier_share, r.outlier_m, r.std_m, r.bearing_std_rad, r.velocity_std_mps
+            ),
+            Self::Gnss(g) => {
+                let most = if g.max_m.is_finite() { format!(", {} m at most", g.max_m) } else { String::new() };
+                let (bias, drift) = (g.bias_m, g.drift_mps);
+                format!("position wrong by [{}, {}] m and [{}, {}] m/s{most}", bias.x, bias.y, drift.x, drift.y)
+            }
+            Self::Clock(c) => format!("clock wrong by {} s and {} ppm", c.offset_s, c.drift_ppm),
             Self::Noise(n) => format!(
                 "position wrong by [{}, {}] m ± {} m, velocity by [{}, {}] m/s ± {} m/s",
                 n.position_bias_m.x,

@@ -9,5 +9,6 @@ pub(crate) mod triggers;
 pub(crate) mod view;
 
 pub use crate::fault_plan::{
-    Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, ProcessCommand, Wind,
+    ClockDrift, Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, Noise, PositionDrift,
+    ProcessCommand, Wind,
 };

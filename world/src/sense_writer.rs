@@ -1,6 +1,7 @@
 //! What each drone senses, written into the downlink.
 
 use crate::body::Body;
+use crate::sensor_errors::RangingErrors;
 use crate::sensor_fault::SensorFault;
 use crate::sensor_model::SensorModel;
 use crate::sweep::{Contact, SensorSweep};
@@ -42,12 +43,14 @@ impl SenseWriter {
         for ((drone, body), (incarnation, sensor_fault)) in sensed.bodies.iter().enumerate().zip(drones) {
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
-                self.write_contact(contact, sensed, sensor_fault.position_error_m, down);
+                self.write_contact(contact, sensed, &sensor_fault, down);
             }
             if body.is_alive() && !sensor_fault.no_ranging {
-                sensed.write_neighbours(drone, down);
+                sensed.write_neighbours(drone, &sensor_fault.ranging, down);
             }
-            let position_error_m = sensor_fault.position_error_m + sensed.model.position_m(drone);
+            let fault_m = sensor_fault.position_error_m + sensor_fault.gnss_error_m;
+            let position_error_m = fault_m + sensed.model.position_m(drone);
+            let clock_fault_ns = (sensor_fault.clock_error_s * 1e9).round() as i64;
             down.drones.push(SensesHeader {
                 position_m: shifted(body.position(), position_error_m),
                 velocity_mps: shifted(body.velocity(), sensor_fault.velocity_error_mps),
@@ -59,7 +62,7 @@ impl SenseWriter {
                 incarnation,
                 link_faults: sensor_fault.link_faults,
                 extra_reaction_s: sensor_fault.extra_reaction_s,
-                clock_error_ns: sensed.model.clock_ns(drone, sensed.now),
+                clock_error_ns: sensed.model.clock_ns(drone, sensed.now) + clock_fault_ns,
                 broken: sensor_fault.broken(sensed.ranging_m.is_some()).to_wire(),
                 reserved: 0,
             });
@@ -67,8 +70,7 @@ impl SenseWriter {
     }
 
     /// A drone measures an obstacle relative to itself, so an error of its own position moves the obstacle with it.
-    /// `error_m`: that error, as far as it comes from a fault, m.
-    fn write_contact(&mut self, contact: &Contact, sensed: &Sensed<'_>, error_m: Vec2, down: &mut Downlink) {
+    fn write_contact(&mut self, contact: &Contact, sensed: &Sensed<'_>, fault: &SensorFault, down: &mut Downlink) {
         let (drone, obstacle) = (contact.drone as usize, contact.obstacle as usize);
         let (model, position) = (sensed.model, sensed.bodies[drone].position());
         let mut nearest = contact.nearest;
@@ -78,13 +80,16 @@ impl SenseWriter {
             nearest = sensed.sweep.outlines()[obstacle].nearest(position - aside);
             nearest.point += aside;
         }
-        let own_m = error_m + model.position_m(drone);
-        if self.places[obstacle] == NOT_WRITTEN || model.draws_own_outlines() {
-            self.places[obstacle] = down.shapes.len() as u32;
+        let own_m = fault.position_error_m + fault.gnss_error_m + model.position_m(drone);
+        let own_outline = model.draws_own_outlines() || fault.gnss_error_m != Vec2::zeros();
+        let mut place = self.places[obstacle];
+        if own_outline || place == NOT_WRITTEN {
+            place = down.shapes.len() as u32;
             let whole = &self.shapes[obstacle];
-            let shape = if model.draws_own_outlines() {
+            let shape = if own_outline {
                 model.outline(whole, position.xy() - displaced_m).moved(own_m + displaced_m)
             } else {
+                self.places[obstacle] = place;
                 *whole
             };
             down.shapes.push(SensedShape { shape, id: ObstacleId(contact.obstacle), reserved: 0 });
@@ -92,7 +97,7 @@ impl SenseWriter {
         down.obstacles.push(SensedObstacle {
             nearest_m: shifted(nearest.point, own_m),
             distance_m: nearest.distance_m,
-            shape: self.places[obstacle],
+            shape: place,
             reserved: 0,
         });
     }
@@ -114,14 +119,14 @@ pub(crate) struct Sensed<'a> {
 }
 
 impl Sensed<'_> {
-    fn write_neighbours(&self, drone: usize, down: &mut Downlink) {
+    fn write_neighbours(&self, drone: usize, fault: &RangingErrors, down: &mut Downlink) {
         let Some(range_m) = self.ranging_m else { return };
         for &id in self.sweep.neighbours_of(drone) {
             let other = id as usize;
             if (self.bodies[other].position() - self.bodies[drone].position()).norm_squared() > range_m * range_m {
                 continue;
             }
-            let measured = self.model.range(drone, other, self.bodies, self.sweep.outlines());
+            let measured = self.model.range((drone, other), fault, self.bodies, self.sweep.outlines());
             down.neighbours.extend(measured.map(|(position, velocity)| SensedNeighbour {
                 position_m: position.into(),
                 velocity_mps: velocity.into(),
@@ -159,10 +164,19 @@ mod tests {
         ranging_m: Option<f64>,
         sensor_fault: SensorFault,
     ) -> Downlink {
+        sensed_by(bodies, shapes, ranging_m, std::iter::repeat(sensor_fault))
+    }
+
+    fn sensed_by(
+        bodies: &[Body],
+        shapes: &[ConvexShape],
+        ranging_m: Option<f64>,
+        faults: impl Iterator<Item = SensorFault>,
+    ) -> Downlink {
         let mut sweep = SensorSweep::new(shapes.iter().map(Outline::new).collect());
         let mut down = Downlink::default();
         sweep.sweep(bodies, RANGE);
-        let drones = std::iter::repeat((1, sensor_fault));
+        let drones = faults.map(|fault| (1, fault));
         let model = SensorModel::new(SensorErrors::default(), 0.02, bodies.len());
         let sensed = Sensed { bodies, sweep: &sweep, ranging_m, model: &model, now: SimTime::ZERO };
         SenseWriter::new(shapes).write(&sensed, drones, &mut down);
@@ -205,6 +219,33 @@ mod tests {
         assert_eq!((senses.position_m, senses.velocity_mps), ([3.0, -1.0, 50.0], [0.5, 0.0, 0.0]));
         assert_eq!((senses.obstacles[0].nearest_m, senses.obstacles[0].distance_m), ([73.0, -1.0, 50.0], 70.0));
         assert_eq!(senses.neighbours[0].position_m, [50.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_wrong_position_moves_the_outlines_that_this_drone_alone_senses() {
+        let gnss_error_m = Vec2::new(3.0, -1.0);
+        let drones = [SensorFault::default(), SensorFault { gnss_error_m, ..SensorFault::default() }];
+        let shapes = [rectangle(80.0, 0.0, 10.0, 10.0)];
+        let all = bodies(&[[0.0, 0.0], [0.0, 5.0], [0.0, -5.0]]);
+        let down = sensed_by(&all, &shapes, None, [drones[0], drones[1], drones[0]].into_iter());
+        let outline = |drone| {
+            let senses = down.view().senses(DroneId(drone)).unwrap();
+            let sensed = senses.obstacles[0];
+            (senses.shape(&sensed).unwrap().shape, sensed.nearest_m, senses.position_m)
+        };
+        let (shape, nearest_m, position_m) = outline(1);
+        assert_eq!((shape, nearest_m), (shapes[0].moved(gnss_error_m), [73.0, 4.0, 50.0]));
+        assert_eq!(position_m, [3.0, 4.0, 50.0]);
+        assert_eq!((outline(0).0, outline(2).0, down.shapes.len()), (shapes[0], shapes[0], 2));
+    }
+
+    #[test]
+    fn ranging_fails_and_clocks_jump_without_a_word() {
+        let silent = RangingErrors { dropout_share: 1.0, ..RangingErrors::default() };
+        let fault = SensorFault { ranging: silent, clock_error_s: -0.25, ..SensorFault::default() };
+        let down = sensed_with(&bodies(&[[0.0, 0.0], [1.0, 0.0]]), &[], Some(9.0), fault);
+        assert!(down.neighbours.is_empty());
+        assert_eq!((down.drones[0].broken, down.drones[0].clock_error_ns), (0, -250_000_000));
     }
 
     #[test]

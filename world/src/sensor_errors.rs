@@ -82,6 +82,20 @@ impl RangingErrors {
     pub fn is_ideal(&self) -> bool {
         *self == Self { outlier_m: self.outlier_m, ..Self::default() }
     }
+
+    /// Of each of the errors and shares, the greater one of the two; latency, field of view and occlusion as they are.
+    #[must_use]
+    pub(crate) fn or_worse(&self, other: &Self) -> Self {
+        Self {
+            std_m: self.std_m.max(other.std_m),
+            bearing_std_rad: self.bearing_std_rad.max(other.bearing_std_rad),
+            velocity_std_mps: self.velocity_std_mps.max(other.velocity_std_mps),
+            outlier_share: self.outlier_share.max(other.outlier_share),
+            outlier_m: self.outlier_m.max(other.outlier_m),
+            dropout_share: self.dropout_share.max(other.dropout_share),
+            ..*self
+        }
+    }
 }
 
 /// Errors of the clocks. Each drone has a constant offset and a constant drift, drawn uniformly by the seed.

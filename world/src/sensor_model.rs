@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::faults::keyed_rng::KeyedRng;
 use crate::geometry::Outline;
-use crate::sensor_errors::{PositionError, SensorErrors};
+use crate::sensor_errors::{PositionError, RangingErrors, SensorErrors};
 use crate::view::in_view;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{SimTime, Tick, Vec2, Vec3};
@@ -117,9 +117,15 @@ impl SensorModel {
         self.errors.view_m.map_or(*whole, |range_m| in_view(whole, from, range_m))
     }
 
-    /// What a drone measures of a neighbour; `None` if nothing.
-    pub(crate) fn range(&self, drone: usize, other: usize, bodies: &[Body], outlines: &[Outline]) -> Option<Measured> {
-        if self.exact_ranging {
+    /// What a drone measures of a neighbour; `None` if nothing. `fault`: errors of this drone's sensor, as far as they are worse.
+    pub(crate) fn range(
+        &self,
+        (drone, other): (usize, usize),
+        fault: &RangingErrors,
+        bodies: &[Body],
+        outlines: &[Outline],
+    ) -> Option<Measured> {
+        if self.exact_ranging && fault.is_ideal() {
             let (own, other) = (&bodies[drone], &bodies[other]);
             return Some((other.position() - own.position(), other.velocity() - own.velocity()));
         }
@@ -129,7 +135,7 @@ impl SensorModel {
         };
         let ((here, own), (there, theirs)) = (motion(drone), motion(other));
         let (position, velocity) = (there - here, theirs - own);
-        let errors = &self.errors.ranging;
+        let errors = self.errors.ranging.or_worse(fault);
         if !sees(errors.field_rad, own.xy(), position.xy()) {
             return None;
         }

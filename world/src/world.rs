@@ -123,21 +123,22 @@ impl World {
     /// The senses of all drones in the current tick, and the frames that were sent in the tick before.
     pub fn downlink(&mut self) -> &Downlink {
         self.open();
-        let (tick, faults) = (self.tick, self.faults.schedule());
+        let (tick, now, faults) = (self.tick, self.now(), self.faults.schedule());
         let processes = self.drones.processes().iter().zip(0..);
-        let drones = processes.map(|(process, id)| (process.incarnation(), faults.sensor_fault(DroneId(id), tick)));
+        let drones =
+            processes.map(|(process, id)| (process.incarnation(), faults.sensor_fault(DroneId(id), (tick, now))));
         let sensed = Sensed {
             bodies: self.drones.bodies(),
             sweep: &self.sweep,
             ranging_m: self.params.ranging_m,
             model: &self.sensors,
-            now: self.now(),
+            now,
         };
         self.sense_writer.write(&sensed, drones, &mut self.downlink);
         // A drone counts its own frames by their order. Without that order there is no index by place.
         let locality = if self.uplink.keeps_order() { self.params.locality } else { Locality::default() };
         self.downlink.index.build(locality, &self.downlink.frames);
-        self.downlink.seal(tick, self.now());
+        self.downlink.seal(tick, now);
         &self.downlink
     }
 

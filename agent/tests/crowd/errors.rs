@@ -5,7 +5,7 @@ use skein_agent::sensing_errors::SensingErrors;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 
-/// Share of the ticks in which the error of a position jumps. Between jumps it is constant, as the worst correlated error.
+/// Share of the ticks in which the error of a position or of a clock jumps. Between jumps it is constant, as the worst correlated error.
 const JUMPS: f64 = 0.03;
 
 /// The errors of all drones of a crowd.
@@ -57,6 +57,13 @@ impl Errors {
                 // Mostly at the bound.
                 let next = self.random.disc(1.5 * self.bounds.position_m);
                 *error = next.cap_magnitude(self.bounds.position_m);
+            }
+        }
+        for error in &mut self.clocks_s {
+            if self.random.unit() < JUMPS {
+                // Mostly at one of the two ends.
+                let next = self.random.within(-1.5, 1.5) * self.bounds.clock_s;
+                *error = next.clamp(-self.bounds.clock_s, self.bounds.clock_s);
             }
         }
     }

@@ -15,6 +15,8 @@ struct Active {
     fault: usize,
     /// The drones it affects, in ascending order.
     drones: Vec<DroneId>,
+    /// When it began.
+    since: SimTime,
     /// The first instant at which it is over.
     until: SimTime,
 }
@@ -42,7 +44,7 @@ pub(crate) struct FaultSchedule {
     /// Indices of the faults that have not begun.
     waiting: Vec<usize>,
     active: Vec<Active>,
-    /// What is in force for each drone, without noise: noise is drawn anew in each tick.
+    /// What is in force for each drone, without what changes from tick to tick: noise, and errors that drift.
     standing: Vec<SensorFault>,
 }
 
@@ -99,7 +101,7 @@ impl FaultSchedule {
         let fault = &self.plan.faults[change.fault];
         if !change.drones.is_empty() && fault.effect != FaultEffect::Kill {
             let until = now.after(fault.for_s);
-            self.active.push(Active { fault: change.fault, drones: change.drones.clone(), until });
+            self.active.push(Active { fault: change.fault, drones: change.drones.clone(), since: now, until });
             self.settle();
         }
         Some(change)
@@ -116,20 +118,26 @@ impl FaultSchedule {
         self.active.iter().any(|active| self.plan.faults[active.fault].effect == FaultEffect::Restart)
     }
 
-    /// How a drone's senses differ from the truth in a tick, with noise.
-    pub(crate) fn sensor_fault(&self, drone: DroneId, tick: Tick) -> SensorFault {
+    /// How a drone's senses differ from the truth in a tick that begins now.
+    pub(crate) fn sensor_fault(&self, drone: DroneId, (tick, now): (Tick, SimTime)) -> SensorFault {
         let mut sensor_fault = self.standing[drone.index()];
         for active in self.active.iter().filter(|active| active.has(drone)) {
-            if let FaultEffect::Noise(noise) = &self.plan.faults[active.fault].effect {
-                let mut rng = self.rng(active.fault, u64::from(drone.0), tick);
-                sensor_fault.position_error_m += noise.position_bias_m + rng.vector(noise.position_std_m);
-                sensor_fault.velocity_error_mps += noise.velocity_bias_mps + rng.vector(noise.velocity_std_mps);
+            let lasted_s = now.since(active.since);
+            match &self.plan.faults[active.fault].effect {
+                FaultEffect::Noise(noise) => {
+                    let mut rng = self.rng(active.fault, u64::from(drone.0), tick);
+                    sensor_fault.position_error_m += noise.position_bias_m + rng.vector(noise.position_std_m);
+                    sensor_fault.velocity_error_mps += noise.velocity_bias_mps + rng.vector(noise.velocity_std_mps);
+                }
+                FaultEffect::Gnss(drift) => sensor_fault.gnss_error_m += drift.after_m(lasted_s),
+                FaultEffect::Clock(drift) => sensor_fault.clock_error_s += drift.after_s(lasted_s),
+                _ => {}
             }
         }
         sensor_fault
     }
 
-    /// How a drone's senses differ from the truth, without noise.
+    /// How a drone's senses differ from the truth, without what changes from tick to tick.
     pub(crate) fn standing(&self, drone: DroneId) -> &SensorFault {
         &self.standing[drone.index()]
     }

@@ -19,7 +19,10 @@ fn ideal_sensors_have_no_error() {
     ideal.begin(0, &pair);
     assert_eq!((ideal.position_m(1), ideal.clock_ns(1, SimTime::from_secs(9.0))), (Vec2::zeros(), 0));
     assert!(ideal.obstacle_m(0, 0).is_none() && !ideal.draws_own_outlines());
-    assert_eq!(ideal.range(0, 1, &pair, &[]), Some((Vec3::new(30.0, 40.0, 0.0), Vec3::zeros())));
+    assert_eq!(
+        ideal.range((0, 1), &RangingErrors::default(), &pair, &[]),
+        Some((Vec3::new(30.0, 40.0, 0.0), Vec3::zeros()))
+    );
 }
 
 /// Over one correlation time, the product of two values has the mean σ²/e.
@@ -74,7 +77,7 @@ fn a_measurement_is_noisy_late_or_missing() {
     let (mut sum, mut squares) = (0.0, 0.0);
     for tick in 0..2000 {
         noisy.begin(tick, &near(50.0));
-        let (position, velocity) = noisy.range(0, 1, &near(50.0), &[]).unwrap();
+        let (position, velocity) = noisy.range((0, 1), &RangingErrors::default(), &near(50.0), &[]).unwrap();
         let error = position.norm() - 50.0;
         (sum, squares) = (sum + error, squares + error * error);
         assert_eq!(velocity, Vec3::zeros());
@@ -86,13 +89,13 @@ fn a_measurement_is_noisy_late_or_missing() {
     for tick in 0..10 {
         late.begin(tick, &near(50.0 + tick as f64));
     }
-    let (position, _) = late.range(0, 1, &near(59.0), &[]).unwrap();
+    let (position, _) = late.range((0, 1), &RangingErrors::default(), &near(59.0), &[]).unwrap();
     assert_eq!(position.x, 54.0, "five ticks ago");
 
     let mut missing = ranging(RangingErrors { dropout_share: 0.25, ..RangingErrors::default() });
     let measured = |tick| {
         missing.begin(tick, &near(50.0));
-        usize::from(missing.range(0, 1, &near(50.0), &[]).is_some())
+        usize::from(missing.range((0, 1), &RangingErrors::default(), &near(50.0), &[]).is_some())
     };
     let count: usize = (0..4000).map(measured).sum();
     // Five standard deviations of a binomial with p = 0.75, n = 4000.
@@ -106,7 +109,7 @@ fn a_detour_makes_distances_longer() {
     let mut excess = Vec::new();
     for tick in 0..4000 {
         detours.begin(tick, &pair);
-        excess.push(detours.range(0, 1, &pair, &[]).unwrap().0.norm() - 50.0);
+        excess.push(detours.range((0, 1), &RangingErrors::default(), &pair, &[]).unwrap().0.norm() - 50.0);
     }
     let longer: Vec<f64> = excess.iter().copied().filter(|excess| *excess > 1e-6).collect();
     assert!(excess.iter().all(|excess| (-1e-9..=8.0).contains(excess)));
@@ -118,10 +121,30 @@ fn a_detour_makes_distances_longer() {
 fn neighbours_are_seen_ahead_and_in_the_open() {
     let ahead = ranging(RangingErrors { field_rad: 2.0, ..RangingErrors::default() });
     let pair = |x: f64, y: f64| bodies(&[[0.0, 0.0], [x, y]]);
-    assert!(ahead.range(0, 1, &pair(50.0, 10.0), &[]).is_some(), "at rest it looks along x");
-    assert!(ahead.range(0, 1, &pair(-50.0, 10.0), &[]).is_none());
+    assert!(
+        ahead.range((0, 1), &RangingErrors::default(), &pair(50.0, 10.0), &[]).is_some(),
+        "at rest it looks along x"
+    );
+    assert!(ahead.range((0, 1), &RangingErrors::default(), &pair(-50.0, 10.0), &[]).is_none());
     let hidden = ranging(RangingErrors { occlusion: true, ..RangingErrors::default() });
     let wall = [Outline::new(&rectangle(25.0, 0.0, 2.0, 8.0))];
-    assert!(hidden.range(0, 1, &pair(50.0, 0.0), &wall).is_none());
-    assert!(hidden.range(0, 1, &pair(50.0, 30.0), &wall).is_some());
+    assert!(hidden.range((0, 1), &RangingErrors::default(), &pair(50.0, 0.0), &wall).is_none());
+    assert!(hidden.range((0, 1), &RangingErrors::default(), &pair(50.0, 30.0), &wall).is_some());
+}
+
+#[test]
+fn a_fault_makes_ranging_worse_and_never_better() {
+    let pair = bodies(&[[0.0, 0.0], [50.0, 0.0]]);
+    let mut ideal = ranging(RangingErrors::default());
+    let noise = RangingErrors { std_m: 2.0, ..RangingErrors::default() };
+    let missing = RangingErrors { dropout_share: 1.0, ..RangingErrors::default() };
+    ideal.begin(5, &pair);
+    let exact = ideal.range((0, 1), &RangingErrors::default(), &pair, &[]);
+    assert_ne!(ideal.range((0, 1), &noise, &pair, &[]), exact);
+    assert_eq!(ideal.range((0, 1), &missing, &pair, &[]), None);
+    let mut noisy = ranging(noise);
+    noisy.begin(5, &pair);
+    let by_fault = ideal.range((0, 1), &noise, &pair, &[]);
+    let better = RangingErrors { std_m: 0.1, ..RangingErrors::default() };
+    assert_eq!(noisy.range((0, 1), &better, &pair, &[]), by_fault, "the greater deviation counts");
 }

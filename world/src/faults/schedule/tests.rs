@@ -3,8 +3,9 @@
 use super::*;
 use crate::drones::DroneTable;
 use crate::event_log::EventLog;
-use crate::fault_plan::{FaultTrigger, Noise, Wind};
+use crate::fault_plan::{ClockDrift, FaultTrigger, Noise, PositionDrift, Wind};
 use crate::geometry::{Nearest, Outline};
+use crate::sensor_errors::RangingErrors;
 use crate::stages::Stages;
 use crate::sweep::Contact;
 use crate::testing::rectangle;
@@ -218,15 +219,57 @@ fn noise_is_drawn_in_each_tick_and_gusts_last() {
         ),
     ]);
     begun(&mut schedule, at(0.0), &Scene::new());
-    let errors: Vec<Vec2> = (0..1000).map(|tick| schedule.sensor_fault(DroneId(0), tick).position_error_m).collect();
+    let errors: Vec<Vec2> =
+        (0..1000).map(|tick| schedule.sensor_fault(DroneId(0), (tick, at(0.0))).position_error_m).collect();
     let mean = errors.iter().sum::<Vec2>() / 1000.0;
     // Five standard errors of a mean of 1000 draws.
     assert!((mean - bias).amax() < 5.0 * 0.5 / 1000f64.sqrt(), "{mean}");
-    assert_eq!(schedule.sensor_fault(DroneId(0), 7).velocity_error_mps, Vec2::zeros());
-    assert_eq!(schedule.sensor_fault(DroneId(1), 7).position_error_m, Vec2::zeros());
+    assert_eq!(schedule.sensor_fault(DroneId(0), (7, at(0.0))).velocity_error_mps, Vec2::zeros());
+    assert_eq!(schedule.sensor_fault(DroneId(1), (7, at(0.0))).position_error_m, Vec2::zeros());
     let blown = |drone, seconds| schedule.wind_mps2(DroneId(drone), at(seconds));
     assert_eq!(blown(0, 0.1), blown(0, 1.9));
     assert_ne!(blown(0, 1.9), blown(0, 2.1));
     assert_ne!(blown(0, 0.1), blown(2, 0.1));
     assert_eq!(blown(1, 0.1), Vec2::zeros());
+}
+
+#[test]
+fn positions_and_clocks_drift_from_the_beginning_of_their_faults() {
+    let drift = PositionDrift { bias_m: Vec2::new(1.0, 0.0), drift_mps: Vec2::new(0.5, 0.0), max_m: 3.0 };
+    let clock = ClockDrift { offset_s: -0.5, drift_ppm: 1000.0 };
+    let mut schedule = schedule(vec![
+        fault(FaultEffect::Gnss(drift), FaultTime::At(2.0), one(0), 10.0),
+        fault(FaultEffect::Gnss(PositionDrift { max_m: f64::INFINITY, ..drift }), FaultTime::At(2.0), one(1), 10.0),
+        fault(FaultEffect::Clock(clock), FaultTime::At(2.0), FaultTargets::All, 10.0),
+        fault(FaultEffect::Clock(clock), FaultTime::At(2.0), one(2), 1.0),
+    ]);
+    let scene = Scene::new();
+    let told = |schedule: &FaultSchedule, drone, seconds| {
+        let fault = schedule.sensor_fault(DroneId(drone), (0, at(seconds)));
+        (fault.gnss_error_m.x, fault.clock_error_s)
+    };
+    assert_eq!(told(&schedule, 0, 1.0), (0.0, 0.0));
+    begun(&mut schedule, at(2.0), &scene);
+    assert_eq!(told(&schedule, 0, 2.0), (1.0, -0.5), "a jump");
+    assert_eq!(told(&schedule, 0, 4.0), (2.0, -0.498));
+    assert_eq!((told(&schedule, 0, 11.0).0, told(&schedule, 1, 11.0).0), (3.0, 5.5), "up to its bound");
+    assert_eq!(told(&schedule, 2, 2.0), (0.0, -1.0), "faults add up");
+    schedule.end(at(12.0));
+    assert_eq!(told(&schedule, 0, 12.0), (0.0, 0.0), "the truth is back at once");
+}
+
+#[test]
+fn of_several_faults_of_ranging_the_worst_counts() {
+    let first = RangingErrors { dropout_share: 0.5, std_m: 1.0, ..RangingErrors::default() };
+    let second = RangingErrors { dropout_share: 0.2, outlier_share: 0.1, outlier_m: 4.0, ..RangingErrors::default() };
+    let mut schedule = schedule(vec![
+        fault(FaultEffect::Ranging(first), FaultTime::At(0.0), one(0), 1.0),
+        fault(FaultEffect::Ranging(second), FaultTime::At(0.0), FaultTargets::All, 2.0),
+    ]);
+    begun(&mut schedule, at(0.0), &Scene::new());
+    let both = RangingErrors { dropout_share: 0.5, std_m: 1.0, ..second };
+    assert_eq!((schedule.standing(DroneId(0)).ranging, schedule.standing(DroneId(1)).ranging), (both, second));
+    assert!(!schedule.standing(DroneId(0)).no_ranging, "the drone does not know of it");
+    schedule.end(at(1.0));
+    assert_eq!(schedule.standing(DroneId(0)).ranging, second);
 }
