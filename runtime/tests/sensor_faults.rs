@@ -1,0 +1,48 @@
+//! Faults of sensors and clocks that a drone does not know of, in whole flights.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use skein_protocol::record::Outcome;
+use support::{fly_to_the_end, scenario};
+
+const PAPERS_RULE: (&str, &str) = ("strategy", "congestion-aware-paper");
+
+/// The same fault, with the margin that follows from it, and with one that is declared too small.
+#[test]
+fn the_margin_is_what_keeps_drones_apart_when_a_position_is_biased() {
+    for drone in ["3", "5"] {
+        let fault = format!("{{ kind = \"gnss\", position_bias_m = [0, 12], at_s = 6, for_s = 25, drone = {drone} }}");
+        let sets = [PAPERS_RULE, ("sensors.ranging", "false"), ("fault.0", fault.as_str())];
+        let flown = |more: &[(&str, &str)]| fly_to_the_end(&scenario("paper/s2-right", &[&sets, more].concat()), None);
+        assert_eq!(flown(&[]).ended(), Some(Outcome::Reached), "drone {drone}");
+        assert_eq!(flown(&[("sensors.position_error_max_m", "0")]).ended(), Some(Outcome::Unsafe), "drone {drone}");
+    }
+}
+
+/// The process of a drone with a wrong position and clock is stopped, or replaced, while its faults begin and end.
+#[test]
+fn faults_of_sensors_outlive_the_process() {
+    let wrong = [
+        "{ kind = \"clock\", clock_offset_s = -1, at_s = 8, for_s = 3, drone = 3 }",
+        "{ kind = \"clock\", clock_offset_s = 1, clock_drift_ppm = 500, at_s = 10, drone = 3 }",
+        "{ kind = \"gnss\", position_bias_m = [1, 1], position_drift_mps = [-0.1, 0], at_s = 10, for_s = 20, drone = 3 }",
+    ];
+    for kind in ["restart", "freeze"] {
+        for (ranging, reaction_time_s) in [("true", "0"), ("true", "0.2"), ("false", "0"), ("false", "0.2")] {
+            let stopped = format!("{{ kind = \"{kind}\", at_s = 9, for_s = 3, drone = 3 }}");
+            let sets = [
+                PAPERS_RULE,
+                ("sensors.ranging", ranging),
+                ("drone.reaction_time_s", reaction_time_s),
+                ("fault.0", stopped.as_str()),
+                ("fault.1", wrong[0]),
+                ("fault.2", wrong[1]),
+                ("fault.3", wrong[2]),
+            ];
+            let world = fly_to_the_end(&scenario("paper/s2-right", &sets), None);
+            let what = format!("{kind}, ranging {ranging}, reaction time {reaction_time_s} s");
+            assert_eq!((world.ended(), world.violations()), (Some(Outcome::Reached), 0), "{what}");
+        }
+    }
+}
