@@ -4,7 +4,10 @@
 mod support;
 
 use skein_protocol::record::Outcome;
-use support::{fly_to_the_end, scenario};
+use skein_protocol::slot::{LinkStats, Slot};
+use skein_protocol::{DroneId, Vec3};
+use skein_runtime::{StepScratch, mission};
+use support::{fly_to_the_end, parse, pilot_hosts, scenario};
 
 const PAPERS_RULE: (&str, &str) = ("strategy", "congestion-aware-paper");
 
@@ -44,5 +47,25 @@ fn faults_of_sensors_outlive_the_process() {
             let what = format!("{kind}, ranging {ranging}, reaction time {reaction_time_s} s");
             assert_eq!((world.ended(), world.violations()), (Some(Outcome::Reached), 0), "{what}");
         }
+    }
+}
+
+/// A drone that reacts late takes a clock that jumps ahead for what it is, and not for ticks that it has missed: it does not brake.
+#[test]
+fn a_jump_of_the_clock_voids_no_command() {
+    let text = "[formation]\ndrones = 1\n[drone]\nreaction_time_s = 0.2\n[mission]\nend = \"hold\"\nstop_x_m = 500\n\
+        [[fault]]\nkind = \"clock\"\nclock_offset_s = 1\nat_s = 3\ndrone = 0\n";
+    let scenario = parse(text, &[PAPERS_RULE]);
+    let (mut world, mut hosts) = (mission::world(&scenario).unwrap(), pilot_hosts(&scenario));
+    let (mut scratch, mut stats) = (StepScratch::default(), LinkStats::default());
+    while world.now().secs() < 4.0 {
+        let mut slot = Slot::default();
+        let down = world.downlink().view();
+        let frames: Vec<_> = hosts[0].step(&down, &mut scratch, &mut slot, &mut stats).frames().collect();
+        world.take_slot(DroneId(0), &slot);
+        world.take_frames(DroneId(0), &frames);
+        world.advance();
+        let speed_mps = Vec3::from(world.record().rows[0].velocity_mps).norm();
+        assert!(speed_mps > 9.9, "{speed_mps} m/s at {} s", world.now().secs());
     }
 }
