@@ -151,6 +151,8 @@ fn stops_unseen(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<St
 /// An error of a sensor that can be greater, with its faults, than the margins allow for. `key`: what bounds it, and its unit.
 fn beyond_the_margin(what: &str, (possible, allowed): (f64, f64), (key, unit): (&str, &str)) -> Option<String> {
     (possible > allowed + 1e-9).then(|| {
+        // Rounded up, so that the key can be set to it.
+        let possible = (possible * 1e3 - 1e-6).ceil() / 1e3;
         format!(
             "{what} may be wrong by {possible:.3} {unit} with all faults, but the margins allow for {allowed:.3} {unit}: the flight is \
              outside the safety statement; raise {key} to {possible:.3} at least"
