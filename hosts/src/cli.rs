@@ -23,6 +23,11 @@ pub(crate) enum Command {
     /// Take the place of a host's drones on the launcher's machine; started by `skein run --hosts`
     #[command(hide = true)]
     Relay(RelayArgs),
+    /// Let `skein view`, `top` and `topic` on other machines look at the swarms of this one
+    Share(ShareArgs),
+    /// Fetch what swarms of other machines publish; started by `skein view --connect`
+    #[command(hide = true)]
+    Look(LookArgs),
 }
 
 /// Arguments of `host`. Those of `skein host`, which starts it, are their documentation.
@@ -46,6 +51,30 @@ pub(crate) struct HostArgs {
     /// The words of the program that flies drones, as a JSON list; set by `skein host`
     #[arg(long, hide = true, value_parser = words)]
     pub(crate) program: Option<Words>,
+}
+
+/// Arguments of `share`. Those of `skein share`, which starts it, are their documentation.
+#[derive(Debug, Args)]
+pub(crate) struct ShareArgs {
+    /// Only swarms whose name begins with RUN
+    pub(crate) run: Option<String>,
+    /// Where viewers reach this machine: Zenoh endpoints
+    #[arg(long, value_name = "ENDPOINT", value_delimiter = ',', default_value = "tcp/127.0.0.1:7448")]
+    pub(crate) listen: Vec<String>,
+    /// How to reach the network.
+    #[command(flatten)]
+    pub(crate) network: NetworkArgs,
+}
+
+/// Arguments of `look`.
+#[derive(Debug, Args)]
+pub(crate) struct LookArgs {
+    /// How to reach the network.
+    #[command(flatten)]
+    pub(crate) network: NetworkArgs,
+    /// The version of Skein that the command is built with.
+    #[arg(long)]
+    pub(crate) version: String,
 }
 
 /// Arguments of `relay`.

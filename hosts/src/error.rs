@@ -1,11 +1,11 @@
-//! What keeps a host or a relay from doing its part.
+//! What keeps a host, a relay, a share or a look from doing its part.
 
 use skein_bus::BusError;
 use skein_protocol::downlink::DownlinkError;
 use skein_runtime::RuntimeError;
 use thiserror::Error;
 
-/// Why a host or a relay ended.
+/// Why one of them ended.
 #[derive(Debug, Error)]
 pub(crate) enum HostsError {
     /// The command line asks for what may not be.
@@ -30,6 +30,26 @@ pub(crate) enum HostsError {
     /// The host was there, and is no longer.
     #[error("host {0} is gone: its drones count as dead")]
     Gone(String),
+    /// There is no share.
+    #[error(
+        "nothing is shared at {at}: expected `skein share` there, with certificates of the same authority if the endpoint is tls/"
+    )]
+    NoShare {
+        /// The endpoints.
+        at: String,
+    },
+    /// The shares were there, and are no longer.
+    #[error("the connection to {at} is lost: `skein share` has ended there, or the network is cut")]
+    ShareGone {
+        /// The endpoints.
+        at: String,
+    },
+    /// The share of a swarm was there, and is no longer.
+    #[error("the connection to its machine is lost: `skein share` has ended there, or the network is cut")]
+    LookLost,
+    /// A share refuses what was asked for.
+    #[error("{0}")]
+    NotShared(String),
     /// What came over the network cannot be used.
     #[error("what came over the network cannot be used: {0}")]
     Message(&'static str),

@@ -5,12 +5,12 @@ use crate::cli::{HostArgs, Words};
 use crate::error::HostsError;
 use crate::flight::{Asked, fly, reply};
 use crate::network::Side;
+use crate::say::say;
+use crate::signals::watch_signals;
 use crate::{keys, names};
 use crossbeam_channel::{RecvTimeoutError, unbounded};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use skein_runtime::Program;
 use skein_scenario::Scenario;
-use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
@@ -151,20 +151,4 @@ fn program(args: &HostArgs) -> Result<Program, HostsError> {
 fn machine_name() -> String {
     // Without /proc there is no name, and the message that refuses it names the option.
     std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
-}
-
-/// The number of a signal that came in; 0 while none did.
-fn watch_signals() -> Result<Arc<AtomicUsize>, HostsError> {
-    let noted = Arc::new(AtomicUsize::new(0));
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
-        signal_hook::flag::register_usize(signal, Arc::clone(&noted), signal.unsigned_abs() as usize)
-            .map_err(HostsError::system(format!("watching for signal {signal}")))?;
-    }
-    Ok(noted)
-}
-
-/// Prints a line. A reader that is gone does not matter.
-fn say(line: &str) {
-    let mut out = std::io::stdout();
-    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }

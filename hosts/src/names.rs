@@ -30,6 +30,11 @@ pub(crate) fn wing(flight: &str) -> String {
     format!("skein/flight/{flight}/wing")
 }
 
+/// A queryable of a share, which says what swarms of its machine publish.
+pub(crate) fn share(id: &str) -> String {
+    format!("skein/share/{id}")
+}
+
 /// Whether a text can be part of a name on the network.
 pub(crate) fn is_name(text: &str) -> bool {
     let letter = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');

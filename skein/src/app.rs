@@ -145,6 +145,7 @@ fn dispatch(command: Command, pilots: &PilotRegistry, on_folder: Option<&OnFolde
     match command {
         Command::Run(args) => run::run(&args, pilots, on_folder),
         Command::Host(args) => hosts::host(&args, pilots),
+        Command::Share(args) => hosts::share(&args),
         Command::Check(args) => check::check(&args, pilots),
         Command::Sweep(args) => sweep::sweep(&args, pilots),
         Command::Hunt(args) => hunt::hunt(&args, pilots),

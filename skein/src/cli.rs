@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Run(RunArgs),
     /// Offer this machine to runs on other machines, which then fly drones here
     Host(crate::hosts::HostArgs),
+    /// Let `view`, `top` and `topic` on other machines look at the swarms of this one
+    Share(crate::hosts::ShareArgs),
     /// Check a scenario and print what would be started, without starting it
     Check(CheckArgs),
     /// Fly a grid of missions side by side; write CSV, JSON and plots with 95 % intervals; resumable

@@ -1,5 +1,5 @@
-//! `skein host` and `skein run --hosts`: other machines that fly drones. The program `skein-hosts`, which is built apart, does what
-//! needs a network.
+//! `skein host` and `skein run --hosts`: other machines that fly drones. `skein share`: other machines that look. The program
+//! `skein-hosts`, which is built apart, does what needs a network.
 
 use crate::exit::{Exit, Failure};
 use crate::scenario_args::ScenarioArgs;
@@ -68,7 +68,7 @@ impl NetworkArgs {
     }
 
     /// Appends these options, with one more endpoint.
-    fn append_to(&self, words: &mut Vec<OsString>, endpoint: Option<&str>) {
+    pub(crate) fn append_to(&self, words: &mut Vec<OsString>, endpoint: Option<&str>) {
         for endpoint in endpoint.into_iter().chain(self.connect.iter().map(String::as_str)) {
             words.extend(["--connect".into(), endpoint.into()]);
         }
@@ -78,6 +78,38 @@ impl NetworkArgs {
         }
         words.extend(self.insecure.then(|| "--insecure".into()));
     }
+}
+
+/// Arguments of `share`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  skein share
+  skein share --listen tls/0.0.0.0:7448 --keys keys      and on another machine:
+  skein view --connect tls/10.0.0.2:7448 --keys keys
+
+Swarms that start later are shared as well. Ctrl-C ends the share; the swarms fly on.")]
+pub(crate) struct ShareArgs {
+    /// Share only swarms whose name begins with RUN, as shown by `skein top`
+    pub(crate) run: Option<String>,
+    /// Zenoh endpoints where viewers reach this machine
+    #[arg(long, value_name = "ENDPOINT", value_delimiter = ',', default_value = "tcp/127.0.0.1:7448")]
+    pub(crate) listen: Vec<String>,
+    /// How to reach other machines.
+    #[command(flatten)]
+    pub(crate) network: NetworkArgs,
+}
+
+/// Shares the swarms of this machine: becomes `skein-hosts share`.
+pub(crate) fn share(args: &ShareArgs) -> Result<Exit, Failure> {
+    let mut words: Vec<OsString> = vec!["share".into()];
+    for endpoint in &args.listen {
+        words.extend(["--listen".into(), endpoint.into()]);
+    }
+    args.network.append_to(&mut words, None);
+    if let Some(run) = &args.run {
+        words.extend(["--".into(), run.into()]);
+    }
+    become_program(words)
 }
 
 /// Arguments of `host`.
@@ -106,7 +138,6 @@ pub(crate) struct HostArgs {
 
 /// Offers this machine: becomes `skein-hosts host`.
 pub(crate) fn host(args: &HostArgs, pilots: &PilotRegistry) -> Result<Exit, Failure> {
-    let path = program()?;
     let mut words: Vec<OsString> = vec!["host".into(), "--drones".into(), args.drones.to_string().into()];
     for endpoint in &args.listen {
         words.extend(["--listen".into(), endpoint.into()]);
@@ -120,12 +151,18 @@ pub(crate) fn host(args: &HostArgs, pilots: &PilotRegistry) -> Result<Exit, Fail
     let program = serde_json::to_string(&pilots.program().words()).map_err(Failure::environment)?;
     words.extend(["--program".into(), program.into()]);
     args.network.append_to(&mut words, None);
+    become_program(words)
+}
+
+/// Becomes `skein-hosts` with these arguments.
+fn become_program(words: Vec<OsString>) -> Result<Exit, Failure> {
+    let path = program()?;
     let error = Command::new(&path).args(words).exec();
     Err(Failure::environment(format!("starting {}: {error}", path.display())))
 }
 
 /// `skein-hosts`: beside this executable, or in the search path.
-fn program() -> Result<PathBuf, Failure> {
+pub(crate) fn program() -> Result<PathBuf, Failure> {
     let own = std::env::current_exe().unwrap_or_default();
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let beside = own.parent().map(Path::to_owned).into_iter();

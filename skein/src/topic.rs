@@ -3,10 +3,9 @@
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::print_line;
-use crate::tap::{RunningSwarm, SwarmTap, no_swarm, running};
+use crate::tap::{LookArgs, RunningSwarm, Sample, SwarmTap, Swarms};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
-use skein_bus::BusError;
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
@@ -29,7 +28,8 @@ const WINDOW: Duration = Duration::from_secs(1);
   skein topic list
   skein topic echo air --kind plan
   skein topic echo senses --drone 3 --count 1
-  skein topic hz air")]
+  skein topic hz air
+  skein topic list --connect tls/10.0.0.2:7448 --keys keys      swarms of another machine, see `skein share`")]
 pub(crate) struct TopicArgs {
     /// What to do.
     #[command(subcommand)]
@@ -37,6 +37,9 @@ pub(crate) struct TopicArgs {
     /// Use the swarm whose name begins with NAME, as shown by `skein top` [default: the first one]
     #[arg(long, global = true, value_name = "NAME")]
     pub(crate) run: Option<String>,
+    /// Where swarms are looked for.
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
 }
 
 /// What to do with a topic.
@@ -107,25 +110,27 @@ struct KindError {
 
 /// Lists topics, or prints messages or rates.
 pub(crate) fn topic(args: &TopicArgs) -> Result<Exit, Failure> {
-    let found = running(args.run.as_deref())?;
-    let first = found.first().ok_or_else(|| no_swarm(args.run.as_deref()))?;
+    let swarms = Swarms::of(&args.look)?;
+    let name = args.run.as_deref();
+    let found = swarms.running(name)?;
+    let first = found.first().ok_or_else(|| Failure::environment(swarms.none(name)))?;
     match &args.action {
-        Action::List => list(&found),
+        Action::List => list(&swarms, &found),
         Action::Echo(filter) => {
             let mut left = filter.count.unwrap_or(u64::MAX);
-            listen(first, filter, |line| {
+            listen((&swarms, first), filter, |line| {
                 let Some(line) = line else { return Ok(true) };
                 left -= 1;
                 Ok(print_line(line)? && left > 0)
             })
         }
-        Action::Hz(filter) => hz(first, filter),
+        Action::Hz(filter) => hz((&swarms, first), filter),
     }
 }
 
-fn list(found: &[RunningSwarm]) -> Result<Exit, Failure> {
+fn list(swarms: &Swarms, found: &[RunningSwarm]) -> Result<Exit, Failure> {
     for run in found {
-        let tap = SwarmTap::attach(&run.path)?;
+        let tap = SwarmTap::attach(swarms, run)?;
         let line = |topic: &str, service: &str| {
             print_line(json!({ "run": run.name(), "topic": topic, "service": service, "drones": tap.facts.drones }))
         };
@@ -139,7 +144,7 @@ fn list(found: &[RunningSwarm]) -> Result<Exit, Failure> {
     Ok(Exit::Reached)
 }
 
-fn hz(run: &RunningSwarm, filter: &Filter) -> Result<Exit, Failure> {
+fn hz(run: (&Swarms, &RunningSwarm), filter: &Filter) -> Result<Exit, Failure> {
     let (mut counts, mut since): (BTreeMap<String, u64>, Instant) = (BTreeMap::new(), Instant::now());
     let mut left = filter.count.unwrap_or(u64::MAX);
     listen(run, filter, |line| {
@@ -163,12 +168,12 @@ fn hz(run: &RunningSwarm, filter: &Filter) -> Result<Exit, Failure> {
 /// Passes each line that matches the filter to `take`, and `None` when there are no new samples. Ends when the swarm has
 /// ended or `take` returns false.
 fn listen(
-    run: &RunningSwarm,
+    (swarms, run): (&Swarms, &RunningSwarm),
     filter: &Filter,
     mut take: impl FnMut(Option<Value>) -> Result<bool, Failure>,
 ) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    let tap = SwarmTap::attach(&run.path)?;
+    let tap = SwarmTap::attach(swarms, run)?;
     let dt_s = tap.facts.dt_s;
     let downlink = match filter.topic {
         Name::Senses | Name::Air => Some(tap.downlink()?),
@@ -180,7 +185,7 @@ fn listen(
             Some(port) => lines_of(port.receive(), |sample| {
                 DownlinkView::parse(sample.bytes()).map(|down| of_downlink(&down, filter, dt_s)).unwrap_or_default()
             })?,
-            None => lines_of(tap.records.receive(), |sample| {
+            None => lines_of(tap.record(), |sample| {
                 RecordView::parse(sample.bytes()).map(|record| of_record(record, filter, dt_s)).unwrap_or_default()
             })?,
         };
@@ -205,11 +210,11 @@ fn listen(
     }
 }
 
-fn lines_of<S>(
-    sample: Result<Option<S>, BusError>,
-    lines: impl FnOnce(S) -> Vec<Value>,
+fn lines_of(
+    sample: Result<Option<Sample>, Failure>,
+    lines: impl FnOnce(Sample) -> Vec<Value>,
 ) -> Result<Option<Vec<Value>>, Failure> {
-    Ok(sample.map_err(Failure::environment)?.map(lines))
+    Ok(sample?.map(lines))
 }
 
 fn of_downlink(down: &DownlinkView<'_>, filter: &Filter, dt_s: f64) -> Vec<Value> {

@@ -103,11 +103,22 @@ impl Place {
         Self::offer(command, name, endpoint)
     }
 
-    fn offer(mut command: Command, name: &str, endpoint: &str) -> Host {
+    /// Shares this place's swarms, and waits until they can be looked at.
+    pub(crate) fn share(&self, endpoint: &str, more: &[&str]) -> Host {
+        let command = self.command(&[&["share", "--listen", endpoint], more].concat());
+        Self::start(command, "shares the swarms of this machine", endpoint)
+    }
+
+    fn offer(command: Command, name: &str, endpoint: &str) -> Host {
+        Self::start(command, &format!("host {name} offers"), endpoint)
+    }
+
+    /// Starts what serves at an endpoint, and waits until it says so.
+    fn start(mut command: Command, says: &str, endpoint: &str) -> Host {
         let mut child = command.stderr(Stdio::inherit()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        assert!(line.contains(&format!("host {name} offers")), "{line:?}");
+        assert!(line.contains(says), "{line:?}");
         Host { child, endpoint: endpoint.to_owned() }
     }
 
@@ -149,7 +160,7 @@ impl Drop for Place {
     }
 }
 
-/// A host. Dropping it ends it.
+/// A host or a share. Dropping it ends it.
 pub(crate) struct Host {
     child: Child,
     pub(crate) endpoint: String,

@@ -8,7 +8,7 @@ mod swarm_view;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output;
-use crate::tap::running;
+use crate::tap::{LookArgs, Swarms};
 use clap::Args;
 use crossterm::event::{Event, KeyCode, KeyModifiers, poll, read};
 use display_state::DisplayState;
@@ -23,6 +23,7 @@ use swarm_view::SwarmView;
   skein top
   skein top --once     watch for one second and print text
   skein top --json     the same as one JSON object, for scripts
+  skein top --connect tls/10.0.0.2:7448 --keys keys      the swarms of another machine, see `skein share`
 
 Keys: up and down select a swarm, d shows its drones, space pauses, q quits.")]
 pub(crate) struct TopArgs {
@@ -32,6 +33,9 @@ pub(crate) struct TopArgs {
     /// As --once, but print one JSON object
     #[arg(long)]
     pub(crate) json: bool,
+    /// Where swarms are looked for.
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
 }
 
 /// Time between two redraws.
@@ -43,14 +47,16 @@ const ONCE: Duration = Duration::from_secs(1);
 
 /// Shows the swarms until the user quits.
 pub(crate) fn top(args: &TopArgs) -> Result<Exit, Failure> {
-    let interrupt = Interrupt::watch()?;
-    if args.once || args.json {
-        return once(args, &interrupt);
-    }
-    if !std::io::stdout().is_terminal() {
+    let once_only = args.once || args.json;
+    if !once_only && !std::io::stdout().is_terminal() {
         return Err(Failure::usage(
             "stdout is not a terminal; `skein top --once` prints text, `skein top --json` prints JSON",
         ));
+    }
+    let found = Swarms::of(&args.look)?;
+    let interrupt = Interrupt::watch()?;
+    if once_only {
+        return once(args, &found, &interrupt);
     }
     let mut screen = Screen::open().map_err(Failure::environment)?;
     let (mut swarms, mut shown) = (Vec::new(), DisplayState::default());
@@ -65,25 +71,28 @@ pub(crate) fn top(args: &TopArgs) -> Result<Exit, Failure> {
         }
         if drawn.elapsed() >= REDRAW {
             drawn = Instant::now();
-            attach(&mut swarms)?;
+            attach(&found, &mut swarms)?;
             if !shown.paused {
                 for swarm in &mut swarms {
                     swarm.turn();
                 }
             }
-            screen.show(&page(&swarms, shown)).map_err(Failure::environment)?;
+            screen.show(&page(&swarms, shown, &found.none(None))).map_err(Failure::environment)?;
         }
     }
     Ok(interrupt.signal().map_or(Exit::Reached, Exit::Interrupted))
 }
 
-fn once(args: &TopArgs, interrupt: &Interrupt) -> Result<Exit, Failure> {
+fn once(args: &TopArgs, found: &Swarms, interrupt: &Interrupt) -> Result<Exit, Failure> {
     let mut swarms = Vec::new();
-    attach(&mut swarms)?;
+    attach(found, &mut swarms)?;
     let since = Instant::now();
     while since.elapsed() < ONCE && interrupt.signal().is_none() {
         gather(&mut swarms);
         std::thread::sleep(POLL);
+    }
+    if let Some(failure) = found.failure() {
+        return Err(failure);
     }
     for swarm in &mut swarms {
         swarm.turn();
@@ -92,7 +101,7 @@ fn once(args: &TopArgs, interrupt: &Interrupt) -> Result<Exit, Failure> {
         output::print_line(json::page(&swarms))?;
         return Ok(Exit::Reached);
     }
-    let lines = page(&swarms, DisplayState { drones: true, ..DisplayState::default() });
+    let lines = page(&swarms, DisplayState { drones: true, ..DisplayState::default() }, &found.none(None));
     let text: String = lines.iter().map(|line| format!("{}\n", line.text)).collect();
     output::print(text)?;
     Ok(Exit::Reached)
@@ -105,13 +114,13 @@ fn gather(swarms: &mut [SwarmView]) {
 }
 
 /// Attaches to new swarms, and drops those that have ended.
-fn attach(swarms: &mut Vec<SwarmView>) -> Result<(), Failure> {
-    let found = running(None)?;
+fn attach(source: &Swarms, swarms: &mut Vec<SwarmView>) -> Result<(), Failure> {
+    let found = source.running(None)?;
     swarms.retain(|swarm| found.contains(&swarm.run));
     for run in found {
         if !swarms.iter().any(|swarm| swarm.run == run) {
             // Attaching to a swarm that has just started can fail; it is tried again at the next redraw.
-            swarms.extend(SwarmView::attach(run).ok());
+            swarms.extend(SwarmView::attach(source, run).ok());
         }
     }
     Ok(())

@@ -69,12 +69,12 @@ impl Drop for Screen {
     }
 }
 
-/// The lines of the display.
-pub(crate) fn page(swarms: &[SwarmView], shown: DisplayState) -> Vec<Line> {
+/// The lines of the display; `none` if there are no swarms.
+pub(crate) fn page(swarms: &[SwarmView], shown: DisplayState, none: &str) -> Vec<Line> {
     let paused = if shown.paused { "  PAUSED" } else { "" };
     let mut lines = vec![plain(format!("skein top    up/down swarm   d drones   space pause   q quit{paused}"))];
     if swarms.is_empty() {
-        lines.push(plain("no swarm runs; start one with `skein run SCENARIO`".to_owned()));
+        lines.push(plain(none.to_owned()));
         return lines;
     }
     lines.push(bold(format!(

@@ -1,7 +1,7 @@
 //! A swarm that is watched, and its rates.
 
 use crate::exit::Failure;
-use crate::tap::{RunningSwarm, SwarmTap};
+use crate::tap::{RunningSwarm, SwarmTap, Swarms};
 use skein_protocol::record::{DroneRow, RecordView};
 use std::time::Instant;
 
@@ -52,8 +52,8 @@ pub(crate) struct SwarmView {
 
 impl SwarmView {
     /// Attaches to a swarm.
-    pub(crate) fn attach(run: RunningSwarm) -> Result<Self, Failure> {
-        let tap = SwarmTap::attach(&run.path)?;
+    pub(crate) fn attach(swarms: &Swarms, run: RunningSwarm) -> Result<Self, Failure> {
+        let tap = SwarmTap::attach(swarms, &run)?;
         Ok(Self {
             run,
             tap,
@@ -70,9 +70,13 @@ impl SwarmView {
 
     /// Takes the records that have come in.
     pub(crate) fn gather(&mut self) {
-        while let Ok(Some(sample)) = self.tap.records.receive() {
+        while let Ok(Some(sample)) = self.tap.record() {
             let Ok(record) = RecordView::parse(sample.bytes()) else { continue };
             let head = record.head;
+            if self.rows.is_empty() {
+                // Over a network, the first record takes its time.
+                self.since = Instant::now();
+            }
             self.first_tick.get_or_insert(head.tick);
             self.tick = head.tick;
             self.counts.t_s = head.now.secs();

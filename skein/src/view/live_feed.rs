@@ -1,7 +1,7 @@
 //! The live feed: watches the running swarm, and the next one when it has ended, and sends lines of JSON to every page.
 
-use crate::tap::{SwarmTap, running};
-use skein_bus::BusError;
+use crate::exit::Failure;
+use crate::tap::{SwarmTap, Swarms};
 use skein_protocol::DroneId;
 use skein_protocol::record::{EventKind, RecordView, RunEvent};
 use skein_report::page;
@@ -35,7 +35,8 @@ const KEPT: usize = 24 << 20;
 /// No drone is selected.
 const NONE_SELECTED: u32 = u32::MAX;
 
-type Line = Arc<str>;
+/// A line for the pages.
+pub(crate) type Line = Arc<str>;
 
 /// The live feed.
 pub(crate) struct LiveFeed {
@@ -48,6 +49,8 @@ struct Shared {
     backlog: Mutex<Backlog>,
     selected: AtomicU32,
     stop: AtomicBool,
+    /// Whether no swarm can be watched any more.
+    lost: AtomicBool,
 }
 
 /// The lines of the run, from which every page takes what it does not have yet.
@@ -140,11 +143,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl LiveFeed {
     /// Starts to watch swarms, one after the other. If `name` is given: those whose name begins with it.
-    pub(crate) fn start(name: Option<String>) -> Self {
+    pub(crate) fn start(swarms: Swarms, name: Option<String>) -> Self {
         let shared = Arc::new(Shared { selected: AtomicU32::new(NONE_SELECTED), ..Shared::default() });
         let watched = Arc::clone(&shared);
-        let thread = std::thread::spawn(move || watched.watch(name.as_deref()));
+        let thread = std::thread::spawn(move || watched.watch(&swarms, name.as_deref()));
         Self { shared, thread: Some(thread) }
+    }
+
+    /// Whether the connection to the machines that it watches is lost. Nothing comes any more then.
+    pub(crate) fn is_lost(&self) -> bool {
+        self.shared.lost.load(Ordering::Acquire)
     }
 
     /// Adds a page. It first gets the run so far.
@@ -173,17 +181,21 @@ impl Shared {
         self.stop.load(Ordering::Relaxed)
     }
 
-    fn watch(&self, name: Option<&str>) {
+    fn watch(&self, swarms: &Swarms, name: Option<&str>) {
         let mut seen = Vec::new();
         while !self.stopped() {
-            let mut found = running(name).unwrap_or_default().into_iter().filter(|run| !seen.contains(&run.path));
+            if let Some(failure) = swarms.failure() {
+                lock(&self.backlog).keep(page::status_line(&failure.to_string()));
+                return self.lost.store(true, Ordering::Release);
+            }
+            let mut found = swarms.running(name).unwrap_or_default().into_iter().filter(|run| !seen.contains(run));
             // A swarm of another version of Skein cannot be attached to; others still can.
-            let tap = found.find_map(|run| Some((SwarmTap::attach(&run.path).ok()?, run.path)));
-            let Some((tap, path)) = tap else {
+            let tap = found.find_map(|run| Some((SwarmTap::attach(swarms, &run).ok()?, run)));
+            let Some((tap, run)) = tap else {
                 std::thread::sleep(SEARCH);
                 continue;
             };
-            seen.push(path);
+            seen.push(run);
             self.follow(&tap);
         }
     }
@@ -216,9 +228,9 @@ impl Shared {
     }
 
     /// Takes the waiting records. Returns how many there were.
-    fn drain(&self, tap: &SwarmTap, watcher: &mut Watcher) -> Result<u32, BusError> {
+    fn drain(&self, tap: &SwarmTap, watcher: &mut Watcher) -> Result<u32, Failure> {
         let mut taken = 0;
-        while let Some(sample) = tap.records.receive()? {
+        while let Some(sample) = tap.record()? {
             taken += 1;
             if let Ok(record) = RecordView::parse(sample.bytes()) {
                 self.take(watcher, record);

@@ -11,6 +11,7 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::print_line;
 use crate::run_folder;
+use crate::tap::{LookArgs, Swarms};
 use clap::Args;
 use live_feed::LiveFeed;
 use request::Door;
@@ -28,6 +29,7 @@ use token::Token;
   skein view                      the running swarm, or the next one
   skein view runs/s2-right-1      a recorded run
   skein view --port 8080 --open
+  skein view --connect tls/10.0.0.2:7448 --keys keys      a swarm of another machine, see `skein share`
 
 The page is served on 127.0.0.1, to this machine only. The address contains a token: no one else can open the page.
 Ctrl-C stops the server; the swarm flies on.")]
@@ -43,6 +45,9 @@ pub(crate) struct ViewArgs {
     /// Watch swarms whose name begins with NAME, as shown by `skein top`
     #[arg(long, value_name = "NAME", conflicts_with = "run_dir")]
     pub(crate) run: Option<String>,
+    /// Where swarms are looked for.
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
 }
 
 /// Niceness of the view, as in `nice -n`, so that the swarm has precedence.
@@ -50,6 +55,10 @@ const NICE: i32 = 10;
 
 /// Serves the page until it is interrupted.
 pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
+    let swarms = match (&args.run_dir, Swarms::of(&args.look)?) {
+        (Some(_), Swarms::There(_)) => return Err(Failure::usage("--connect: expected no RUN_DIR beside it")),
+        (_, swarms) => swarms,
+    };
     let interrupt = Interrupt::watch()?;
     // If it fails, the view takes a little more CPU time from the swarm.
     let _ = rustix::process::nice(NICE);
@@ -58,7 +67,9 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
     let port = listener.local_addr().map_err(Failure::environment)?.port();
     let content = match &args.run_dir {
         Some(path) => Content::Page(recorded(path)?),
-        None => Content::Live { page: page::live(port), feed: Arc::new(LiveFeed::start(args.run.clone())) },
+        None => {
+            Content::Live { page: page::live(port), feed: Arc::new(LiveFeed::start(swarms.clone(), args.run.clone())) }
+        }
     };
     let token = Token::draw().map_err(|error| Failure::environment(format!("/dev/urandom: {error}")))?;
     let url = format!("http://127.0.0.1:{port}/{}", token.query());
@@ -67,7 +78,7 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
         open(&url);
     }
     server::serve(&listener, &Door { port, token }, &content, &interrupt).map_err(Failure::environment)?;
-    Ok(Exit::Reached)
+    swarms.failure().map_or(Ok(Exit::Reached), Err)
 }
 
 fn recorded(path: &std::path::Path) -> Result<String, Failure> {

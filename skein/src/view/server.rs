@@ -1,7 +1,7 @@
 //! The HTTP and WebSocket server: one thread per client, and a limited number of clients. Those without the view's token do not
 //! take the places of the others.
 
-use super::live_feed::{Listener, LiveFeed};
+use super::live_feed::{Line, LiveFeed};
 use super::request::{Door, MAX_HEAD, Request, classify};
 use super::waiting_room::WaitingRoom;
 use crate::interrupt::Interrupt;
@@ -34,7 +34,14 @@ pub(crate) enum Content {
     },
 }
 
-/// Serves clients until it is interrupted.
+impl Content {
+    /// Whether nothing new comes any more, and never will.
+    fn is_lost(&self) -> bool {
+        matches!(self, Self::Live { feed, .. } if feed.is_lost())
+    }
+}
+
+/// Serves clients until it is interrupted, or the connection to the swarms is lost.
 pub(crate) fn serve(
     listener: &TcpListener,
     door: &Door,
@@ -44,7 +51,7 @@ pub(crate) fn serve(
     listener.set_nonblocking(true)?;
     let server = Server { door, content, interrupt, waiting: WaitingRoom::default(), guests: AtomicUsize::new(0) };
     std::thread::scope(|scope| {
-        while interrupt.signal().is_none() {
+        while interrupt.signal().is_none() && !content.is_lost() {
             match listener.accept() {
                 Ok((stream, _)) => {
                     let server = &server;
@@ -168,8 +175,14 @@ fn talk(stream: TcpStream, feed: &LiveFeed, interrupt: &Interrupt) -> std::io::R
     socket.get_ref().set_read_timeout(Some(POLL))?;
     let listener = feed.listen();
     while interrupt.signal().is_none() {
-        if !receive(&mut socket, feed)? || !send(&mut socket, &listener) {
+        // Looked at first, so that all that came before is sent.
+        let lost = feed.is_lost();
+        let lines = listener.lines();
+        if !receive(&mut socket, feed)? || !send(&mut socket, &lines) {
             return Ok(());
+        }
+        if lost && lines.is_empty() {
+            break;
         }
     }
     // The page shows that the connection is lost.
@@ -196,7 +209,6 @@ fn receive(socket: &mut WebSocket<TcpStream>, feed: &LiveFeed) -> std::io::Resul
 }
 
 /// Sends a piece of the lines that are new. False if the page has disconnected.
-fn send(socket: &mut WebSocket<TcpStream>, listener: &Listener) -> bool {
-    let lines = listener.lines();
+fn send(socket: &mut WebSocket<TcpStream>, lines: &[Line]) -> bool {
     lines.is_empty() || socket.send(Message::text(lines.join("\n"))).is_ok()
 }
