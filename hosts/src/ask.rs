@@ -30,12 +30,12 @@ pub(crate) enum Wanted {
         known: Vec<String>,
     },
     /// The samples that are new, as [`Samples`].
-    Next(Feed),
+    Next(FeedKey),
 }
 
-/// What one viewer gets of one swarm.
+/// Names what one viewer gets of one swarm.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(crate) struct Feed {
+pub(crate) struct FeedKey {
     /// Name of the swarm's folder.
     pub(crate) folder: String,
     /// What is wanted of it.
@@ -124,7 +124,7 @@ mod tests {
 
     fn feed(folder: &str) -> Wanted {
         let (folder, viewer) = (folder.to_owned(), "a1".to_owned());
-        Wanted::Next(Feed { folder, stream: LookStream::Record, viewer })
+        Wanted::Next(FeedKey { folder, stream: LookStream::Record, viewer })
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Looks at swarms of other machines, for a command of `skein`: it asks shares, and passes on what they say. The command checks it.
 
-use crate::ask::{self, Feed, Samples, SharedRun, Wanted};
+use crate::ask::{self, FeedKey, Samples, SharedRun, Wanted};
 use crate::cli::LookArgs;
 use crate::error::HostsError;
 use crate::names;
@@ -175,7 +175,7 @@ impl Shares {
         let known = self.lock().get(request.run as usize).cloned();
         let known = known.ok_or(HostsError::Message("a request is for no swarm"))?;
         let viewer = self.session.zid().to_string();
-        let feed = Feed { folder: known.run.folder, stream: request.stream, viewer };
+        let feed = FeedKey { folder: known.run.folder, stream: request.stream, viewer };
         loop {
             let replies = self.ask(&known.share, Wanted::Next(feed.clone()))?;
             let (_, bytes) = replies.first().ok_or(HostsError::LookLost)?;

@@ -1,6 +1,6 @@
 //! A share: it offers what the swarms of this machine publish to viewers elsewhere. It changes nothing of a swarm.
 
-use crate::ask::{self, Feed, Samples, SharedRun, Wanted};
+use crate::ask::{self, FeedKey, Samples, SharedRun, Wanted};
 use crate::cli::ShareArgs;
 use crate::error::HostsError;
 use crate::feed_thread::FeedThread;
@@ -42,7 +42,7 @@ struct Share {
     /// What the names of the swarms begin with, if not all are offered.
     prefix: Option<String>,
     /// What viewers get.
-    feeds: BTreeMap<Feed, FeedThread>,
+    feeds: BTreeMap<FeedKey, FeedThread>,
 }
 
 impl Share {
@@ -114,7 +114,7 @@ impl Share {
     }
 
     /// Passes a question on to the thread that answers it. If there is none, it is the viewer's first question about this swarm.
-    fn pass_on(&mut self, query: Query, wanted: Feed) {
+    fn pass_on(&mut self, query: Query, wanted: FeedKey) {
         let query = match self.feeds.get(&wanted) {
             Some(thread) => match thread.asked.send(query) {
                 Ok(()) => return,
