@@ -39,6 +39,19 @@ fn the_digest_is_that_of_one_machine() {
 }
 
 #[test]
+fn the_missions_of_the_paper_fly_over_hosts() {
+    let place = Place::new();
+    let (_hosts, connect) = place.two_hosts();
+    for name in ["s2-right", "forest"] {
+        let scenario = format!("{}/../scenarios/paper/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let alone = place.fly(&scenario, &["--runtime", "inline"]);
+        let flown = place.fly(&scenario, &["--hosts", "a=4,b=4", "--connect", &connect]);
+        assert_eq!(flown["outcome"], "reached", "{name}");
+        assert_eq!(flown["digest"], alone["digest"], "{name}");
+    }
+}
+
+#[test]
 fn faults_are_carried_out_on_hosts() {
     let place = Place::new();
     let scenario = place.scenario(

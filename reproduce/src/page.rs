@@ -21,7 +21,8 @@ figure{margin:1.5rem 0;background:#fff;color:#222;border:1px solid var(--line);b
 figure svg{display:block;width:100%;height:auto}
 figcaption{padding:.4rem .8rem}
 @media print{:root{--ink:#000;--paper:#fff;--line:#999;--soft:#fff}body{margin:0;max-width:none;font-size:10pt}\
-table{font-size:7pt}code{font-size:6pt;overflow-wrap:anywhere}tr{break-inside:avoid}}
+table{font-size:7pt}th,td{padding:.15em .3em}\
+code{font-size:6pt;overflow-wrap:anywhere}td:last-child:has(code){min-width:15em;line-height:1.3}tr{break-inside:avoid}}
 ";
 
 /// Number of lines up to which a table is open.

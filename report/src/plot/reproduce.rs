@@ -133,11 +133,11 @@ impl Snapshots {
         let colours = self.colours();
         self.draw_legend(&mut svg, &colours);
         for (i, snapshot) in self.snapshots.iter().enumerate() {
-            let (x, y) = (14.0 + (i % 2) as f64 * (WIDTH / 2.0), 70.0 + (i / 2) as f64 * view.pitch());
+            let (x, y) = (14.0 + (i % 2) as f64 * (WIDTH / 2.0), 70.0 + LABEL + (i / 2) as f64 * view.pitch());
             let _ = writeln!(svg, "<g transform=\"translate({x:.0} {y:.0})\">");
             view.draw(&mut svg, facts, &snapshot.drones, &colours);
             let label = format!("t = {:.0} s: {}", snapshot.t_s, self.groups(i).join(", "));
-            let _ = writeln!(svg, "<text x=\"8\" y=\"18\">{}</text></g>", escaped(&label));
+            let _ = writeln!(svg, "<text x=\"0\" y=\"-6\">{}</text></g>", escaped(&label));
         }
         svg.push_str("</svg>\n");
         svg
@@ -179,6 +179,9 @@ fn snapshot(rows: &[trace::TraceRow], tails: &BTreeMap<usize, Vec<(f64, Vec2)>>)
     Snapshot { t_s, drones: rows.iter().map(drone).collect() }
 }
 
+/// Room for the label above a panel, px.
+const LABEL: f64 = 18.0;
+
 /// The part of the world that each panel shows, m.
 struct View {
     low: Vec2,
@@ -199,7 +202,7 @@ impl View {
 
     /// From one row of panels to the next, px.
     fn pitch(&self) -> f64 {
-        self.height() + 18.0
+        LABEL + self.height() + 18.0
     }
 
     /// Place of a point in the panel, px.
