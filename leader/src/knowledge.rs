@@ -11,7 +11,7 @@ use crate::plan_bundle::PlanBundle;
 use crate::tuning::MAX_REJECTIONS;
 use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, ObstacleId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
 /// What one drone knows of its swarm. The other parts of `Leading` read it.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub(crate) struct Knowledge {
     obstacles: Obstacles,
     ledger: Ledger,
     election: Election,
+    /// The newest formation of the whole swarm whose drones' passages are noted.
+    formed: PlanStamp,
 }
 
 impl Knowledge {
@@ -41,6 +43,7 @@ impl Knowledge {
             obstacles: Obstacles::new(params.drones, reach_m),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
             election: Election::new(params.me, params.incarnation, params.election, params.start),
+            formed: PlanStamp::default(),
         }
     }
 
@@ -270,6 +273,37 @@ impl Knowledge {
         for set in self.ledger.sets().iter().filter(|set| position.x >= set.routes.exit_x_m()) {
             self.obstacles.note_passed(self.me, &set.ids);
         }
+        if self.ledger.obeyed().is_some_and(|bundle| is_formation_of_all(&bundle.plan)) {
+            self.note_beyond(&[(self.me, position.x)]);
+        }
+    }
+
+    /// Notes for each of these drones, at these abscissas (m), the obstacle sets that it is beyond, planned for or not.
+    fn note_beyond(&mut self, drones: &[(DroneId, f64)]) {
+        let beyond_m = self.params.routes.planning_distance_m;
+        let known = &self.obstacles;
+        let noted = |drone: DroneId, set: &[ObstacleId]| set.iter().all(|&id| known.has_passed(drone, id));
+        let mut new = Vec::new();
+        for set in known.sets() {
+            let exit_x_m = known.exit_x_m(set, beyond_m);
+            let beyond = drones.iter().filter(|(drone, x_m)| *x_m >= exit_x_m && !noted(*drone, set));
+            new.extend(beyond.map(|&(drone, _)| (drone, set.clone())));
+        }
+        for (drone, set) in new {
+            self.obstacles.note_passed(drone, &set);
+        }
+    }
+
+    /// Notes what the drones of a new formation of the whole swarm are beyond. A slot may lie before the exit of a set that all have
+    /// passed; a drone that flies back to it does not have to pass the set again.
+    fn note_formed(&mut self, now: SimTime) {
+        let formation = self.ledger.obeyed().filter(|bundle| is_formation_of_all(&bundle.plan));
+        let Some(bundle) = formation.filter(|bundle| bundle.plan.id != self.formed) else { return };
+        let of_all = bundle.plan.members >= self.drones;
+        let members = self.living_peers(now).filter(|m| of_all || bundle.parts.contains(m.id));
+        let members: Vec<(DroneId, f64)> = members.map(|m| (m.id, m.position.x)).collect();
+        self.formed = bundle.plan.id;
+        self.note_beyond(&members);
     }
 
     /// Notes which planned sets these members have passed.
@@ -310,9 +344,15 @@ impl Knowledge {
                 self.obstacles.note_passed(drone, &ended);
             }
         }
+        self.note_formed(now);
         let group = self.ledger.group();
         self.election.handle(now, 0, Input::Joined(group));
     }
+}
+
+/// Whether a plan closes one formation of the whole swarm.
+fn is_formation_of_all(plan: &Plan) -> bool {
+    plan.phase() == Phase::Reform && plan.group == GroupId::ALL
 }
 
 /// The term that a message belongs to.
