@@ -78,11 +78,30 @@ struct Known {
     agreed: bool,
     /// Whether this drone makes a first line if there is none.
     opens: bool,
+    /// Whether it last said what it says in turn with its newest line.
+    answered: bool,
 }
 
 impl Known {
     fn new(pair: SeparationPair, peer: DroneId, changed: SimTime, agreed: bool) -> Self {
-        Self { pair, peer, heard: None, said: SimTime::ZERO, changed, seen: None, agreed, opens: false }
+        Self {
+            pair,
+            peer,
+            heard: None,
+            said: SimTime::ZERO,
+            changed,
+            seen: None,
+            agreed,
+            opens: false,
+            answered: false,
+        }
+    }
+
+    /// What is to be said now: the newest line; or, every other time, an answer to the other drone.
+    fn statement(&mut self) -> Option<Statement> {
+        let answer = self.pair.answer().filter(|_| !self.answered);
+        self.answered = answer.is_some();
+        answer.or_else(|| self.pair.statement())
     }
 }
 
@@ -225,7 +244,7 @@ impl Separations {
                 let pose = known.seen.map_or(*pose, |seen| seen.at(now, pose));
                 self.params.propose(known, &pose, peers.delay_s(), path);
             }
-            separators.extend(known.pair.statement().map(|said| separator(known.peer, &said)));
+            separators.extend(known.statement().map(|said| separator(known.peer, &said)));
         }
         say.extend(separators.chunks(MAX_SEPARATORS).map(message));
     }

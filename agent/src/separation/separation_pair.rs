@@ -72,8 +72,20 @@ impl SeparationPair {
     /// What the drone says: the line with the highest number to which it is bound.
     #[must_use]
     pub fn statement(&self) -> Option<Statement> {
-        let &bound_to = self.bound.last()?;
-        Some(Statement { bound_to, incarnation: self.incarnation, addressed: self.peer_incarnation })
+        self.bound.last().map(|&line| self.says(line))
+    }
+
+    /// What a drone that can make no further line says in turn with [`Self::statement`]: the newest line of the other drone's making to
+    /// which it is bound. It frees the other drone from older lines. `None` if it can make further lines, or has no such line.
+    #[must_use]
+    pub fn answer(&self) -> Option<Statement> {
+        let theirs = |line: &&NumberedLine| line.number % 2 != self.parity();
+        let full = self.bound.len() >= MAX_LINES;
+        self.bound.iter().rev().find(theirs).filter(|_| full).map(|&line| self.says(line))
+    }
+
+    fn says(&self, bound_to: NumberedLine) -> Statement {
+        Statement { bound_to, incarnation: self.incarnation, addressed: self.peer_incarnation }
     }
 
     /// Hears which incarnation of the other drone speaks. From a new one on, what an older one said no longer counts.
@@ -140,11 +152,15 @@ impl SeparationPair {
         true
     }
 
-    /// The next number that no drone has used. Drones in front use even numbers, and drones at the back odd ones.
+    /// Drones in front use even numbers, and drones at the back odd ones.
+    fn parity(&self) -> u32 {
+        u32::from(self.side == Side::Back)
+    }
+
+    /// The next number that no drone has used.
     fn next_number(&self) -> Option<u32> {
-        let parity = u32::from(self.side == Side::Back);
         let next = self.newest.checked_add(1)?;
-        if next % 2 == parity { Some(next) } else { next.checked_add(1) }
+        if next % 2 == self.parity() { Some(next) } else { next.checked_add(1) }
     }
 
     /// Whether the drone is bound to the line with this number.
@@ -211,6 +227,28 @@ mod tests {
         assert_eq!((numbers(&front), numbers(&back)), (vec![1, 2], vec![2]));
         front.hear(&back.statement().unwrap(), |_| true);
         assert_eq!(numbers(&front), [2]);
+    }
+
+    /// Each drone is bound to lines to which the other one's path does not keep, and has heard only of the newest of them.
+    #[test]
+    fn two_drones_that_can_make_no_further_line_free_each_other() {
+        let start = || (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
+        let (mut front, mut back) = start();
+        assert!(back.propose(line(1.0), NOW));
+        front.hear(&back.statement().unwrap(), |_| true);
+        assert_eq!(numbers(&front), [1]);
+        while front.propose(line(-f64::from(front.newest)), NOW) {}
+        while back.propose(line(f64::from(back.newest) + 2.0), NOW) {}
+        assert_eq!((front.lines().len(), back.lines().len()), (MAX_LINES, MAX_LINES));
+        back.hear(&front.statement().unwrap(), |_| false);
+        front.hear(&back.statement().unwrap(), |_| false);
+        assert!(!front.propose(line(-50.0), NOW) && !back.propose(line(50.0), NOW), "neither can move");
+        back.hear(&front.answer().unwrap(), |_| false);
+        assert_eq!(numbers(&back)[0], 1, "line 0 is over");
+        assert!(back.propose(line(0.5), NOW) && back.answer().is_none());
+        front.hear(&back.statement().unwrap(), |_| true);
+        back.hear(&front.answer().or(front.statement()).unwrap(), |_| false);
+        assert_eq!(numbers(&back).len(), 1, "both are bound to the newest line: {:?}", numbers(&back));
     }
 
     #[test]
