@@ -148,6 +148,25 @@ fn same_digest(place: &Place, scenario: &str, shares: &[&str], timeout_s: &str) 
     }
 }
 
+/// Its answers take 50 ms, and a tick 20 ms.
+#[test]
+fn a_host_that_is_too_slow_for_the_clock_is_late_and_holds_up_nobody() {
+    let place = Place::new();
+    let scenario = place.scenario("");
+    let host = place.host("a", &free_endpoint(), &[]);
+    let network = SlowNetwork::new(&host.endpoint, NETWORKS[2]);
+    let args = ["--hosts", "a=2", "--connect", &network.endpoint, "--clock", "realtime", "--set", "time.timeout_s=4"];
+    let flown = place.fly(&scenario, &args);
+    let (ticks, missed) = (flown["ticks"].as_u64().unwrap(), flown["deadline_misses"].as_u64().unwrap());
+    assert_eq!(ticks, 200, "no tick waited for it");
+    assert!(missed > ticks, "both of its drones are late in most ticks: {missed}");
+    let median_us = flown["hosts"][0]["lateness_us"]["p50"].as_f64().unwrap();
+    assert!(median_us > 20_000.0, "{median_us} µs");
+    assert_eq!(flown["violations"].as_array().unwrap().len(), 0);
+    let gone = flown["faults"].as_array().unwrap();
+    assert!(gone.is_empty(), "a host that is late is not gone: {gone:?}");
+}
+
 #[test]
 fn a_cut_of_a_second_is_survived_and_a_longer_one_is_not() {
     let place = Place::new();
