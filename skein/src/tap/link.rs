@@ -29,13 +29,13 @@ pub(crate) struct Link {
     at: String,
     child: Mutex<Child>,
     requests: Mutex<ChildStdin>,
-    heard: Arc<Shared>,
+    heard: Arc<LinkState>,
     reader: Option<JoinHandle<()>>,
 }
 
 /// What the thread that reads has heard.
 #[derive(Default)]
-struct Shared {
+struct LinkState {
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -64,7 +64,7 @@ impl Link {
         let (Some(requests), Some(words)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(Failure::environment("expected pipes to skein-hosts"));
         };
-        let heard = Arc::new(Shared::default());
+        let heard = Arc::new(LinkState::default());
         let hearer = Arc::clone(&heard);
         let reader = std::thread::spawn(move || hearer.read(words));
         let (child, requests) = (Mutex::new(child), Mutex::new(requests));
@@ -123,7 +123,7 @@ impl Drop for Link {
     }
 }
 
-impl Shared {
+impl LinkState {
     fn lock(&self) -> MutexGuard<'_, State> {
         lock(&self.state)
     }
