@@ -79,6 +79,12 @@ fn silent_faults_of_sensors_break_no_distance() {
 }
 
 #[test]
+fn waits_of_drones_that_talk_over_a_bad_radio_end() {
+    assert_reached("open-ranks", "congestion-aware-paper");
+    assert_reached("full-of-lines", "congestion-aware-paper");
+}
+
+#[test]
 fn drones_whose_ranging_fails_agree_on_lines_and_fly_on() {
     for strategy in ["shortest-path", "congestion-aware-paper"] {
         assert_reached("blind-ranging", strategy);
