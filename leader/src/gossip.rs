@@ -4,7 +4,7 @@
 //! does not repeat it in that interval. A change, such as a drone that is heard again after a silence, starts with the
 //! shortest interval. So a fact spreads at once, and a swarm that agrees says little.
 
-use crate::tuning::{MAX_GOSSIP_DOUBLINGS, NEAR_REDUNDANCY, REDUNDANCY};
+use crate::tuning::{MAX_GOSSIP_DOUBLINGS, MAX_SILENT_TURNS, NEAR_REDUNDANCY, REDUNDANCY};
 use skein_protocol::digest::Digest;
 use skein_protocol::{DroneId, SimTime};
 
@@ -24,6 +24,8 @@ pub(crate) struct Gossip {
     heard: u32,
     /// Whether this drone has had its turn in the present interval.
     over: bool,
+    /// Number of turns, one after the other, in which it was silent because others had said the fact.
+    silent_turns: u32,
 }
 
 impl Gossip {
@@ -31,7 +33,7 @@ impl Gossip {
     pub(crate) fn new(now: SimTime, shortest_s: f64, me: DroneId) -> Self {
         // Multiples of the golden ratio spread the drones evenly, whatever their number is.
         let phase = (f64::from(me.0) * 0.618_033_988_749_894_9).fract();
-        Self { shortest_s, phase, varies: None, doublings: 0, since: now, heard: 0, over: false }
+        Self { shortest_s, phase, varies: None, doublings: 0, since: now, heard: 0, over: false, silent_turns: 0 }
     }
 
     /// As [`Self::new`], but the point at which this drone speaks is drawn anew for each interval.
@@ -51,6 +53,17 @@ impl Gossip {
         self.doublings
     }
 
+    /// When [`Self::is_due`] next changes anything.
+    pub(crate) fn next_turn(&self) -> SimTime {
+        let part = if self.over { 1.0 } else { 0.5 + 0.5 * self.phase };
+        self.since.after(self.length_s() * part)
+    }
+
+    /// Length of the present interval, s.
+    fn length_s(&self) -> f64 {
+        self.shortest_s * f64::from(1_u32 << self.doublings)
+    }
+
     /// Starts again with the shortest interval: some drone may not know the fact.
     pub(crate) fn restart(&mut self, now: SimTime) {
         self.begin(now, 0);
@@ -67,13 +80,17 @@ impl Gossip {
         self.heard = self.heard.saturating_add(1);
     }
 
-    /// Whether this drone says the fact now. Call once per tick.
+    /// Whether this drone says the fact now. Call once per tick, or at least when [`Self::next_turn`] has come.
     pub(crate) fn is_due(&mut self, now: SimTime) -> bool {
-        let length_s = self.shortest_s * f64::from(1_u32 << self.doublings);
+        let length_s = self.length_s();
         let age_s = now.since(self.since);
         let turn = !self.over && age_s >= length_s * (0.5 + 0.5 * self.phase);
         let enough = if self.varies.is_some() { NEAR_REDUNDANCY } else { REDUNDANCY };
-        let due = turn && self.heard < enough;
+        // The drones that said it may be heard by others than this one.
+        let due = turn && (self.heard < enough || self.silent_turns >= MAX_SILENT_TURNS);
+        if turn && self.varies.is_some() {
+            self.silent_turns = if due { 0 } else { self.silent_turns + 1 };
+        }
         self.over |= turn;
         if age_s >= length_s {
             self.begin(now, (self.doublings + 1).min(MAX_GOSSIP_DOUBLINGS));

@@ -237,14 +237,25 @@ impl Leading {
         }
         let is_fact = !matches!(message, MessageRef::Leadership(_) | MessageRef::Pose(_) | MessageRef::Presence(_));
         if is_fact && self.relays.is_wide() {
-            self.relays.hear(&self.knowledge, now, source, &message.to_message());
+            self.relays.hear(&self.knowledge, now, source, message);
         }
     }
 
-    /// Hears of drones that `source` has heard of.
+    /// Hears of drones that `source` has heard of. Most of it is known: several drones pass the same states on.
     fn hear_presence(&mut self, now: SimTime, source: DroneId, presence: &Presence) {
         let me = self.knowledge.me();
-        for (drone, pose) in presence.poses().filter(|(drone, _)| *drone != me && drone.0 < self.drones) {
+        let near = self.relays.is_near(&self.knowledge, source);
+        for present in presence.present().iter().filter(|present| present.drone != me && present.drone.0 < self.drones)
+        {
+            let drone = present.drone;
+            let known = self.knowledge.peers().stamp_of(drone).filter(|known| *known >= present.stamp);
+            if known == Some(present.stamp) && near {
+                self.relays.hear_newest(now, drone);
+            }
+            if known == Some(present.stamp) || (known.is_some() && !near) {
+                continue;
+            }
+            let pose = presence.pose(present);
             if self.knowledge.hear_of(now, drone, pose) {
                 self.roles.note_plan_conflict();
             }

@@ -69,6 +69,8 @@ mod plan_pace;
 pub mod planned_set;
 mod planner;
 mod presences;
+mod relay_pace;
+mod relayed_facts;
 mod relays;
 mod roles;
 pub mod roster;

@@ -146,6 +146,8 @@ pub struct LeadingParams {
     pub beacon_period_s: f64,
     /// Period of repetitions, s.
     pub repeat_period_s: f64,
+    /// What a drone may pass on for others on average, bytes/s; infinite if bandwidth is no limit.
+    pub relay_bytes_per_s: f64,
     /// A peer that is silent for longer counts as gone, s. Longer on a bad link.
     pub peer_timeout_s: f64,
 }

@@ -243,6 +243,11 @@ impl Peers {
         self.get(peer).map(|known| &known.pose)
     }
 
+    /// The time stamp of a peer's last beacon.
+    pub(crate) fn stamp_of(&self, peer: DroneId) -> Option<SimTime> {
+        self.place(peer).ok().map(|place| self.stamps[place])
+    }
+
     /// The last beacon of a peer that is not silent for too long.
     #[must_use]
     pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {

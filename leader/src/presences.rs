@@ -3,7 +3,7 @@
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::roster::{OfDrone, Roster};
-use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS};
+use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS, STATES_PER_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
@@ -35,6 +35,8 @@ impl OfDrone for Told {
 pub(crate) struct Presences {
     me: DroneId,
     repeat_s: f64,
+    /// A state without news is passed on again after this long, s.
+    period_s: f64,
     told: Roster<Told>,
     /// When a drone was last heard of for the first time.
     last_new: SimTime,
@@ -46,7 +48,9 @@ impl Presences {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, start) = (params.me, params.start);
-        Self { me, repeat_s: params.repeat_period_s, told: Roster::default(), last_new: start, turn: start }
+        let repeat_s = params.repeat_period_s;
+        let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
+        Self { me, repeat_s, period_s, told: Roster::default(), last_new: start, turn: start }
     }
 
     /// When a drone was last heard of for the first time.
@@ -57,7 +61,7 @@ impl Presences {
     /// Notes that a drone's state was heard. `near`: the state in a message of a drone close to this one.
     pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, near: Option<&Pose>) {
         let Some(newest) = k.peers().last(drone) else { return };
-        let period_s = self.repeat_s * PRESENCE_REPEATS;
+        let period_s = self.period_s;
         let new = Told { drone, left: NEWS_TIMES, news: news(newest), covered: SimTime::ZERO };
         let told = match self.told.get_mut(drone) {
             Some(told) => told,
@@ -78,14 +82,20 @@ impl Presences {
         }
     }
 
+    /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
+    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
+        if let Some(told) = self.told.get_mut(drone) {
+            told.covered = now;
+            told.left = told.left.saturating_sub(1);
+        }
+    }
+
     /// Says the states that are due, if it is this drone's turn, in at most `frames`.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, frames: usize, say: &mut Vec<Message>) {
         if now < self.turn || frames == 0 {
             return;
         }
-        let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
-        self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
-        let period_s = self.repeat_s * PRESENCE_REPEATS;
+        let period_s = self.period_s;
         let mut due: BTreeMap<Kind, Vec<(u32, SimTime, DroneId)>> = BTreeMap::new();
         for told in self.told.iter() {
             let id = told.drone;
@@ -98,6 +108,11 @@ impl Presences {
                     id,
                 ));
             }
+        }
+        let needed: usize = due.values().map(|drones| drones.len().div_ceil(MAX_PRESENT)).sum();
+        if needed <= frames {
+            let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
+            self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
         }
         let mut left = frames;
         for ((obeyed, group, term), mut drones) in due {

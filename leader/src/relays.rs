@@ -12,50 +12,15 @@
 //! - The states of drones are collected, so that a frame holds several.
 
 use crate::beats::Beats;
-use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::presences::Presences;
-use crate::tuning::{
-    CLOCKS_S, DETOUR_DOUBLINGS, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, RELAY_MEMORY_S, SETTLED_S, UNSETTLED_S, WIDE_S,
-};
-use skein_protocol::payload::{Leadership, Plan, Pose};
-use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, SimTime, Vec2};
-use std::collections::BTreeMap;
-
-/// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Subject {
-    /// The plan for this group.
-    Plan(GroupId),
-    /// The assignment of this drone in a plan for this group.
-    Part(GroupId, DroneId),
-    /// The arrivals of this drone, of this kind.
-    Arrivals(u32, DroneId),
-    /// What this drone has passed.
-    Passed(DroneId),
-}
-
-/// Which of two messages about the same subject is newer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct Version {
-    ballot: Ballot,
-    epoch: u32,
-    stamp: SimTime,
-}
-
-/// A message that may be passed on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Relayed {
-    message: Message,
-    version: Version,
-    /// The drone it was first heard from.
-    from: DroneId,
-    /// When it was last heard.
-    heard: SimTime,
-    gossip: Gossip,
-}
+use crate::relay_pace::RelayPace;
+use crate::relayed_facts::RelayedFacts;
+use crate::tuning::{CLOCKS_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, SETTLED_S, UNSETTLED_S, WIDE_S};
+use skein_protocol::payload::{Leadership, Pose};
+use skein_protocol::{Ballot, DroneId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
 
 /// What one drone passes on. Memory is bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +43,13 @@ pub(crate) struct Relays {
     crowded: bool,
     /// Whether a neighbour obeys an earlier term than this drone.
     lags: bool,
+    pace: RelayPace,
+    /// Whether the greater half of what it may say next is for states.
+    states_first: bool,
     beats: Beats,
-    relayed: BTreeMap<Subject, Relayed>,
+    facts: RelayedFacts,
+    /// When it next forgets what was not heard for long.
+    forgets: SimTime,
     presences: Presences,
 }
 
@@ -98,8 +68,11 @@ impl Relays {
             wide: false,
             crowded: false,
             lags: false,
+            pace: RelayPace::new(params),
+            states_first: false,
             beats: Beats::new(params),
-            relayed: BTreeMap::new(),
+            facts: RelayedFacts::new(params),
+            forgets: params.start,
             presences: Presences::new(params),
         }
     }
@@ -150,10 +123,11 @@ impl Relays {
         let first = !k.election().obeyed().is_some();
         self.wide = self.differs.is_some_and(|since| first || now.since(since) >= patience_s);
         self.beats.forget(now);
-        if self.wide {
-            self.relayed.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
-        } else {
-            self.relayed.clear();
+        if !self.wide {
+            self.facts.clear();
+        } else if now >= self.forgets {
+            self.facts.forget(now);
+            self.forgets = now.after(FORGET_S);
         }
     }
 
@@ -161,6 +135,11 @@ impl Relays {
     pub(crate) fn hear_state(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, relay: Option<(DroneId, &Pose)>) {
         let near = relay.filter(|(relay, _)| self.is_near(k, *relay)).map(|(_, pose)| pose);
         self.presences.hear(k, now, drone, near);
+    }
+
+    /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
+    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
+        self.presences.hear_newest(now, drone);
     }
 
     /// Notes a message about leadership that `source` said. Returns whether it is to be obeyed: it comes from the leader
@@ -196,26 +175,10 @@ impl Relays {
         self.beats.hear(now, message, near, self.crowded)
     }
 
-    /// Notes a message of `source` that may have to be passed on. Returns whether it is new.
-    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, source: DroneId, message: &Message) -> bool {
-        let Some((subject, version)) = subject(source, message) else { return false };
+    /// Notes a message of `source` that may have to be passed on.
+    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, source: DroneId, message: MessageRef<'_>) {
         let near = self.is_near(k, source);
-        let known = self.relayed.get_mut(&subject);
-        if let Some(one) = known.filter(|one| one.version >= version || is_same_passage(&one.message, message)) {
-            if one.version == version {
-                one.heard = now;
-                if near {
-                    one.gossip.hear();
-                }
-            }
-            return false;
-        }
-        let room = self.relayed.len() < 8 * self.drones as usize + 64;
-        if room || self.relayed.contains_key(&subject) {
-            let gossip = Gossip::varying(now, self.repeat_s, self.me);
-            self.relayed.insert(subject, Relayed { message: *message, version, from: source, heard: now, gossip });
-        }
-        true
+        self.facts.hear(now, source, message, near);
     }
 
     /// Says what is due to be passed on.
@@ -223,81 +186,16 @@ impl Relays {
         if !self.wide {
             return;
         }
-        let last = say.len() + MAX_RELAYED_PER_TICK;
-        let position = self.position;
+        // The leaders' messages are few and come first.
+        let beats = say.len();
         self.beats.speak(k, now, MAX_RELAYED_PER_TICK, self.lags, say);
-        for (subject, one) in &mut self.relayed {
-            if say.len() >= last {
-                return;
-            }
-            if is_wanted(k, now, *subject, one) && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
-                say.push(passed_on(one.message, one.from));
-            }
-        }
-        self.presences.speak(k, now, last.saturating_sub(say.len()), say);
+        let first = say.len();
+        let last = first + self.pace.frames(now).min((MAX_RELAYED_PER_TICK + beats).saturating_sub(first));
+        // What is said until states show that it was obeyed must leave room for those states.
+        self.states_first = !self.states_first;
+        let for_states = if self.states_first { (last - first).div_ceil(2) } else { (last - first) / 2 };
+        self.presences.speak(k, now, for_states, say);
+        self.facts.speak(k, now, self.position, last, say);
+        self.pace.note(&say[first..]);
     }
-}
-
-/// What a message is about, and its version; `None` if it is not passed on.
-fn subject(source: DroneId, message: &Message) -> Option<(Subject, Version)> {
-    let at = |stamp| Version { stamp, ..Version::default() };
-    Some(match message {
-        Message::Plan(plan) => {
-            let version = Version { ballot: plan.id.ballot, epoch: plan.id.epoch, ..Version::default() };
-            (Subject::Plan(plan.group), version)
-        }
-        Message::Assignment(part) => {
-            let version = Version { ballot: part.id.ballot, epoch: part.id.epoch, ..Version::default() };
-            (Subject::Part(part.scope, part.drone), version)
-        }
-        Message::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), at(row.stamp)),
-        Message::Passed(passed) => (Subject::Passed(passed.drone(source)), at(passed.stamp)),
-        _ => return None,
-    })
-}
-
-/// Whether both messages report that a drone has passed the same obstacles.
-fn is_same_passage(known: &Message, heard: &Message) -> bool {
-    matches!((known, heard), (Message::Passed(a), Message::Passed(b)) if a.set_count == b.set_count && a.set == b.set)
-}
-
-/// Whether some drone may still need the message.
-fn is_wanted(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> bool {
-    match (subject, &one.message) {
-        (Subject::Plan(scope), Message::Plan(plan)) => is_plan_wanted(k, now, scope, plan),
-        (Subject::Part(..), Message::Assignment(part)) => {
-            let Some(pose) = k.peers().last_of_living(part.drone, now) else { return one.gossip.is_first() };
-            is_late(pose, part.id.ballot, part.id.epoch)
-        }
-        _ => one.gossip.is_first(),
-    }
-}
-
-/// Whether this drone, which is at `position`, is closer to the drone that a message is for than the one it heard it from. In the end
-/// the message is passed on in all directions.
-fn is_on_the_way(k: &Knowledge, position: Vec2, one: &Relayed) -> bool {
-    let Message::Assignment(part) = &one.message else { return true };
-    let Some(pose) = k.peers().last(part.drone) else { return true };
-    let away_m = |from: Vec2| (from - pose.position()).norm();
-    let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
-    one.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
-}
-
-/// Whether a neighbour of the plan's group does not obey it yet.
-fn is_plan_wanted(k: &Knowledge, now: SimTime, scope: GroupId, plan: &Plan) -> bool {
-    let late = |pose: &Pose| scope.contains(pose.group) && is_late(pose, plan.id.ballot, plan.id.epoch);
-    k.peers().direct(now).any(|(_, pose)| late(pose))
-}
-
-/// Whether a drone has not obeyed a plan yet, and will.
-fn is_late(pose: &Pose, ballot: Ballot, epoch: u32) -> bool {
-    (pose.obeyed.ballot, pose.obeyed.epoch) < (ballot, epoch) && pose.term <= ballot
-}
-
-/// The message as it is passed on.
-fn passed_on(mut message: Message, from: DroneId) -> Message {
-    if let Message::Passed(passed) = &mut message {
-        passed.of = passed.drone(from).0.saturating_add(1);
-    }
-    message
 }

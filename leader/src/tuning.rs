@@ -83,6 +83,9 @@ pub(crate) const MAX_GOSSIP_DOUBLINGS: u32 = 3;
 
 /// A drone that hears this many copies from drones close to it does not pass a message on. No unit. 2. By hand.
 pub(crate) const NEAR_REDUNDANCY: u32 = 2;
+/// A drone that was silent in this many turns because drones close to it had said the message says it in the next one: it may be
+/// heard by drones that do not hear those. No unit. 8. By hand.
+pub(crate) const MAX_SILENT_TURNS: u32 = 8;
 /// A drone is close if it is nearer than this part of the distance of the farthest neighbour. No unit. 0.5. By hand.
 pub(crate) const NEAR: f64 = 0.5;
 /// A drone passes messages on once a neighbour has heard other drones than it does for this long, s. At least three beacons,
@@ -100,6 +103,11 @@ pub(crate) const BEAT_REPEAT: f64 = 0.5;
 pub(crate) const FOREIGN_BEATS: f64 = 10.0;
 /// What was not heard for this long is forgotten, s. 30. By hand.
 pub(crate) const RELAY_MEMORY_S: f64 = 30.0;
+/// Time between two looks at what was not heard for long, s. 3: a tenth of that. By hand.
+pub(crate) const FORGET_S: f64 = 3.0;
+/// An assignment that its drone obeys is looked at again after this many repeat periods. No unit. 8: with the default period
+/// 1.6 s. By hand.
+pub(crate) const UNWANTED_REPEATS: f64 = 8.0;
 /// A message of a leader whose stamp lies further in the future is not believed, s. 2: twice the offset of two clocks that are
 /// each one second off. By calculation.
 pub(crate) const CLOCKS_S: f64 = 2.0;
@@ -114,6 +122,9 @@ pub(crate) const NEWS_TIMES: u32 = 2;
 /// Drones without news are passed on once per this many repeat periods. No unit. 8: with the default period every 1.6 s. By
 /// hand.
 pub(crate) const PRESENCE_REPEATS: f64 = 8.0;
+/// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 320: swarms of
+/// more than 512 drones repeat states less often, so that what a drone hears does not grow with the swarm. By hand.
+pub(crate) const STATES_PER_S: f64 = 320.0;
 /// A drone heard directly within this time needs no relay, s. 1. By hand: several beacons.
 pub(crate) const DIRECT_S: f64 = 1.0;
 /// No first claim is made while further drones became known within this time, s. 0.6. By hand: three hops.

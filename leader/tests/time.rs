@@ -184,6 +184,19 @@ fn a_chain_has_one_leader_and_one_plan_and_keeps_them() {
     }
 }
 
+/// Drones that are close to each other do not always hear the same drones. Then a drone may be the only way to another one although
+/// drones close to it say the same.
+#[test]
+fn a_chain_whose_links_do_not_follow_its_places_unites() {
+    for seed in 400..500 {
+        let mut swarm = Swarm::new(DEFAULT, Air { seed, loss: 0.3, ..Air::default() }, 5);
+        swarm.reach = 1;
+        swarm.own.rotate_right(2);
+        let united_s = swarm.until(60.0, |s| s.disunion(0));
+        assert!(united_s.is_ok(), "seed {seed}: {united_s:?}");
+    }
+}
+
 #[test]
 fn a_chain_that_loses_many_frames_unites() {
     for (drones, loss, seed, limit_s) in [(10, 0.75, 1, 60.0), (30, 0.25, 2, 40.0), (30, 0.5, 3, 60.0)] {

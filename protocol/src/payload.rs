@@ -152,25 +152,34 @@ pub struct Presence {
 }
 
 impl Presence {
-    /// The last beacons of the drones, as far as they are passed on: without the climb, the places in queues, and the drones
-    /// that each of them hears.
+    /// The drones.
+    #[must_use]
+    pub fn present(&self) -> &[Present] {
+        &self.drones[..MAX_PRESENT.min(self.count as usize)]
+    }
+
+    /// The last beacon of one of the drones, as far as it is passed on: without the climb, the places in queues, and the drones
+    /// that it hears.
+    #[must_use]
+    pub fn pose(&self, present: &Present) -> Pose {
+        let ([x, y, z], [vx, vy]) = (present.position_m.map(f64::from), present.velocity_mps.map(f64::from));
+        Pose {
+            stamp: present.stamp,
+            position_m: [x, y, z],
+            velocity_mps: [vx, vy, 0.0],
+            queue: [QueuePlace::default(); MAX_PLACES],
+            obeyed: self.obeyed,
+            group: self.group,
+            term: self.term,
+            incarnation: present.incarnation,
+            flags: present.flags,
+            hears: 0,
+        }
+    }
+
+    /// The last beacons of all these drones, see [`Self::pose`].
     pub fn poses(&self) -> impl Iterator<Item = (DroneId, Pose)> + '_ {
-        self.drones.iter().take(self.count as usize).map(|present| {
-            let ([x, y, z], [vx, vy]) = (present.position_m.map(f64::from), present.velocity_mps.map(f64::from));
-            let pose = Pose {
-                stamp: present.stamp,
-                position_m: [x, y, z],
-                velocity_mps: [vx, vy, 0.0],
-                queue: [QueuePlace::default(); MAX_PLACES],
-                obeyed: self.obeyed,
-                group: self.group,
-                term: self.term,
-                incarnation: present.incarnation,
-                flags: present.flags,
-                hears: 0,
-            };
-            (present.drone, pose)
-        })
+        self.present().iter().map(|present| (present.drone, self.pose(present)))
     }
 }
 

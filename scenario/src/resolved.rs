@@ -28,6 +28,9 @@ const ALTITUDE_M: f64 = 50.0;
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
 const BEACON_SHARE: f64 = 0.25;
+
+/// Share of the bandwidth that what drones pass on may take. No unit.
+const RELAY_SHARE: f64 = 0.5;
 /// Longest time between two statements of separating lines, s.
 const SEPARATION_PERIOD_MAX_S: f64 = 2.0;
 
@@ -263,12 +266,23 @@ impl Scenario {
         least_s.clamp(self.beacon_period_s(), self.beacon_period_s().max(SEPARATION_PERIOD_MAX_S))
     }
 
+    /// What a drone may pass on for others on average, bytes/s: together, all drones pass on half of the bandwidth. Infinite if
+    /// bandwidth is no limit.
+    #[must_use]
+    pub fn relay_bytes_per_s(&self) -> f64 {
+        self.share_bps(RELAY_SHARE) / 8.0 / f64::from(self.formation.drones)
+    }
+
     /// The time in which all drones say one message each, if the messages take a quarter of the bandwidth, s. `bytes`: size of
     /// the payload.
     fn period_within_share_s(&self, bytes: usize) -> f64 {
         let frame_bits = 8.0 * (HEAD_BYTES as f64 + bytes as f64);
-        let share_bps = self.radio.rate_bps.map_or(f64::INFINITY, |rate_bps| BEACON_SHARE * rate_bps);
-        f64::from(self.formation.drones) * frame_bits / share_bps
+        f64::from(self.formation.drones) * frame_bits / self.share_bps(BEACON_SHARE)
+    }
+
+    /// A share of the bandwidth, bit/s.
+    fn share_bps(&self, share: f64) -> f64 {
+        self.radio.rate_bps.map_or(f64::INFINITY, |rate_bps| share * rate_bps)
     }
 
     /// The radio of the scenario: delay, loss, range and copies, keyed by the seed.

@@ -1,0 +1,218 @@
+//! What a drone has heard and may have to pass on, and when it does. See [`crate::relays`].
+//!
+//! A large swarm has a thousand assignments, so a drone looks at those only whose turn has come.
+
+use crate::gossip::Gossip;
+use crate::knowledge::Knowledge;
+use crate::params::LeadingParams;
+use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
+use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan, Pose};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Subject {
+    /// The plan for this group.
+    Plan(GroupId),
+    /// The assignment of this drone in a plan for this group.
+    Part(GroupId, DroneId),
+    /// The arrivals of this drone, of this kind.
+    Arrivals(u32, DroneId),
+    /// What this drone has passed.
+    Passed(DroneId),
+}
+
+/// Which of two messages about the same subject is newer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Version {
+    ballot: Ballot,
+    epoch: u32,
+    stamp: SimTime,
+}
+
+/// What a message says. Most are assignments, so the others are elsewhere.
+#[derive(Clone, Debug, PartialEq)]
+enum Fact {
+    Plan(Box<Plan>),
+    Part(Assignment),
+    Arrivals(Box<Arrivals>),
+    Passed(Box<Passed>),
+}
+
+/// A message that may be passed on.
+#[derive(Clone, Debug, PartialEq)]
+struct Relayed {
+    fact: Fact,
+    version: Version,
+    /// The drone it was first heard from.
+    from: DroneId,
+    /// When it was last heard.
+    heard: SimTime,
+    gossip: Gossip,
+    /// When it is looked at next; `None` if it need not be passed on again.
+    turn: Option<SimTime>,
+}
+
+/// The messages that one drone may pass on. Memory is bounded by the size of the swarm.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RelayedFacts {
+    me: DroneId,
+    repeat_s: f64,
+    room: usize,
+    known: BTreeMap<Subject, Relayed>,
+    /// The messages that will be looked at, by their turns.
+    turns: BTreeSet<(SimTime, Subject)>,
+}
+
+impl RelayedFacts {
+    /// Nothing heard.
+    pub(crate) fn new(params: &LeadingParams) -> Self {
+        let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
+        Self { me, repeat_s, room, known: BTreeMap::new(), turns: BTreeSet::new() }
+    }
+
+    /// Forgets all.
+    pub(crate) fn clear(&mut self) {
+        self.known.clear();
+        self.turns.clear();
+    }
+
+    /// Forgets what was not heard for long.
+    pub(crate) fn forget(&mut self, now: SimTime) {
+        self.known.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
+        self.turns.retain(|(_, subject)| self.known.contains_key(subject));
+    }
+
+    /// Notes a message of `source`. `near`: that drone is close to this one.
+    pub(crate) fn hear(&mut self, now: SimTime, source: DroneId, message: MessageRef<'_>, near: bool) {
+        let Some((subject, version)) = subject(source, message) else { return };
+        let known = self.known.get_mut(&subject);
+        if let Some(one) = known.filter(|one| one.version >= version || is_same_passage(&one.fact, message)) {
+            if one.version == version {
+                one.heard = now;
+                if near {
+                    one.gossip.hear();
+                }
+            }
+            return;
+        }
+        let old = self.known.get(&subject).map(|one| one.turn);
+        let Some(fact) = fact(message).filter(|_| old.is_some() || self.known.len() < self.room) else { return };
+        if let Some(turn) = old.flatten() {
+            self.turns.remove(&(turn, subject));
+        }
+        let gossip = Gossip::varying(now, self.repeat_s, self.me);
+        let turn = gossip.next_turn();
+        self.turns.insert((turn, subject));
+        self.known.insert(subject, Relayed { fact, version, from: source, heard: now, gossip, turn: Some(turn) });
+    }
+
+    /// Says what is due, until `last` messages are said. This drone is at `position`, world frame, m.
+    pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
+        while say.len() < last
+            && let Some(&(turn, subject)) = self.turns.first()
+            && turn <= now
+        {
+            self.turns.pop_first();
+            let Some(one) = self.known.get_mut(&subject) else { continue };
+            let wanted = is_wanted(k, now, subject, one);
+            if wanted && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
+                say.push(one.passed_on());
+            }
+            one.turn = one.next_look(now, wanted, self.repeat_s);
+            self.turns.extend(one.turn.map(|turn| (turn, subject)));
+        }
+    }
+}
+
+impl Relayed {
+    /// When the message is looked at again after a look at `now`.
+    fn next_look(&self, now: SimTime, wanted: bool, repeat_s: f64) -> Option<SimTime> {
+        match &self.fact {
+            Fact::Arrivals(_) | Fact::Passed(_) if !self.gossip.is_first() => None,
+            Fact::Plan(_) if !wanted => Some(now.after(repeat_s)),
+            _ if !wanted => Some(now.after(repeat_s * UNWANTED_REPEATS)),
+            _ => Some(self.gossip.next_turn().max(SimTime(now.0 + 1))),
+        }
+    }
+
+    /// The message as it is passed on.
+    fn passed_on(&self) -> Message {
+        match &self.fact {
+            Fact::Plan(plan) => Message::Plan(**plan),
+            Fact::Part(part) => Message::Assignment(*part),
+            Fact::Arrivals(row) => Message::Arrivals(**row),
+            Fact::Passed(passed) => {
+                Message::Passed(Passed { of: passed.drone(self.from).0.saturating_add(1), ..**passed })
+            }
+        }
+    }
+}
+
+/// What a message is about, and its version; `None` if it is not passed on.
+fn subject(source: DroneId, message: MessageRef<'_>) -> Option<(Subject, Version)> {
+    let at = |stamp| Version { stamp, ..Version::default() };
+    Some(match message {
+        MessageRef::Plan(plan) => {
+            let version = Version { ballot: plan.id.ballot, epoch: plan.id.epoch, ..Version::default() };
+            (Subject::Plan(plan.group), version)
+        }
+        MessageRef::Assignment(part) => {
+            let version = Version { ballot: part.id.ballot, epoch: part.id.epoch, ..Version::default() };
+            (Subject::Part(part.scope, part.drone), version)
+        }
+        MessageRef::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), at(row.stamp)),
+        MessageRef::Passed(passed) => (Subject::Passed(passed.drone(source)), at(passed.stamp)),
+        _ => return None,
+    })
+}
+
+/// What a message says; `None` if it is not passed on.
+fn fact(message: MessageRef<'_>) -> Option<Fact> {
+    Some(match message {
+        MessageRef::Plan(plan) => Fact::Plan(Box::new(*plan)),
+        MessageRef::Assignment(part) => Fact::Part(*part),
+        MessageRef::Arrivals(row) => Fact::Arrivals(Box::new(*row)),
+        MessageRef::Passed(passed) => Fact::Passed(Box::new(*passed)),
+        _ => return None,
+    })
+}
+
+/// Whether both messages report that a drone has passed the same obstacles.
+fn is_same_passage(known: &Fact, heard: MessageRef<'_>) -> bool {
+    matches!((known, heard), (Fact::Passed(a), MessageRef::Passed(b)) if a.set_count == b.set_count && a.set == b.set)
+}
+
+/// Whether some drone may still need the message.
+fn is_wanted(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> bool {
+    match (subject, &one.fact) {
+        (Subject::Plan(scope), Fact::Plan(plan)) => is_plan_wanted(k, now, scope, plan),
+        (Subject::Part(..), Fact::Part(part)) => {
+            let Some(pose) = k.peers().last_of_living(part.drone, now) else { return one.gossip.is_first() };
+            is_late(pose, part.id.ballot, part.id.epoch)
+        }
+        _ => one.gossip.is_first(),
+    }
+}
+
+/// Whether this drone, which is at `position`, is closer to the drone that a message is for than the one it heard it from. In the end
+/// the message is passed on in all directions.
+fn is_on_the_way(k: &Knowledge, position: Vec2, one: &Relayed) -> bool {
+    let Fact::Part(part) = &one.fact else { return true };
+    let Some(pose) = k.peers().last(part.drone) else { return true };
+    let away_m = |from: Vec2| (from - pose.position()).norm();
+    let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
+    one.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
+}
+
+/// Whether a neighbour of the plan's group does not obey it yet.
+fn is_plan_wanted(k: &Knowledge, now: SimTime, scope: GroupId, plan: &Plan) -> bool {
+    let late = |pose: &Pose| scope.contains(pose.group) && is_late(pose, plan.id.ballot, plan.id.epoch);
+    k.peers().direct(now).any(|(_, pose)| late(pose))
+}
+
+/// Whether a drone has not obeyed a plan yet, and will.
+fn is_late(pose: &Pose, ballot: Ballot, epoch: u32) -> bool {
+    (pose.obeyed.ballot, pose.obeyed.epoch) < (ballot, epoch) && pose.term <= ballot
+}

@@ -1,0 +1,112 @@
+//! Tests of what one drone of a large swarm passes on.
+#![allow(clippy::unwrap_used, reason = "test helpers")]
+
+mod swarm;
+
+use bytemuck::Zeroable;
+use skein_leader::leading::Leading;
+use skein_leader::own_state::OwnState;
+use skein_protocol::payload::{Assignment, Leadership, MAX_PRESENT, Pose, Presence, Present};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, PlanStamp, SimTime, Vec2};
+use std::collections::BTreeMap;
+use swarm::{DEFAULT, params, step};
+
+const DRONES: u32 = 600;
+const TERM: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
+const PLAN: PlanStamp = PlanStamp { ballot: TERM, epoch: 1 };
+
+/// What drone 1 says. It hears the leader 0 and drone 2 only; drone 2 hears all others, none of which obeys the plan yet.
+struct Middle {
+    leading: Leading,
+    tick: u64,
+}
+
+impl Middle {
+    fn new() -> Self {
+        Self { leading: Leading::new(&params(&DEFAULT, DRONES, 1, 1, SimTime::ZERO)), tick: 0 }
+    }
+
+    fn now(&self) -> SimTime {
+        SimTime::from_secs(0.02 * self.tick as f64)
+    }
+
+    fn hear(&mut self, source: u32, message: Message) {
+        let now = self.now();
+        self.leading.hear(now, DroneId(source), &message, &mut Vec::new());
+    }
+
+    /// Hears that these drones obey a plan.
+    fn hear_of(&mut self, drones: impl Iterator<Item = u32>, obeyed: PlanStamp) {
+        let stamp = self.now();
+        for drones in drones.collect::<Vec<_>>().chunks(MAX_PRESENT) {
+            let mut presence = Presence { obeyed, group: GroupId::ALL, term: TERM, ..Presence::default() };
+            presence.count = drones.len() as u32;
+            for (entry, &drone) in presence.drones.iter_mut().zip(drones) {
+                let position_m = [-40.0 * drone as f32, 0.0, 50.0];
+                *entry = Present { stamp, drone: DroneId(drone), incarnation: 1, position_m, ..Present::zeroed() };
+            }
+            self.hear(2, Message::Presence(presence));
+        }
+    }
+
+    /// One tick, in which both neighbours are heard. Returns what the drone says.
+    fn step(&mut self) -> Vec<Message> {
+        self.tick += 1;
+        let stamp = self.now();
+        for (source, hears) in [(0, 17), (2, 18)] {
+            let position_m = [-40.0 * f64::from(source), 0.0, 50.0];
+            let common = Pose { stamp, position_m, group: GroupId::ALL, term: TERM, incarnation: 1, ..Pose::zeroed() };
+            self.hear(source, Message::Pose(Pose { hears, obeyed: PLAN, ..common }));
+        }
+        let (kind, ballot, group) = (LeadershipKind::Claim as u16, TERM, GroupId::ALL);
+        self.hear(0, Message::Leadership(Leadership { stamp, ballot, group, kind, ..Leadership::zeroed() }));
+        let position = Vec2::new(-40.0, 0.0);
+        let own = OwnState { tick: self.tick, position, velocity: Vec2::zeros(), altitude_m: 50.0, climb_mps: 0.0 };
+        let mut said = Vec::new();
+        step(&mut self.leading, stamp, &own, &mut said);
+        said
+    }
+}
+
+/// A drone with 598 assignments to pass on says each of them before it says one of them often, and it passes news of a drone on
+/// at once.
+#[test]
+fn many_assignments_starve_neither_each_other_nor_the_states_of_drones() {
+    let mut middle = Middle::new();
+    for _ in 0..60 {
+        middle.step();
+    }
+    middle.hear_of(3..DRONES, PlanStamp::default());
+    // Until the states are passed on.
+    for _ in 0..300 {
+        middle.step();
+    }
+    for drone in 2..DRONES {
+        let (scope, group) = (GroupId::ALL, GroupId::ALL);
+        let part =
+            Assignment { id: PLAN, scope, group, drone: DroneId(drone), leader: DroneId(0), ..Zeroable::zeroed() };
+        middle.hear(0, Message::Assignment(part));
+    }
+    let mut parts: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut news_after = None;
+    for tick in 0..400 {
+        if tick == 25 {
+            middle.hear_of(500..501, PLAN);
+        }
+        for message in middle.step() {
+            match message {
+                Message::Assignment(part) => *parts.entry(part.drone.0).or_default() += 1,
+                Message::Presence(presence) if tick >= 25 && presence.obeyed == PLAN => {
+                    let is_news = presence.poses().any(|(drone, _)| drone == DroneId(500));
+                    news_after = news_after.or(is_news.then_some(tick - 25));
+                }
+                _ => {}
+            }
+        }
+    }
+    let late = (3..DRONES).filter(|drone| *drone != 500);
+    let (least, most) =
+        late.map(|drone| parts.get(&drone).copied().unwrap_or(0)).fold((u32::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
+    assert!(news_after.is_some_and(|ticks| ticks <= 20), "news after {news_after:?} ticks");
+    assert!(least >= 1 && most <= 2 * least + 1, "assignments were passed on {least} to {most} times");
+}
