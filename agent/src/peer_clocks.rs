@@ -4,14 +4,39 @@ use skein_protocol::payload::{Leadership, Pose};
 use skein_protocol::{DroneId, MessageRef, SimTime};
 use std::collections::BTreeMap;
 
+/// Length of a window in which the least time of a drone's messages counts, s: some hundred beacons.
+const WINDOW_S: f64 = 30.0;
+
 /// Estimates how far the clocks of the others are apart from this drone's, from the least time that a message seemed to take. What a
 /// drone learns by it decides how well it flies; the safety rule allows for every clock error within the bound.
 #[derive(Clone, Debug)]
 pub(crate) struct PeerClocks {
     /// Greatest difference of two clocks, ns; 0 for exact clocks.
     bound_ns: i64,
-    /// The least time that a message of each drone seemed to take, ns.
-    least_ns: BTreeMap<DroneId, i64>,
+    least: BTreeMap<DroneId, Least>,
+}
+
+/// The least time that a message of one drone seemed to take lately. It is forgotten after two windows, because a clock may be set
+/// anew, and drifts.
+#[derive(Clone, Copy, Debug)]
+struct Least {
+    /// Start of the present window.
+    since: SimTime,
+    /// In the present window, ns.
+    now_ns: i64,
+    /// In the window before, ns.
+    before_ns: i64,
+}
+
+impl Least {
+    /// Notes that a message seemed to take this long, ns. Returns the least of the two windows.
+    fn note(&mut self, now: SimTime, took_ns: i64) -> i64 {
+        if now.since(self.since) >= WINDOW_S {
+            *self = Self { since: now, now_ns: took_ns, before_ns: self.now_ns };
+        }
+        self.now_ns = self.now_ns.min(took_ns);
+        self.now_ns.min(self.before_ns)
+    }
 }
 
 /// A message whose stamp is by this drone's clock.
@@ -33,7 +58,7 @@ impl Restamped {
 impl PeerClocks {
     /// Nothing heard. `error_s`: greatest error of a clock, s.
     pub(crate) fn new(error_s: f64) -> Self {
-        Self { bound_ns: (2.0 * error_s * 1e9).ceil() as i64, least_ns: BTreeMap::new() }
+        Self { bound_ns: (2.0 * error_s * 1e9).ceil() as i64, least: BTreeMap::new() }
     }
 
     /// The same message with its stamp by this drone's clock; `None` if its stamps need no change.
@@ -57,9 +82,9 @@ impl PeerClocks {
 
     fn by_own_clock(&mut self, now: SimTime, source: DroneId, stamp: SimTime) -> SimTime {
         let took_ns = now.0.saturating_sub(stamp.0);
-        let least_ns = self.least_ns.entry(source).or_insert(took_ns);
-        *least_ns = took_ns.min(*least_ns);
-        SimTime(stamp.0.saturating_add((*least_ns).clamp(-self.bound_ns, self.bound_ns)))
+        let first = Least { since: now, now_ns: took_ns, before_ns: took_ns };
+        let least_ns = self.least.entry(source).or_insert(first).note(now, took_ns);
+        SimTime(stamp.0.saturating_add(least_ns.clamp(-self.bound_ns, self.bound_ns)))
     }
 }
 
@@ -83,6 +108,18 @@ mod tests {
         assert_eq!(heard(&mut clocks, 10.3, 11.5), Some(10.0), "this beacon took 0.3 s longer");
         assert_eq!(heard(&mut clocks, 11.0, 30.0), Some(28.0), "no clock is that far ahead");
         assert_eq!(heard(&mut PeerClocks::new(0.0), 10.0, 11.5), None, "clocks are exact");
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_is_estimated_anew() {
+        let mut clocks = PeerClocks::new(1.0);
+        assert_eq!(heard(&mut clocks, 10.0, 11.0), Some(10.0), "its clock is a second ahead");
+        assert_eq!(heard(&mut clocks, 20.0, 20.0), Some(19.0), "its clock was set back, which looks like a delay");
+        for tick in 0..700 {
+            let now_s = 20.0 + 0.1 * f64::from(tick);
+            heard(&mut clocks, now_s, now_s);
+        }
+        assert_eq!(heard(&mut clocks, 90.0, 90.0), Some(90.0));
     }
 
     #[test]

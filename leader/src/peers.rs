@@ -21,8 +21,6 @@ const ROUNDING_S: f64 = 1e-6;
 /// What is known of one peer.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
-    /// The longest silence that is not yet significant, s.
-    silence_s: f64,
     /// Of its beacons, by their times of arrival.
     timeout: AdaptiveTimeout,
     /// When it was last heard without a relay; [`NEVER`] if it never was.
@@ -31,17 +29,23 @@ struct Peer {
 }
 
 impl Peer {
-    fn lives(&self, now: SimTime) -> bool {
-        now.since(self.timeout.last()) <= self.silence_s
+    /// The longest silence that is not yet significant, s: never more than [`MAX_TIMEOUTS`], however rarely it was heard, because a dead
+    /// drone must not count for long. `base_s`: time-out of a regular source. It is not kept, because a drone has a thousand peers.
+    fn silence_s(&self, base_s: f64) -> f64 {
+        self.timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
     }
 
-    fn is_direct(&self, now: SimTime) -> bool {
-        now.since(self.direct) <= self.silence_s
+    fn lives(&self, now: SimTime, base_s: f64) -> bool {
+        now.since(self.timeout.last()) <= self.silence_s(base_s)
+    }
+
+    fn is_direct(&self, now: SimTime, base_s: f64) -> bool {
+        now.since(self.direct) <= self.silence_s(base_s)
     }
 
     /// A moment until which it certainly lives.
-    fn lives_until(&self) -> SimTime {
-        self.timeout.last() + ((self.silence_s - ROUNDING_S) * 1e9) as i64
+    fn lives_until(&self, base_s: f64) -> SimTime {
+        self.timeout.last() + ((self.silence_s(base_s) - ROUNDING_S) * 1e9) as i64
     }
 }
 
@@ -113,9 +117,8 @@ impl Peers {
                     self.note_near(source);
                 }
                 let timeout = self.prior(now, direct.is_some());
-                let silence_s = patience_s(&timeout, self.timeout_s);
-                let peer = Peer { silence_s, timeout, direct: direct.unwrap_or(NEVER), pose };
-                self.quiet_until = self.quiet_until.min(peer.lives_until());
+                let peer = Peer { timeout, direct: direct.unwrap_or(NEVER), pose };
+                self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 self.ids.insert(place, source);
                 self.stamps.insert(place, pose.stamp);
                 self.last.insert(place, peer);
@@ -123,15 +126,15 @@ impl Peers {
             Ok(place) if pose.stamp > self.stamps[place] => {
                 let prior = self.prior(now, false);
                 let peer = &mut self.last[place];
+                let longest_s = peer.silence_s(self.timeout_s);
                 peer.pose = pose;
                 if direct.is_none() && peer.timeout.last() <= peer.direct {
                     peer.timeout = prior;
                 }
                 peer.direct = direct.unwrap_or(peer.direct);
-                peer.timeout.hear(now, 0.0, peer.silence_s);
-                peer.silence_s = patience_s(&peer.timeout, self.timeout_s);
+                peer.timeout.hear(now, 0.0, longest_s);
                 self.stamps[place] = pose.stamp;
-                self.quiet_until = self.quiet_until.min(peer.lives_until());
+                self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 if direct.is_some() {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
                 }
@@ -158,7 +161,7 @@ impl Peers {
     /// Finds out anew until when no peer is silent for too long.
     fn look_for_silence(&mut self, now: SimTime) {
         self.next_look = now.after(LOOK_TIMEOUTS * self.timeout_s);
-        self.quiet_until = self.last.iter().map(Peer::lives_until).min().unwrap_or(SimTime::MAX);
+        self.quiet_until = self.last.iter().map(|peer| peer.lives_until(self.timeout_s)).min().unwrap_or(SimTime::MAX);
         // No silence is significant only after longer.
         let longest_s = MAX_TIMEOUTS * self.timeout_s;
         let mut near = std::mem::take(&mut self.near);
@@ -190,13 +193,13 @@ impl Peers {
 
     /// Whether a peer is heard without a relay.
     pub(crate) fn is_direct(&self, peer: DroneId, now: SimTime) -> bool {
-        self.get(peer).is_some_and(|known| known.is_direct(now))
+        self.get(peer).is_some_and(|known| known.is_direct(now, self.timeout_s))
     }
 
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
         let near = self.near.iter().filter_map(|&id| Some((id, self.get(id)?)));
-        near.filter(move |(_, known)| known.is_direct(now)).map(|(id, known)| (id, &known.pose))
+        near.filter(move |(_, known)| known.is_direct(now, self.timeout_s)).map(|(id, known)| (id, &known.pose))
     }
 
     /// What drone `me` says in [`Pose::hears`].
@@ -252,19 +255,21 @@ impl Peers {
     #[must_use]
     pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {
         let all = self.all_live(now);
-        self.get(peer).filter(|known| all || known.lives(now)).map(|known| &known.pose)
+        self.get(peer).filter(|known| all || known.lives(now, self.timeout_s)).map(|known| &known.pose)
     }
 
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
         let all = self.all_live(now);
-        self.known().filter(move |(_, known)| all || known.lives(now)).map(|(id, known)| (id, &known.pose))
+        self.known()
+            .filter(move |(_, known)| all || known.lives(now, self.timeout_s))
+            .map(|(id, known)| (id, &known.pose))
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
         let some = if self.all_live(now) { 0 } else { self.ids.len() };
-        let silent = self.known().take(some).filter(move |(_, known)| !known.lives(now));
+        let silent = self.known().take(some).filter(move |(_, known)| !known.lives(now, self.timeout_s));
         silent.map(|(id, known)| (id, &known.pose))
     }
 
@@ -294,25 +299,23 @@ impl Peers {
     /// If there is no such peer.
     #[must_use]
     pub fn is_living_at(&self, index: usize, now: SimTime) -> bool {
-        self.all_live(now) || self.last[index].lives(now)
+        self.all_live(now) || self.last[index].lives(now, self.timeout_s)
     }
 
     /// How old the last beacons of the living peers are, s, by id.
     pub fn ages_s(&self, now: SimTime) -> impl Iterator<Item = f64> {
         let all = self.all_live(now);
-        let living = self.stamps.iter().enumerate().filter(move |(index, _)| all || self.last[*index].lives(now));
+        let living = self
+            .stamps
+            .iter()
+            .enumerate()
+            .filter(move |(index, _)| all || self.last[*index].lives(now, self.timeout_s));
         living.map(move |(_, stamp)| now.since(*stamp))
     }
 
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
         self.ids.iter().copied().zip(&self.last)
     }
-}
-
-/// The longest silence of a peer that is not yet significant, s: never more than [`MAX_TIMEOUTS`], however rarely it was heard, because a
-/// dead drone must not count for long.
-fn patience_s(timeout: &AdaptiveTimeout, base_s: f64) -> f64 {
-    timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
 }
 
 /// A hash of a set of drones, whatever their order; never 0.
@@ -377,7 +380,7 @@ mod tests {
             }
             let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
-            let lives = |id: &u32| peers.known().any(|(known, peer)| known.0 == *id && peer.lives(now));
+            let lives = |id: &u32| peers.known().any(|(known, peer)| known.0 == *id && peer.lives(now, 1.0));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, pose)| now.since(pose.stamp)).collect();
             assert_eq!(peers.ages_s(now).collect::<Vec<_>>(), ages);

@@ -24,6 +24,13 @@ struct Told {
     covered: SimTime,
 }
 
+impl Told {
+    /// News that was not said yet.
+    fn new(drone: DroneId, newest: &Pose) -> Self {
+        Self { drone, left: NEWS_TIMES, news: news(newest), covered: SimTime::ZERO }
+    }
+}
+
 impl OfDrone for Told {
     fn drone(&self) -> DroneId {
         self.drone
@@ -37,7 +44,11 @@ pub(crate) struct Presences {
     repeat_s: f64,
     /// A state without news is passed on again after this long, s.
     period_s: f64,
+    /// Whether it passes states on. Otherwise it keeps none.
+    open: bool,
     told: Roster<Told>,
+    /// Number of drones ever heard of.
+    known: usize,
     /// When a drone was last heard of for the first time.
     last_new: SimTime,
     /// When this drone speaks next.
@@ -50,7 +61,7 @@ impl Presences {
         let (me, start) = (params.me, params.start);
         let repeat_s = params.repeat_period_s;
         let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
-        Self { me, repeat_s, period_s, told: Roster::default(), last_new: start, turn: start }
+        Self { me, repeat_s, period_s, open: false, told: Roster::default(), known: 0, last_new: start, turn: start }
     }
 
     /// When a drone was last heard of for the first time.
@@ -58,18 +69,24 @@ impl Presences {
         self.last_new
     }
 
+    /// Starts or stops to pass states on.
+    pub(crate) fn set_open(&mut self, k: &Knowledge, open: bool) {
+        if std::mem::replace(&mut self.open, open) != open {
+            let known = k.peers().all().filter(|_| open);
+            self.told = known.map(|(drone, pose)| Told::new(drone, pose)).collect();
+        }
+    }
+
     /// Notes that a drone's state was heard. `near`: the state in a message of a drone close to this one.
     pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, near: Option<&Pose>) {
-        let Some(newest) = k.peers().last(drone) else { return };
+        let known = k.peers().stamps().len();
+        if known > self.known {
+            (self.known, self.last_new) = (known, now);
+        }
+        let Some(newest) = k.peers().last(drone).filter(|_| self.open) else { return };
         let period_s = self.period_s;
-        let new = Told { drone, left: NEWS_TIMES, news: news(newest), covered: SimTime::ZERO };
-        let told = match self.told.get_mut(drone) {
-            Some(told) => told,
-            None => {
-                self.last_new = now;
-                self.told.add(new)
-            }
-        };
+        let new = Told::new(drone, newest);
+        let told = self.told.add(new);
         if told.news != new.news {
             *told = new;
         }

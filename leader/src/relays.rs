@@ -122,6 +122,7 @@ impl Relays {
         let patience_s = WIDE_S.max(3.0 * beacon_s) + 2.0 * k.peers().delay_s();
         let first = !k.election().obeyed().is_some();
         self.wide = self.differs.is_some_and(|since| first || now.since(since) >= patience_s);
+        self.presences.set_open(k, self.wide);
         self.beats.forget(now);
         if !self.wide {
             self.facts.clear();

@@ -13,6 +13,10 @@ const SHIFT: f64 = 1.0;
 const MOST_FAULTS: usize = 3;
 /// A fault that is added begins within this time, s. Most flights are under way then.
 const FAULT_WITHIN_S: f64 = 60.0;
+/// Greatest error of a broken sensor, in safe distances.
+const ERROR: f64 = 0.1;
+/// Greatest offset of a faulty clock, s.
+const CLOCK_OFFSET_S: f64 = 1.0;
 
 /// A valid scenario that differs a little from `parent`. It depends on the two keys only. `None` if no attempt is valid.
 pub(super) fn neighbour(parent: &Scenario, seed: u64, number: u64) -> Option<Scenario> {
@@ -89,14 +93,34 @@ fn add_fault(scenario: &mut Scenario, rng: &mut SplitMix64) {
     }
     let drone = rng.integer(0, scenario.formation.drones - 1);
     let (at_s, for_s) = (rng.between(0.1, FAULT_WITHIN_S), rng.between(0.5, 20.0));
-    let (kind, for_s) = match rng.integer(0, 4) {
+    let (kind, for_s) = match rng.integer(0, 7) {
         0 => (FaultKind::Kill, None),
         1 => (FaultKind::Freeze, Some(for_s)),
         2 => (FaultKind::Restart, Some(for_s)),
         3 => (FaultKind::Deaf, Some(for_s)),
-        _ => (FaultKind::Mute, Some(for_s)),
+        4 => (FaultKind::Mute, Some(for_s)),
+        5 => (FaultKind::Ranging, Some(for_s)),
+        6 => (FaultKind::Gnss, Some(for_s)),
+        _ => (FaultKind::Clock, Some(for_s)),
     };
-    scenario.fault_plan.push(Fault::of_drone(kind, drone, at_s, for_s));
+    let mut fault = Fault::of_drone(kind, drone, at_s, for_s);
+    mislead(&mut fault, rng, ERROR * scenario.drone.safe_distance_m);
+    scenario.fault_plan.push(fault);
+}
+
+/// Draws the errors of a sensor's or a clock's fault. Distances are wrong by up to `by_m`, m.
+fn mislead(fault: &mut Fault, rng: &mut SplitMix64, by_m: f64) {
+    match fault.kind {
+        FaultKind::Ranging => {
+            fault.ranging_std_m = Some(rng.between(0.0, 0.5 * by_m));
+            fault.ranging_outlier_share = Some(rng.between(0.0, 0.3));
+            fault.ranging_outlier_m = Some(rng.between(0.0, by_m));
+            fault.ranging_dropout_share = Some(rng.between(0.0, 0.5));
+        }
+        FaultKind::Gnss => fault.position_bias_m = Some([0, 1].map(|_| rng.between(-0.5 * by_m, 0.5 * by_m))),
+        FaultKind::Clock => fault.clock_offset_s = Some(rng.between(-CLOCK_OFFSET_S, CLOCK_OFFSET_S)),
+        _ => {}
+    }
 }
 
 fn shift(obstacle: &mut Obstacle, rng: &mut SplitMix64, by_m: f64) {
