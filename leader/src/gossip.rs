@@ -126,6 +126,27 @@ mod tests {
     }
 
     #[test]
+    fn a_fact_that_is_looked_at_in_its_turns_only_is_said_as_often() {
+        let gossip = Gossip::varying(SimTime::ZERO, 0.2, DroneId(3));
+        let (mut each_tick, mut in_turns) = (gossip, gossip);
+        let mut said = [Vec::new(), Vec::new()];
+        for tick in 0..2000 {
+            let now = SimTime::from_secs(0.02 * f64::from(tick));
+            // Two others say it in some intervals.
+            if tick % 300 < 2 {
+                each_tick.hear();
+                in_turns.hear();
+            }
+            said[0].extend(each_tick.is_due(now).then_some(tick));
+            if in_turns.next_turn() <= now {
+                said[1].extend(in_turns.is_due(now).then_some(tick));
+            }
+        }
+        assert!(said[0].len() > 10, "{said:?}");
+        assert_eq!(said[0], said[1]);
+    }
+
+    #[test]
     fn after_a_restart_the_shortest_interval_comes_first() {
         let mut gossip = Gossip::new(SimTime::ZERO, 0.2, DroneId(2));
         says(&mut gossip, 0.0, 30.0);

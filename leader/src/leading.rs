@@ -248,11 +248,14 @@ impl Leading {
         for present in presence.present().iter().filter(|present| present.drone != me && present.drone.0 < self.drones)
         {
             let drone = present.drone;
-            let known = self.knowledge.peers().stamp_of(drone).filter(|known| *known >= present.stamp);
-            if known == Some(present.stamp) && near {
-                self.relays.hear_newest(now, drone);
+            let known = self.knowledge.peers().stamp_of(drone);
+            if known == Some(present.stamp) {
+                if near {
+                    self.relays.hear_newest(now, drone);
+                }
+                continue;
             }
-            if known == Some(present.stamp) || (known.is_some() && !near) {
+            if known > Some(present.stamp) && !near {
                 continue;
             }
             let pose = presence.pose(present);

@@ -28,8 +28,7 @@ const ALTITUDE_M: f64 = 50.0;
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
 const BEACON_SHARE: f64 = 0.25;
-
-/// Share of the bandwidth that what drones pass on may take. No unit.
+/// Greatest share of the bandwidth that plans, assignments and states take that drones pass on.
 const RELAY_SHARE: f64 = 0.5;
 /// Longest time between two statements of separating lines, s.
 const SEPARATION_PERIOD_MAX_S: f64 = 2.0;
