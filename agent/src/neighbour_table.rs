@@ -7,6 +7,7 @@ use skein_leader::peers::{Peers, extrapolated};
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
+use std::ops::Range;
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +67,20 @@ impl NeighbourTable {
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         self.distant.advance(senses.now, senses.position());
-        for index in 0..self.distant.follow(view.peers.stamps()) {
+        let stamps = view.peers.stamps();
+        for block in 0..self.distant.follow(stamps) {
+            if let Some(indices) = self.distant.open(block, stamps, view.peers.changes()) {
+                self.update_heard(view, indices, (reach_m, least_m));
+                self.distant.close(block);
+            }
+        }
+    }
+
+    /// Adds the neighbours that are known by beacon alone, of the peers at these indices of [`Peers::stamps`]. `reach_m` and
+    /// `least_m`: how far and how near they may be, m.
+    fn update_heard(&mut self, view: &NeighbourView<'_>, indices: Range<usize>, (reach_m, least_m): (f64, f64)) {
+        let senses = view.senses;
+        for index in indices {
             if self.distant.is_out_of_reach(index) || !view.peers.is_living_at(index, view.now) {
                 continue;
             }

@@ -11,6 +11,7 @@ use crate::knowledge::Knowledge;
 use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::membership::Membership;
+use crate::news::News;
 use crate::obstacles::Obstacles;
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
@@ -208,10 +209,11 @@ impl Leading {
                 if self.knowledge.is_back(now, source, pose) {
                     self.broadcaster.restart_gossip(now);
                 }
+                let before = self.news_of(source);
                 if self.knowledge.hear_pose(now, source, pose) {
                     self.roles.note_plan_conflict();
                 }
-                self.relays.hear_state(&self.knowledge, now, source, None);
+                self.relays.hear_state(&self.knowledge, now, source, before, None);
             }
             MessageRef::Obstacle(o) => {
                 self.knowledge.learn(now, o.id, o.shape, o.witness);
@@ -241,6 +243,12 @@ impl Leading {
         }
     }
 
+    /// What this drone knows of another one, if it would pass it on.
+    fn news_of(&self, drone: DroneId) -> Option<News> {
+        let wide = self.relays.is_wide();
+        self.peers().last(drone).filter(|_| wide).map(News::of)
+    }
+
     /// Hears of drones that `source` has heard of. Most of it is known: several drones pass the same states on.
     fn hear_presence(&mut self, now: SimTime, source: DroneId, presence: &Presence) {
         let me = self.knowledge.me();
@@ -259,10 +267,11 @@ impl Leading {
                 continue;
             }
             let pose = presence.pose(present);
+            let before = self.news_of(drone);
             if self.knowledge.hear_of(now, drone, pose) {
                 self.roles.note_plan_conflict();
             }
-            self.relays.hear_state(&self.knowledge, now, drone, Some((source, &pose)));
+            self.relays.hear_state(&self.knowledge, now, drone, before, Some((source, &pose)));
         }
     }
 

@@ -1,6 +1,7 @@
 //! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
+use crate::changes::Changes;
 use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
@@ -62,8 +63,10 @@ pub struct Peers {
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
-    /// The time stamp of the last beacon of each of them, in the same order. Each tick reads all of them.
+    /// The time stamp of the last beacon of each of them, in the same order.
     stamps: Vec<SimTime>,
+    /// Of these time stamps.
+    changes: Changes,
     /// What is known of each of them, in the same order.
     last: Vec<Peer>,
     /// Those that were heard without a relay, ascending: all that may still count as heard so, and some that no longer do. In a wide
@@ -84,6 +87,7 @@ impl Peers {
             next_look: SimTime::ZERO,
             ids: Vec::new(),
             stamps: Vec::new(),
+            changes: Changes::default(),
             last: Vec::new(),
             near: Vec::new(),
         }
@@ -122,6 +126,7 @@ impl Peers {
                 self.ids.insert(place, source);
                 self.stamps.insert(place, pose.stamp);
                 self.last.insert(place, peer);
+                self.changes.note_from(place, self.ids.len());
             }
             Ok(place) if pose.stamp > self.stamps[place] => {
                 let prior = self.prior(now, false);
@@ -134,6 +139,7 @@ impl Peers {
                 peer.direct = direct.unwrap_or(peer.direct);
                 peer.timeout.hear(now, 0.0, longest_s);
                 self.stamps[place] = pose.stamp;
+                self.changes.note(place);
                 self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 if direct.is_some() {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
@@ -223,6 +229,7 @@ impl Peers {
             self.ids.remove(place);
             self.stamps.remove(place);
             self.last.remove(place);
+            self.changes.note_from(place, self.ids.len());
             self.near.retain(|near| *near != peer);
         }
     }
@@ -277,6 +284,12 @@ impl Peers {
     #[must_use]
     pub fn stamps(&self) -> &[SimTime] {
         &self.stamps
+    }
+
+    /// The changes of [`Self::stamps`].
+    #[must_use]
+    pub fn changes(&self) -> &Changes {
+        &self.changes
     }
 
     /// All peers ever heard, by id, with their last beacons.

@@ -1,6 +1,7 @@
 //! The states of drones that a drone passes on, several in a frame. See [`crate::relays`].
 
 use crate::knowledge::Knowledge;
+use crate::news::News;
 use crate::params::LeadingParams;
 use crate::roster::{OfDrone, Roster};
 use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS, STATES_PER_S};
@@ -18,16 +19,14 @@ struct Told {
     drone: DroneId,
     /// How often the news is said at once.
     left: u32,
-    /// A hash of what the drone obeys, and of its flags.
-    news: u64,
     /// When the neighbourhood last heard of it, as far as this drone knows.
     covered: SimTime,
 }
 
 impl Told {
     /// News that was not said yet.
-    fn new(drone: DroneId, newest: &Pose) -> Self {
-        Self { drone, left: NEWS_TIMES, news: news(newest), covered: SimTime::ZERO }
+    fn new(drone: DroneId) -> Self {
+        Self { drone, left: NEWS_TIMES, covered: SimTime::ZERO }
     }
 }
 
@@ -73,26 +72,28 @@ impl Presences {
     pub(crate) fn set_open(&mut self, k: &Knowledge, open: bool) {
         if std::mem::replace(&mut self.open, open) != open {
             let known = k.peers().all().filter(|_| open);
-            self.told = known.map(|(drone, pose)| Told::new(drone, pose)).collect();
+            self.told = known.map(|(drone, _)| Told::new(drone)).collect();
         }
     }
 
-    /// Notes that a drone's state was heard. `near`: the state in a message of a drone close to this one.
-    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, near: Option<&Pose>) {
+    /// Notes that a drone's state was heard. `has_news`: it differs from the one before by [`News`]. `near`: the state in a message of
+    /// a drone close to this one.
+    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, has_news: bool, near: Option<&Pose>) {
         let known = k.peers().stamps().len();
         if known > self.known {
             (self.known, self.last_new) = (known, now);
         }
-        let Some(newest) = k.peers().last(drone).filter(|_| self.open) else { return };
-        let period_s = self.period_s;
-        let new = Told::new(drone, newest);
-        let told = self.told.add(new);
-        if told.news != new.news {
-            *told = new;
+        if !self.open || !(has_news || near.is_some()) {
+            return;
+        }
+        let Some(newest) = k.peers().last(drone) else { return };
+        let told = self.told.add(Told::new(drone));
+        if has_news {
+            *told = Told::new(drone);
         }
         if let Some(pose) = near
-            && told.news == news(pose)
-            && newest.stamp.since(pose.stamp) < period_s
+            && News::of(pose) == News::of(newest)
+            && newest.stamp.since(pose.stamp) < self.period_s
         {
             told.covered = now;
             told.left = told.left.saturating_sub(1);
@@ -117,8 +118,9 @@ impl Presences {
         for told in self.told.iter() {
             let id = told.drone;
             let stale = now.since(told.covered) >= period_s;
-            let pose = k.peers().last_of_living(id, now).filter(|_| told.left > 0 || stale);
-            if let Some(pose) = pose {
+            if (told.left > 0 || stale)
+                && let Some(pose) = k.peers().last_of_living(id, now)
+            {
                 due.entry((pose.obeyed, pose.group, pose.term)).or_default().push((
                     NEWS_TIMES - told.left.min(NEWS_TIMES),
                     told.covered,
@@ -148,15 +150,6 @@ impl Presences {
             }
         }
     }
-}
-
-/// A hash of what must be passed on at once if it changes.
-fn news(pose: &Pose) -> u64 {
-    let ballot = |ballot: Ballot| [ballot.round, ballot.incarnation, ballot.claimant.0];
-    let ([a, b, c], [d, e, f]) = (ballot(pose.obeyed.ballot), ballot(pose.term));
-    let group: [u32; 2] = bytemuck::cast(pose.group.0);
-    let words = [a, b, c, pose.obeyed.epoch, d, e, f, group[0], group[1], pose.flags, pose.incarnation];
-    Digest::of(bytemuck::cast_slice(&words))
 }
 
 /// A beacon as it is passed on.

@@ -6,6 +6,7 @@ use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
+use skein_protocol::ids::GROUP_DEPTH;
 use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +17,7 @@ enum Subject {
     /// The plan for this group.
     Plan(GroupId),
     /// The assignment of this drone in a plan for this group.
-    Part(GroupId, DroneId),
+    Part(DroneId, GroupId),
     /// The arrivals of this drone, of this kind.
     Arrivals(u32, DroneId),
     /// What this drone has passed.
@@ -40,6 +41,16 @@ enum Fact {
     Passed(Box<Passed>),
 }
 
+/// Whether some drone needs a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Need {
+    Now,
+    /// None needs it now, but time alone can change that.
+    Later,
+    /// None needs it, unless what the drone obeys changes.
+    Over,
+}
+
 /// A message that may be passed on.
 #[derive(Clone, Debug, PartialEq)]
 struct Relayed {
@@ -50,7 +61,7 @@ struct Relayed {
     /// When it was last heard.
     heard: SimTime,
     gossip: Gossip,
-    /// When it is looked at next; `None` if it need not be passed on again.
+    /// When it is looked at next; `None` if it need not be passed on again, unless [`RelayedFacts::wake`] is called.
     turn: Option<SimTime>,
 }
 
@@ -108,6 +119,18 @@ impl RelayedFacts {
         self.known.insert(subject, Relayed { fact, version, from: source, heard: now, gossip, turn: Some(turn) });
     }
 
+    /// Notes that what a drone obeys has changed: it may need its assignments again.
+    pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
+        let groups = GroupId::ALL..=GroupId([u8::MAX; GROUP_DEPTH]);
+        let subjects = Subject::Part(drone, *groups.start())..=Subject::Part(drone, *groups.end());
+        for (&subject, one) in self.known.range_mut(subjects).filter(|(_, one)| one.turn.is_none()) {
+            one.gossip.restart(now);
+            let turn = one.gossip.next_turn();
+            one.turn = Some(turn);
+            self.turns.insert((turn, subject));
+        }
+    }
+
     /// Says what is due, until `last` messages are said. This drone is at `position`, world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
         while say.len() < last
@@ -116,11 +139,11 @@ impl RelayedFacts {
         {
             self.turns.pop_first();
             let Some(one) = self.known.get_mut(&subject) else { continue };
-            let wanted = is_wanted(k, now, subject, one);
-            if wanted && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
+            let need = need(k, now, subject, one);
+            if need == Need::Now && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
                 say.push(one.passed_on());
             }
-            one.turn = one.next_look(now, wanted, self.repeat_s);
+            one.turn = one.next_look(now, need, self.repeat_s);
             self.turns.extend(one.turn.map(|turn| (turn, subject)));
         }
     }
@@ -128,12 +151,13 @@ impl RelayedFacts {
 
 impl Relayed {
     /// When the message is looked at again after a look at `now`.
-    fn next_look(&self, now: SimTime, wanted: bool, repeat_s: f64) -> Option<SimTime> {
-        match &self.fact {
-            Fact::Arrivals(_) | Fact::Passed(_) if !self.gossip.is_first() => None,
-            Fact::Plan(_) if !wanted => Some(now.after(repeat_s)),
-            _ if !wanted => Some(now.after(repeat_s * UNWANTED_REPEATS)),
-            _ => Some(self.gossip.next_turn().max(SimTime(now.0 + 1))),
+    fn next_look(&self, now: SimTime, need: Need, repeat_s: f64) -> Option<SimTime> {
+        match (&self.fact, need) {
+            (Fact::Arrivals(_) | Fact::Passed(_), _) if !self.gossip.is_first() => None,
+            (_, Need::Over) => None,
+            (Fact::Plan(_), Need::Later) => Some(now.after(repeat_s)),
+            (_, Need::Later) => Some(now.after(repeat_s * UNWANTED_REPEATS)),
+            (_, Need::Now) => Some(self.gossip.next_turn().max(SimTime(now.0 + 1))),
         }
     }
 
@@ -160,7 +184,7 @@ fn subject(source: DroneId, message: MessageRef<'_>) -> Option<(Subject, Version
         }
         MessageRef::Assignment(part) => {
             let version = Version { ballot: part.id.ballot, epoch: part.id.epoch, ..Version::default() };
-            (Subject::Part(part.scope, part.drone), version)
+            (Subject::Part(part.drone, part.scope), version)
         }
         MessageRef::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), at(row.stamp)),
         MessageRef::Passed(passed) => (Subject::Passed(passed.drone(source)), at(passed.stamp)),
@@ -185,14 +209,16 @@ fn is_same_passage(known: &Fact, heard: MessageRef<'_>) -> bool {
 }
 
 /// Whether some drone may still need the message.
-fn is_wanted(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> bool {
+fn need(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> Need {
+    let now_or_later = |wanted| if wanted { Need::Now } else { Need::Later };
     match (subject, &one.fact) {
-        (Subject::Plan(scope), Fact::Plan(plan)) => is_plan_wanted(k, now, scope, plan),
-        (Subject::Part(..), Fact::Part(part)) => {
-            let Some(pose) = k.peers().last_of_living(part.drone, now) else { return one.gossip.is_first() };
-            is_late(pose, part.id.ballot, part.id.epoch)
-        }
-        _ => one.gossip.is_first(),
+        (Subject::Plan(scope), Fact::Plan(plan)) => now_or_later(is_plan_wanted(k, now, scope, plan)),
+        (Subject::Part(..), Fact::Part(part)) => match k.peers().last_of_living(part.drone, now) {
+            Some(pose) if is_late(pose, part.id.ballot, part.id.epoch) => Need::Now,
+            Some(_) => Need::Over,
+            None => now_or_later(one.gossip.is_first()),
+        },
+        _ => now_or_later(one.gossip.is_first()),
     }
 }
 

@@ -13,6 +13,7 @@
 
 use crate::beats::Beats;
 use crate::knowledge::Knowledge;
+use crate::news::News;
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::presences::Presences;
@@ -132,10 +133,21 @@ impl Relays {
         }
     }
 
-    /// Notes that a drone's state was heard: from itself, or in a message of `relay`.
-    pub(crate) fn hear_state(&mut self, k: &Knowledge, now: SimTime, drone: DroneId, relay: Option<(DroneId, &Pose)>) {
+    /// Notes that a drone's state was heard: from itself, or in a message of `relay`. `before`: what was known of it.
+    pub(crate) fn hear_state(
+        &mut self,
+        k: &Knowledge,
+        now: SimTime,
+        drone: DroneId,
+        before: Option<News>,
+        relay: Option<(DroneId, &Pose)>,
+    ) {
         let near = relay.filter(|(relay, _)| self.is_near(k, *relay)).map(|(_, pose)| pose);
-        self.presences.hear(k, now, drone, near);
+        let has_news = self.wide && k.peers().last(drone).map(News::of) != before;
+        self.presences.hear(k, now, drone, has_news, near);
+        if has_news {
+            self.facts.wake(now, drone);
+        }
     }
 
     /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
