@@ -6,10 +6,10 @@ use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
-use skein_protocol::ids::GROUP_DEPTH;
 use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
 
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,7 +17,7 @@ enum Subject {
     /// The plan for this group.
     Plan(GroupId),
     /// The assignment of this drone in a plan for this group.
-    Part(DroneId, GroupId),
+    Part(GroupId, DroneId),
     /// The arrivals of this drone, of this kind.
     Arrivals(u32, DroneId),
     /// What this drone has passed.
@@ -121,13 +121,15 @@ impl RelayedFacts {
 
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
-        let groups = GroupId::ALL..=GroupId([u8::MAX; GROUP_DEPTH]);
-        let subjects = Subject::Part(drone, *groups.start())..=Subject::Part(drone, *groups.end());
-        for (&subject, one) in self.known.range_mut(subjects).filter(|(_, one)| one.turn.is_none()) {
-            one.gossip.restart(now);
-            let turn = one.gossip.next_turn();
-            one.turn = Some(turn);
-            self.turns.insert((turn, subject));
+        let turn = Gossip::varying(now, self.repeat_s, self.me).next_turn();
+        let mut after = Bound::Included(Subject::Part(GroupId::ALL, DroneId(0)));
+        while let Some((&Subject::Part(scope, _), _)) = self.known.range((after, Bound::Unbounded)).next() {
+            let subject = Subject::Part(scope, drone);
+            if let Some(one) = self.known.get_mut(&subject).filter(|one| one.turn.is_none()) {
+                one.turn = Some(turn);
+                self.turns.insert((turn, subject));
+            }
+            after = Bound::Excluded(Subject::Part(scope, DroneId(u32::MAX)));
         }
     }
 
@@ -184,7 +186,7 @@ fn subject(source: DroneId, message: MessageRef<'_>) -> Option<(Subject, Version
         }
         MessageRef::Assignment(part) => {
             let version = Version { ballot: part.id.ballot, epoch: part.id.epoch, ..Version::default() };
-            (Subject::Part(part.drone, part.scope), version)
+            (Subject::Part(part.scope, part.drone), version)
         }
         MessageRef::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), at(row.stamp)),
         MessageRef::Passed(passed) => (Subject::Passed(passed.drone(source)), at(passed.stamp)),
@@ -215,6 +217,8 @@ fn need(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> Need {
         (Subject::Plan(scope), Fact::Plan(plan)) => now_or_later(is_plan_wanted(k, now, scope, plan)),
         (Subject::Part(..), Fact::Part(part)) => match k.peers().last_of_living(part.drone, now) {
             Some(pose) if is_late(pose, part.id.ballot, part.id.epoch) => Need::Now,
+            // Unless it was said, it is said once if the drone falls silent.
+            Some(_) if one.gossip.is_first() => Need::Later,
             Some(_) => Need::Over,
             None => now_or_later(one.gossip.is_first()),
         },
