@@ -67,8 +67,8 @@ pub struct PilotParams {
     pub separation_period_s: f64,
     /// Time between two repetitions of a message that has to be repeated, s.
     pub repeat_period_s: f64,
-    /// What a drone may pass on for others on average, bytes/s; infinite if bandwidth is no limit.
-    pub relay_bytes_per_s: f64,
+    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
+    pub bandwidth_bytes_per_s: f64,
     /// Silence after which a peer counts as gone, s.
     pub peer_timeout_s: f64,
 }
@@ -87,7 +87,7 @@ impl PilotParams {
             planner: self.planner.clone(),
             beacon_period_s: self.beacon_period_s,
             repeat_period_s: self.repeat_period_s,
-            relay_bytes_per_s: self.relay_bytes_per_s,
+            bandwidth_bytes_per_s: self.bandwidth_bytes_per_s,
             peer_timeout_s: self.peer_timeout_s,
         }
     }

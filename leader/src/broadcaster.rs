@@ -8,7 +8,7 @@ use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use crate::relays::Relays;
 use crate::tuning::FAR_REPEATS;
-use skein_protocol::payload::{MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
+use skein_protocol::payload::{Assignment, MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
 
@@ -18,6 +18,8 @@ pub(crate) struct Broadcaster {
     beacon_s: f64,
     beacon_ticks: u64,
     repeat_s: f64,
+    /// Time that one assignment takes in a leader's share of the bandwidth, s.
+    part_s: f64,
     /// When each known obstacle is said again.
     obstacles: BTreeMap<ObstacleId, Gossip>,
     /// When the passed sets are said again.
@@ -52,6 +54,7 @@ impl Broadcaster {
             beacon_s: params.beacon_period_s,
             beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
             repeat_s,
+            part_s: params.leader_pause_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
             passed: Gossip::new(params.start, repeat_s, params.me),
             term: Ballot::NONE,
@@ -100,7 +103,10 @@ impl Broadcaster {
         }
         // Plans come first. Where bandwidth is short, the first frames of a tick are those that are transmitted.
         if self.repeat_due(now) && k.election().leads() {
+            let first = say.len();
             self.say_plans(k, now, say);
+            let pause_s = (say.len() - first) as f64 * self.part_s;
+            self.next_repeat = self.next_repeat.max(now.after(pause_s));
         }
         self.say_obstacles(k, now, relays.is_wide(), say);
         if self.passed.is_due(now) {

@@ -7,7 +7,7 @@
 use crate::candidates::{candidates, shortest_and_rule};
 use crate::grouping::{Grouping, arrival_table, ranks};
 use crate::obstacles::set_ids;
-use crate::params::Strategy;
+use crate::params::{LeadingParams, Strategy};
 use crate::plan_bundle::PlanBundle;
 use crate::plan_exchange::{self, PlanExchange, arrivals_s};
 use crate::set_place::SetPlace;
@@ -49,9 +49,10 @@ struct AwaitedChoice {
 }
 
 impl JointPlanner {
-    /// Nothing heard, in a swarm of `drones`. Questions are repeated every `repeat_s`.
-    pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
-        Self { exchange: PlanExchange::new(drones, repeat_s), awaited: None }
+    /// Nothing heard.
+    pub(crate) fn new(params: &LeadingParams) -> Self {
+        let row_s = params.leader_pause_s(size_of::<Arrivals>());
+        Self { exchange: PlanExchange::new(params.drones, params.repeat_period_s, row_s), awaited: None }
     }
 
     /// Hears when a drone of another group can be where.
@@ -66,7 +67,9 @@ impl JointPlanner {
         if let Some(planned) = asked.and_then(|tag| s.ledger.sets().iter().find(|p| p.tag == tag))
             && let Some(survey) = Survey::new(s, &planned.ids)
         {
-            say.extend(survey.rows(s, planned.tag));
+            let rows = survey.rows(s, planned.tag);
+            self.exchange.note_said(s.now, rows.len());
+            say.extend(rows);
         }
         self.exchange.repeat(s.now, say);
     }

@@ -52,7 +52,7 @@ impl Leading {
             knowledge: Knowledge::new(params),
             roles: Roles::default(),
             membership: Membership::default(),
-            planner: Planner::new(params.drones, params.repeat_period_s),
+            planner: Planner::new(params),
             broadcaster: Broadcaster::new(params),
             relays: Relays::new(params),
             leader_timeout_s: params.election.leader_timeout_s,

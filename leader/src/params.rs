@@ -3,7 +3,9 @@
 use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
+use crate::tuning::LEADER_SHARE;
 use skein_protocol::formation::Shape;
+use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
 
 /// How a leader chooses among the groupings of its members.
@@ -146,8 +148,15 @@ pub struct LeadingParams {
     pub beacon_period_s: f64,
     /// Period of repetitions, s.
     pub repeat_period_s: f64,
-    /// What a drone may pass on for others on average, bytes/s; infinite if bandwidth is no limit.
-    pub relay_bytes_per_s: f64,
+    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
+    pub bandwidth_bytes_per_s: f64,
     /// A peer that is silent for longer counts as gone, s. Longer on a bad link.
     pub peer_timeout_s: f64,
+}
+
+impl LeadingParams {
+    /// Time that a message with a payload of this size takes in one leader's share of the bandwidth, s; 0 if bandwidth is no limit.
+    pub(crate) fn leader_pause_s(&self, bytes: usize) -> f64 {
+        (HEAD_BYTES as f64 + bytes as f64) / (LEADER_SHARE * self.bandwidth_bytes_per_s)
+    }
 }

@@ -29,6 +29,8 @@ struct Question {
 pub(crate) struct PlanExchange {
     drones: u32,
     repeat_s: f64,
+    /// Time that one row takes in a leader's share of the bandwidth, s.
+    row_s: f64,
     heard: BTreeMap<DroneId, Arrivals>,
     /// The rows of a choice that the coordinator made.
     chosen: BTreeMap<DroneId, Arrivals>,
@@ -38,20 +40,25 @@ pub(crate) struct PlanExchange {
     asked: Option<u32>,
     /// When this drone may answer again.
     next_answer: SimTime,
+    /// When this drone's share of the bandwidth allows further rows.
+    next_rows: SimTime,
 }
 
 impl PlanExchange {
-    /// Nothing heard, in a swarm of `drones`. Repetitions are `repeat_s` apart.
-    pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
+    /// Nothing heard, in a swarm of `drones`. Repetitions are `repeat_s` apart, or longer: a row takes `row_s` of a leader's share of
+    /// the bandwidth.
+    pub(crate) fn new(drones: u32, repeat_s: f64, row_s: f64) -> Self {
         Self {
             drones,
             repeat_s,
+            row_s,
             heard: BTreeMap::new(),
             chosen: BTreeMap::new(),
             announced: None,
             question: None,
             asked: None,
             next_answer: SimTime::ZERO,
+            next_rows: SimTime::ZERO,
         }
     }
 
@@ -89,8 +96,9 @@ impl PlanExchange {
             Some(question) if question.set == set => question,
             other => other.insert(Question { set, since: now, next_said: now, rows: rows() }),
         };
-        if now >= question.next_said {
+        if now >= question.next_said.max(self.next_rows) {
             question.next_said = now.after(self.repeat_s);
+            self.next_rows = now.after(question.rows.len() as f64 * self.row_s);
             say.extend(question.rows.iter().map(|row| Arrivals { kind: ArrivalsKind::Query.to_wire(), ..*row }));
         }
     }
@@ -123,7 +131,10 @@ impl PlanExchange {
         if let Some(question) = self.question.take() {
             self.next_answer = now.after(self.repeat_s);
             self.asked = None;
-            say.extend(question.rows);
+            if now >= self.next_rows {
+                self.note_said(now, question.rows.len());
+                say.extend(question.rows);
+            }
         }
     }
 
@@ -135,8 +146,9 @@ impl PlanExchange {
     /// Says the rows of a choice when they are due.
     pub(crate) fn repeat(&mut self, now: SimTime, say: &mut Vec<Arrivals>) {
         let Some(announcement) = self.announced.as_mut().filter(|one| now <= one.until) else { return };
-        if now >= announcement.next_said {
+        if now >= announcement.next_said.max(self.next_rows) {
             announcement.next_said = now.after(self.repeat_s);
+            self.next_rows = now.after(announcement.rows.len() as f64 * self.row_s);
             say.extend(&announcement.rows);
         }
     }
@@ -150,12 +162,17 @@ impl PlanExchange {
 
     /// The set that another leader asked about, if an answer is due. Marks it as answered.
     pub(crate) fn asked(&mut self, now: SimTime) -> Option<u32> {
-        if now < self.next_answer {
+        if now < self.next_answer.max(self.next_rows) {
             return None;
         }
         let set = self.asked.take()?;
         self.next_answer = now.after(self.repeat_s);
         Some(set)
+    }
+
+    /// Notes that this drone says this many rows.
+    pub(crate) fn note_said(&mut self, now: SimTime, rows: usize) {
+        self.next_rows = now.after(rows as f64 * self.row_s);
     }
 }
 
@@ -204,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_table_is_complete_once_every_drone_has_a_row() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         assert_eq!(asking(&mut exchange, 1.0).len(), 1);
         assert!(exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none());
         exchange.hear(at(1.1), &row_of(2, 1.05, 8));
@@ -217,7 +234,7 @@ mod tests {
 
     #[test]
     fn rows_stay_the_same_and_are_repeated_until_the_wait_is_over() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         let first = asking(&mut exchange, 1.0);
         assert!(asking(&mut exchange, 1.1).is_empty());
         assert_eq!(asking(&mut exchange, 1.2), first);
@@ -228,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_late_question_is_answered_but_not_in_every_tick() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         exchange.hear(at(1.0), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.0, 7) });
         assert_eq!(exchange.asked(at(1.0)), Some(7));
         exchange.hear(at(1.1), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.1, 7) });
@@ -237,7 +254,7 @@ mod tests {
 
     #[test]
     fn a_choice_counts_only_from_the_coordinator_and_only_if_it_is_new() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         let choice = |stamp_s| Arrivals {
             kind: ArrivalsKind::Decision.to_wire(),
             gate_s: one_of(1),
@@ -254,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_choice_is_repeated_for_a_while() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         exchange.announce(at(1.0), vec![row_of(2, 1.0, 7)]);
         let mut said = Vec::new();
         for tick in 0..100 {
@@ -271,7 +288,7 @@ mod tests {
 
     #[test]
     fn rows_of_strangers_of_the_future_and_without_a_route_are_ignored() {
-        let mut exchange = PlanExchange::new(4, 0.2);
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         asking(&mut exchange, 1.0);
         exchange.hear(at(1.0), &row_of(9, 0.5, 7));
         exchange.hear(at(1.0), &row_of(2, 1.5, 7));

@@ -5,6 +5,7 @@ use crate::avoidance;
 use crate::formation_planner::FormationPlanner;
 use crate::joint_planner::JointPlanner;
 use crate::onward::OnwardPlanner;
+use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use crate::plan_pace::PlanPace;
 use crate::situation::Situation;
@@ -25,9 +26,9 @@ pub(crate) struct Planner {
 }
 
 impl Planner {
-    /// A planner that has decided nothing yet, in a swarm of `drones`. Questions are repeated every `repeat_s`.
-    pub(crate) fn new(drones: u32, repeat_s: f64) -> Self {
-        let joint = JointPlanner::new(drones, repeat_s);
+    /// A planner that has decided nothing yet.
+    pub(crate) fn new(params: &LeadingParams) -> Self {
+        let joint = JointPlanner::new(params);
         let (formation, onward) = (FormationPlanner::default(), OnwardPlanner::default());
         Self { joint, formation, onward, pace: PlanPace::default(), interim: 0 }
     }

@@ -40,6 +40,7 @@ impl OfDrone for Told {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Presences {
     me: DroneId,
+    drones: u32,
     repeat_s: f64,
     /// A state without news is passed on again after this long, s.
     period_s: f64,
@@ -60,7 +61,18 @@ impl Presences {
         let (me, start) = (params.me, params.start);
         let repeat_s = params.repeat_period_s;
         let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
-        Self { me, repeat_s, period_s, open: false, told: Roster::default(), known: 0, last_new: start, turn: start }
+        let drones = params.drones.max(1);
+        Self {
+            me,
+            drones,
+            repeat_s,
+            period_s,
+            open: false,
+            told: Roster::default(),
+            known: 0,
+            last_new: start,
+            turn: start,
+        }
     }
 
     /// When a drone was last heard of for the first time.
@@ -114,7 +126,10 @@ impl Presences {
             return;
         }
         let period_s = self.period_s;
-        let mut due: BTreeMap<Kind, Vec<(u32, SimTime, DroneId)>> = BTreeMap::new();
+        let mut due: BTreeMap<Kind, Vec<(u32, u32, DroneId)>> = BTreeMap::new();
+        // Drones close to each other begin at different states, so that they do not all say the same at one time.
+        let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
+        let first = (draw % u64::from(self.drones)) as u32;
         for told in self.told.iter() {
             let id = told.drone;
             let stale = now.since(told.covered) >= period_s;
@@ -123,14 +138,13 @@ impl Presences {
             {
                 due.entry((pose.obeyed, pose.group, pose.term)).or_default().push((
                     NEWS_TIMES - told.left.min(NEWS_TIMES),
-                    told.covered,
+                    (id.0 + self.drones - first) % self.drones,
                     id,
                 ));
             }
         }
         let needed: usize = due.values().map(|drones| drones.len().div_ceil(MAX_PRESENT)).sum();
         if needed <= frames {
-            let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
             self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
         }
         let mut left = frames;

@@ -1,34 +1,36 @@
 //! How much a drone may pass on: a token bucket, so that relays leave the channel room for beacons and plans.
 
 use crate::params::LeadingParams;
-use crate::tuning::MAX_RELAYED_PER_TICK;
-use skein_protocol::payload::Presence;
+use crate::tuning::{BEAT_SHARE, MAX_RELAYED_PER_TICK, RELAY_SHARE};
+use skein_protocol::payload::{Leadership, Presence};
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{Message, SimTime};
-
-/// The longest frame that is passed on, bytes.
-const LONGEST: f64 = HEAD_BYTES as f64 + size_of::<Presence>() as f64;
-
-/// The most that a drone saves up, bytes: what it may say in one tick.
-const MOST: f64 = MAX_RELAYED_PER_TICK as f64 * LONGEST;
 
 /// What one drone may pass on now.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RelayPace {
     bytes_per_s: f64,
+    /// The longest frame that is passed on, bytes.
+    longest_bytes: f64,
     credit_bytes: f64,
     /// When it last gained credit.
     last: SimTime,
 }
 
 impl RelayPace {
-    /// With all the credit that it can have.
-    pub(crate) fn new(params: &LeadingParams) -> Self {
-        Self::at(params.start, params.relay_bytes_per_s)
+    /// That of messages of leaders, with all the credit that it can have.
+    pub(crate) fn of_beats(params: &LeadingParams) -> Self {
+        Self::at(params.start, BEAT_SHARE * share_of_drone(params), size_of::<Leadership>())
     }
 
-    fn at(start: SimTime, bytes_per_s: f64) -> Self {
-        Self { bytes_per_s, credit_bytes: MOST, last: start }
+    /// That of all other messages, with all the credit that it can have.
+    pub(crate) fn of_facts(params: &LeadingParams) -> Self {
+        Self::at(params.start, RELAY_SHARE * share_of_drone(params), size_of::<Presence>())
+    }
+
+    fn at(start: SimTime, bytes_per_s: f64, longest_bytes: usize) -> Self {
+        let longest_bytes = HEAD_BYTES as f64 + longest_bytes as f64;
+        Self { bytes_per_s, longest_bytes, credit_bytes: most(longest_bytes), last: start }
     }
 
     /// How many frames it may say now, however long they are.
@@ -36,9 +38,9 @@ impl RelayPace {
         let passed_s = now.since(self.last);
         self.last = now;
         if passed_s > 0.0 {
-            self.credit_bytes = (self.credit_bytes + passed_s * self.bytes_per_s).min(MOST);
+            self.credit_bytes = (self.credit_bytes + passed_s * self.bytes_per_s).min(most(self.longest_bytes));
         }
-        (self.credit_bytes / LONGEST) as usize
+        (self.credit_bytes / self.longest_bytes) as usize
     }
 
     /// Notes what it said.
@@ -50,15 +52,28 @@ impl RelayPace {
     }
 }
 
+/// The most that a drone saves up, bytes: what it may say in one tick.
+fn most(longest_bytes: f64) -> f64 {
+    MAX_RELAYED_PER_TICK as f64 * longest_bytes
+}
+
+/// One drone's equal part of the bandwidth, bytes/s.
+fn share_of_drone(params: &LeadingParams) -> f64 {
+    params.bandwidth_bytes_per_s / f64::from(params.drones.max(1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
     use skein_protocol::payload::Assignment;
 
+    /// The longest frame, bytes.
+    const LONGEST: f64 = HEAD_BYTES as f64 + size_of::<Presence>() as f64;
+
     /// What a drone says in 500 ticks of 20 ms that wants to say this many messages in each.
     fn said(bytes_per_s: f64, wanted: usize, message: Message) -> Vec<usize> {
-        let mut pace = RelayPace::at(SimTime::ZERO, bytes_per_s);
+        let mut pace = RelayPace::at(SimTime::ZERO, bytes_per_s, size_of::<Presence>());
         let tick = |tick: u32| {
             let frames = pace.frames(SimTime::from_secs(0.02 * f64::from(tick))).min(wanted);
             pace.note(&vec![message; frames]);
@@ -81,7 +96,7 @@ mod tests {
         let part = Message::Assignment(Assignment::zeroed());
         let bytes = (HEAD_BYTES + u64::from(part.encode().len)) as f64;
         let total: usize = said(10.0 * LONGEST, usize::MAX, part).iter().sum();
-        let expected = (MOST + 100.0 * LONGEST) / bytes;
+        let expected = (most(LONGEST) + 100.0 * LONGEST) / bytes;
         assert!((total as f64 - expected).abs() < 5.0, "{total}, expected {expected}");
     }
 

@@ -45,6 +45,7 @@ pub(crate) struct Relays {
     /// Whether a neighbour obeys an earlier term than this drone.
     lags: bool,
     pace: RelayPace,
+    beat_pace: RelayPace,
     /// Whether the greater half of what it may say next is for states.
     states_first: bool,
     beats: Beats,
@@ -69,7 +70,8 @@ impl Relays {
             wide: false,
             crowded: false,
             lags: false,
-            pace: RelayPace::new(params),
+            pace: RelayPace::of_facts(params),
+            beat_pace: RelayPace::of_beats(params),
             states_first: false,
             beats: Beats::new(params),
             facts: RelayedFacts::new(params),
@@ -201,11 +203,13 @@ impl Relays {
         }
         // The leaders' messages are few and come first.
         let beats = say.len();
-        self.beats.speak(k, now, MAX_RELAYED_PER_TICK, self.lags, say);
+        let frames = self.beat_pace.frames(now).min(MAX_RELAYED_PER_TICK);
+        self.beats.speak(k, now, frames, self.lags, say);
+        self.beat_pace.note(&say[beats..]);
         let first = say.len();
         let last = first + self.pace.frames(now).min((MAX_RELAYED_PER_TICK + beats).saturating_sub(first));
         // What is said until states show that it was obeyed must leave room for those states.
-        self.states_first = !self.states_first;
+        self.states_first ^= last > first;
         let for_states = if self.states_first { (last - first).div_ceil(2) } else { (last - first) / 2 };
         self.presences.speak(k, now, for_states, say);
         self.facts.speak(k, now, self.position, last, say);

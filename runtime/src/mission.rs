@@ -206,7 +206,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         beacon_period_s: scenario.beacon_period_s(),
         separation_period_s: scenario.separation_period_s(skein_agent::separation::messages(drones(scenario))),
         repeat_period_s: protocol.repeat_period_s,
-        relay_bytes_per_s: scenario.relay_bytes_per_s(),
+        bandwidth_bytes_per_s: scenario.bandwidth_bytes_per_s(),
         peer_timeout_s: protocol.peer_timeout_s,
     }
 }

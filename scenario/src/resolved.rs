@@ -28,8 +28,6 @@ const ALTITUDE_M: f64 = 50.0;
 const BEACON_PERIOD_S: f64 = 0.1;
 /// Greatest share of the bandwidth that the beacons of all drones take by default.
 const BEACON_SHARE: f64 = 0.25;
-/// Greatest share of the bandwidth that plans, assignments and states take that drones pass on.
-const RELAY_SHARE: f64 = 0.5;
 /// Longest time between two statements of separating lines, s.
 const SEPARATION_PERIOD_MAX_S: f64 = 2.0;
 
@@ -265,11 +263,10 @@ impl Scenario {
         least_s.clamp(self.beacon_period_s(), self.beacon_period_s().max(SEPARATION_PERIOD_MAX_S))
     }
 
-    /// What a drone may pass on for others on average, bytes/s: together, all drones pass on half of the bandwidth. Infinite if
-    /// bandwidth is no limit.
+    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
     #[must_use]
-    pub fn relay_bytes_per_s(&self) -> f64 {
-        self.share_bps(RELAY_SHARE) / 8.0 / f64::from(self.formation.drones)
+    pub fn bandwidth_bytes_per_s(&self) -> f64 {
+        self.share_bps(1.0) / 8.0
     }
 
     /// The time in which all drones say one message each, if the messages take a quarter of the bandwidth, s. `bytes`: size of

@@ -75,7 +75,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
         },
         beacon_period_s: p.beacon_s,
         repeat_period_s: p.repeat_s,
-        relay_bytes_per_s: f64::INFINITY,
+        bandwidth_bytes_per_s: f64::INFINITY,
         peer_timeout_s: p.peer_timeout_s,
     }
 }
