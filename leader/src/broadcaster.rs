@@ -7,7 +7,7 @@ use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use crate::relays::Relays;
-use crate::tuning::FAR_REPEATS;
+use crate::tuning::{FAR_REPEATS, UNPACED};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
@@ -54,7 +54,7 @@ impl Broadcaster {
             beacon_s: params.beacon_period_s,
             beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
             repeat_s,
-            part_s: params.leader_pause_s(size_of::<Assignment>()),
+            part_s: params.leader_frame_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
             passed: Gossip::new(params.start, repeat_s, params.me),
             term: Ballot::NONE,
@@ -105,8 +105,8 @@ impl Broadcaster {
         if self.repeat_due(now) && k.election().leads() {
             let first = say.len();
             self.say_plans(k, now, say);
-            let pause_s = (say.len() - first) as f64 * self.part_s;
-            self.next_repeat = self.next_repeat.max(now.after(pause_s));
+            let paced = (say.len() - first).saturating_sub(UNPACED);
+            self.next_repeat = self.next_repeat.max(now.after(paced as f64 * self.part_s));
         }
         self.say_obstacles(k, now, relays.is_wide(), say);
         if self.passed.is_due(now) {

@@ -51,7 +51,7 @@ struct AwaitedChoice {
 impl JointPlanner {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
-        let row_s = params.leader_pause_s(size_of::<Arrivals>());
+        let row_s = params.leader_frame_s(size_of::<Arrivals>());
         Self { exchange: PlanExchange::new(params.drones, params.repeat_period_s, row_s), awaited: None }
     }
 

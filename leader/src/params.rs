@@ -156,7 +156,7 @@ pub struct LeadingParams {
 
 impl LeadingParams {
     /// Time that a message with a payload of this size takes in one leader's share of the bandwidth, s; 0 if bandwidth is no limit.
-    pub(crate) fn leader_pause_s(&self, bytes: usize) -> f64 {
+    pub(crate) fn leader_frame_s(&self, bytes: usize) -> f64 {
         (HEAD_BYTES as f64 + bytes as f64) / (LEADER_SHARE * self.bandwidth_bytes_per_s)
     }
 }

@@ -2,7 +2,7 @@
 //! members. All of them split the same table, and each applies the part about its own members.
 
 use crate::split::NEVER_S;
-use crate::tuning::{ANNOUNCE_S, ARRIVALS_TIMEOUT_S};
+use crate::tuning::{ANNOUNCE_S, ARRIVALS_TIMEOUT_S, UNPACED};
 use skein_protocol::payload::{Arrivals, MAX_ROUTES};
 use skein_protocol::{ArrivalsKind, Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
@@ -98,7 +98,7 @@ impl PlanExchange {
         };
         if now >= question.next_said.max(self.next_rows) {
             question.next_said = now.after(self.repeat_s);
-            self.next_rows = now.after(question.rows.len() as f64 * self.row_s);
+            self.next_rows = now.after(pause_s(question.rows.len(), self.row_s));
             say.extend(question.rows.iter().map(|row| Arrivals { kind: ArrivalsKind::Query.to_wire(), ..*row }));
         }
     }
@@ -148,7 +148,7 @@ impl PlanExchange {
         let Some(announcement) = self.announced.as_mut().filter(|one| now <= one.until) else { return };
         if now >= announcement.next_said.max(self.next_rows) {
             announcement.next_said = now.after(self.repeat_s);
-            self.next_rows = now.after(announcement.rows.len() as f64 * self.row_s);
+            self.next_rows = now.after(pause_s(announcement.rows.len(), self.row_s));
             say.extend(&announcement.rows);
         }
     }
@@ -172,8 +172,13 @@ impl PlanExchange {
 
     /// Notes that this drone says this many rows.
     pub(crate) fn note_said(&mut self, now: SimTime, rows: usize) {
-        self.next_rows = now.after(rows as f64 * self.row_s);
+        self.next_rows = now.after(pause_s(rows, self.row_s));
     }
+}
+
+/// How long a leader says no further rows after this many, s.
+fn pause_s(rows: usize, row_s: f64) -> f64 {
+    rows.saturating_sub(UNPACED) as f64 * row_s
 }
 
 /// A row of the table. `gate_s`: time to the gate along each route, s from `now`.

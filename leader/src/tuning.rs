@@ -118,10 +118,12 @@ pub(crate) const MAX_RELAYED_PER_TICK: usize = 4;
 /// Greatest share of a limited bandwidth that the states, plans, assignments and rows of arrivals take that drones pass on. No unit.
 /// 0.25. Beacons take another quarter. By hand.
 pub(crate) const RELAY_SHARE: f64 = 0.25;
-/// Greatest share of a limited bandwidth that the messages of leaders take that drones pass on. No unit. 0.1. By hand.
-pub(crate) const BEAT_SHARE: f64 = 0.1;
+/// Greatest share of a limited bandwidth that the messages of leaders take that drones pass on. No unit. 0.15. By hand.
+pub(crate) const BEAT_SHARE: f64 = 0.15;
 /// Greatest share of a limited bandwidth that one leader's assignments take, and that its rows of arrivals take. No unit. 0.05. By hand.
 pub(crate) const LEADER_SHARE: f64 = 0.05;
+/// That many assignments or rows of arrivals may be repeated without regard to that share. 32. By hand: small groups need no share.
+pub(crate) const UNPACED: usize = 32;
 /// An assignment is passed on by drones in all directions from this interval on. No unit. 2. By hand.
 pub(crate) const DETOUR_DOUBLINGS: u32 = 2;
 /// A drone's news is passed on this many times at once. 2. By hand.
