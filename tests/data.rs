@@ -97,6 +97,8 @@ fn one_of_each() -> Vec<EventKind> {
             outcome: Outcome::Reached,
             reason: text(),
             stuck: vec![],
+            unfinished: vec![],
+            standstill_s: None,
             totals: Box::new(Totals::default()),
         },
     ]

@@ -68,6 +68,7 @@ pub mod thin_plate;
 pub mod time;
 mod topic;
 mod topic_name;
+mod unfinished;
 mod user_message;
 pub mod wire;
 
@@ -78,6 +79,7 @@ pub use short_text::{ShortText, TEXT_FIELD};
 pub use space::{horizontal, raised};
 pub use time::{SimTime, Tick};
 pub use topic_name::{OWN_TOPIC, TopicName, TopicNameError};
+pub use unfinished::{Lack, UnfinishedDrone};
 pub use user_message::{TooLong, USER_BYTES, UserMessage};
 pub use wire::{ArrivalsKind, LeadershipKind, Phase, flag};
 

@@ -6,6 +6,7 @@ use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::link_faults::LinkFaults;
 use crate::telemetry::TelemetryRow;
 use crate::time::{SimTime, Tick};
+use crate::unfinished::UnfinishedDrone;
 use crate::wire::Phase;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
@@ -131,6 +132,9 @@ impl DroneRow {
         self.flags & ROW_FROZEN != 0
     }
 }
+
+/// The end of a mission names at most this number of drones that are not done.
+pub const UNFINISHED_MAX: usize = 64;
 
 /// How a mission ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -376,6 +380,14 @@ pub enum EventKind {
         /// The drones that have no way to the goal. Empty unless the outcome is [`Outcome::Stuck`].
         #[serde(default)]
         stuck: Vec<DroneId>,
+        /// Drones that kept the mission from its goal when its time was over: the first ones, at most
+        /// [`UNFINISHED_MAX`]. Empty unless the time was over.
+        #[serde(default)]
+        unfinished: Vec<UnfinishedDrone>,
+        /// How long no living drone had moved when the time was over, s; `None` if one had moved just before, and unless the
+        /// time was over.
+        #[serde(default)]
+        standstill_s: Option<f64>,
         /// Counters of the whole mission.
         totals: Box<Totals>,
     },

@@ -11,12 +11,13 @@ use crate::own_metrics::OwnMetrics;
 use crate::stages::Stages;
 use crate::steps::StepTimer;
 use crate::summary::{
-    Dropped, FailureEntry, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, Violation, numbers,
+    Dropped, FailureEntry, FaultEntry, Messages, SUMMARY_SCHEMA, StepTimes, Summary, UnfinishedEntry, Violation,
+    numbers,
 };
 use crate::tuning::METRICS_PERIOD_S;
 use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
-use skein_protocol::{DroneId, Phase, Vec2, horizontal};
+use skein_protocol::{DroneId, Phase, UnfinishedDrone, Vec2, horizontal};
 
 /// Accumulates everything that the summary of a run contains.
 pub(crate) struct Accumulator {
@@ -60,6 +61,8 @@ struct End {
     t_s: f64,
     outcome: Outcome,
     stuck: Vec<DroneId>,
+    unfinished: Vec<UnfinishedDrone>,
+    standstill_s: Option<f64>,
     reason: String,
     totals: Totals,
 }
@@ -149,8 +152,8 @@ impl Accumulator {
             EventKind::Violation { kind, drones, value_m } => {
                 self.violations.push(Violation { t_s, kind, drones: numbers(&drones), value_m });
             }
-            EventKind::End { outcome, reason, stuck, totals } => {
-                self.end = Some(End { t_s, outcome, reason, stuck, totals: *totals });
+            EventKind::End { outcome, reason, stuck, unfinished, standstill_s, totals } => {
+                self.end = Some(End { t_s, outcome, reason, stuck, unfinished, standstill_s, totals: *totals });
             }
             // Decisions are read from the frames, the end of a leadership from the rows. The summary does not report
             // the end of a fault.
@@ -228,6 +231,11 @@ impl Accumulator {
             outcome: self.end.as_ref().map_or(completion.fallback, |end| end.outcome),
             reason: self.end.as_ref().map(|end| end.reason.clone()),
             stuck: self.end.as_ref().map_or(Vec::new(), |end| end.stuck.iter().map(|id| id.0).collect()),
+            unfinished: self
+                .end
+                .as_ref()
+                .map_or(Vec::new(), |end| end.unfinished.iter().cloned().map(UnfinishedEntry::from).collect()),
+            standstill_s: self.end.as_ref().and_then(|end| end.standstill_s),
             mission_s: self.end.as_ref().map_or(sim_s, |end| end.t_s),
             reform_start_s: self.reform_start_s,
             reform_end_s: self.closing.since_s(),

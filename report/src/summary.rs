@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
 use skein_protocol::record::{FaultKind, Outcome, Percentiles, ViolationKind};
-use skein_protocol::{Ballot, DroneId};
+use skein_protocol::{Ballot, DroneId, Lack, Phase, UnfinishedDrone};
 use std::collections::BTreeMap;
 
 /// [`Summary::schema`] of this version.
@@ -55,6 +55,14 @@ pub struct Summary {
     /// The drones that have no way to the goal. Empty unless `outcome` is `stuck`.
     #[serde(default)]
     pub stuck: Vec<u32>,
+    /// The drones that kept the mission from its goal when its time was over, those in front of a queue first; at most 64. Empty unless
+    /// the time was over.
+    #[serde(default)]
+    pub unfinished: Vec<UnfinishedEntry>,
+    /// How long no living drone had moved when the time was over, s. Null if one had moved within the last 10 s: then the mission was
+    /// slow. Null unless the time was over. A drone moves if it gets farther than half a spacing from where it was.
+    #[serde(default)]
+    pub standstill_s: Option<f64>,
     /// One for each obstacle set, in flight order.
     pub stages: Vec<Stage>,
     /// When the mission ended, s.
@@ -123,6 +131,50 @@ pub struct Summary {
     pub lost_ticks: u64,
     /// Hash over every drone's state and every delivered message in every tick, 16 hex digits.
     pub digest: Option<String>,
+}
+
+/// A drone that kept the mission from its goal when its time was over.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UnfinishedEntry {
+    /// The drone.
+    pub drone: u32,
+    /// What it still had to do: `pass` all obstacles, be in a `slot`, `stop` in its slot, or say that it is `done`.
+    #[schemars(with = "String", extend("enum" = ["pass", "slot", "stop", "done"]))]
+    pub lack: Lack,
+    /// Distance from the slot that is left for it, m; null if the goal has no slots.
+    pub slot_distance_m: Option<f64>,
+    /// How long it had not moved, s.
+    pub still_s: f64,
+    /// The first obstacle set whose middle is ahead of it: its index in `stages`.
+    pub stage: Option<u32>,
+    /// Its group.
+    pub group: String,
+    /// The drone whose plan it obeyed.
+    pub leader: Option<u32>,
+    /// What that plan told it to do: `cruise`, `avoid` or `reform`.
+    #[schemars(with = "String", extend("enum" = ["cruise", "avoid", "reform"]))]
+    pub phase: Phase,
+    /// Its route past the obstacle set, 0 = rightmost.
+    pub route: Option<u16>,
+    /// Its place in the queue of that route, 0 = first.
+    pub rank: Option<u16>,
+}
+
+impl From<UnfinishedDrone> for UnfinishedEntry {
+    fn from(drone: UnfinishedDrone) -> Self {
+        Self {
+            drone: drone.drone.0,
+            lack: drone.lack,
+            slot_distance_m: drone.slot_distance_m,
+            still_s: drone.still_s,
+            stage: drone.stage,
+            group: drone.group,
+            leader: drone.leader.map(|leader| leader.0),
+            phase: drone.phase,
+            route: drone.route,
+            rank: drone.rank,
+        }
+    }
 }
 
 /// A machine that flew drones.

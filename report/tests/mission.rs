@@ -175,6 +175,8 @@ fn end() -> RunEvent {
             outcome: Outcome::Reached,
             reason: "goal met".to_owned(),
             stuck: Vec::new(),
+            unfinished: Vec::new(),
+            standstill_s: None,
             totals: Box::new(totals),
         },
     }

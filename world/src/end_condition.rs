@@ -43,6 +43,16 @@ impl EndCondition {
         !parts.is_empty() && parts.iter().all(|part| self.is_closed(params, bodies, part))
     }
 
+    /// Whether the drone has been past all obstacles. Only known with [`End::Hold`].
+    pub(crate) fn is_past(&self, drone: usize) -> bool {
+        self.past.get(drone).copied().unwrap_or(false)
+    }
+
+    /// Whether the drone is slow enough for a formation that is held.
+    pub(crate) fn is_slow(body: &Body) -> bool {
+        body.velocity().norm_squared() <= HOLD_SPEED_MPS * HOLD_SPEED_MPS
+    }
+
     /// Whether these drones stand in their formation.
     fn is_closed(&mut self, params: &WorldParams, bodies: &[Body], part: &[usize]) -> bool {
         let mut places = std::mem::take(&mut self.places);
@@ -76,9 +86,8 @@ impl EndCondition {
 
     /// Whether every living drone has been past every obstacle and is slow.
     fn holds(&self, bodies: &[Body]) -> bool {
-        let slow = HOLD_SPEED_MPS * HOLD_SPEED_MPS;
         let mut living = bodies.iter().zip(&self.past).filter(|(body, _)| body.is_alive());
-        living.all(|(body, past)| *past && body.velocity().norm_squared() <= slow)
+        living.all(|(body, past)| *past && Self::is_slow(body))
     }
 
     /// Makes the slots for this number of drones, unless they are made already.

@@ -4,15 +4,24 @@ use crate::body::Body;
 use crate::end_condition::EndCondition;
 use crate::params::{End, PartsRule, WorldParams};
 use crate::parts::Parts;
+use crate::process::Process;
 use crate::stages::Stages;
-use skein_protocol::record::Outcome;
-use skein_protocol::{DroneId, SimTime};
+use crate::stillness::Stillness;
+use crate::tuning::STANDSTILL_S;
+use crate::unfinished::Unfinished;
+use crate::unfinished_text;
+use skein_protocol::record::{Outcome, UNFINISHED_MAX};
+use skein_protocol::{DroneId, SimTime, UnfinishedDrone};
 
 /// What the judge looks at, at the end of a tick.
 #[derive(Clone, Copy)]
 pub(crate) struct MissionState<'a> {
     /// The bodies, by id.
     pub(crate) bodies: &'a [Body],
+    /// Their processes.
+    pub(crate) processes: &'a [Process],
+    /// Since when they have not moved.
+    pub(crate) stillness: &'a Stillness,
     /// Whether there are living drones and the pilots of all of them say that the mission is done.
     pub(crate) all_done: bool,
     /// The parts of the swarm; unused unless each of them has to be in formation by itself.
@@ -27,24 +36,43 @@ pub(crate) struct MissionState<'a> {
     pub(crate) violations: u64,
 }
 
+/// How a mission ended.
+#[derive(Clone, Debug)]
+pub(crate) struct Verdict {
+    /// The outcome.
+    pub(crate) outcome: Outcome,
+    /// Why, for a human reader.
+    pub(crate) reason: String,
+    /// If the time was over: drones that kept the mission from its goal.
+    pub(crate) unfinished: Vec<UnfinishedDrone>,
+    /// If the time was over and no living drone had moved for long: for how long, s.
+    pub(crate) standstill_s: Option<f64>,
+}
+
+impl Verdict {
+    fn new(outcome: Outcome, reason: impl Into<String>) -> Self {
+        Self { outcome, reason: reason.into(), unfinished: Vec::new(), standstill_s: None }
+    }
+}
+
 /// How the mission ended, once it has.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MissionJudge {
     condition: EndCondition,
     /// Memory for the living drones, as one part.
     living: [Vec<usize>; 1],
-    end: Option<(Outcome, String)>,
+    end: Option<Verdict>,
 }
 
 impl MissionJudge {
     /// The outcome; `None` while the mission goes on.
     pub(crate) fn outcome(&self) -> Option<Outcome> {
-        self.end.as_ref().map(|(outcome, _)| *outcome)
+        self.end.as_ref().map(|verdict| verdict.outcome)
     }
 
-    /// The outcome with its reason. A mission that goes on is aborted with this reason.
-    pub(crate) fn abort(&mut self, reason: &str) -> (Outcome, String) {
-        self.end.get_or_insert_with(|| (Outcome::Aborted, reason.to_owned())).clone()
+    /// How the mission ended. A mission that goes on is aborted with this reason.
+    pub(crate) fn abort(&mut self, reason: &str) -> Verdict {
+        self.end.get_or_insert_with(|| Verdict::new(Outcome::Aborted, reason)).clone()
     }
 
     /// Ends the mission if its end condition is met, no drone is left, some drone has no way, or the time is over.
@@ -52,21 +80,41 @@ impl MissionJudge {
         if self.end.is_some() {
             return;
         }
-        let (outcome, reason) = if let Some(reason) = self.reached(params, &state) {
-            (Outcome::Reached, reason)
+        let verdict = if let Some(reason) = self.reached(params, &state) {
+            Verdict::new(Outcome::Reached, reason)
         } else if !state.bodies.iter().any(Body::is_alive) && !state.awaits_restarts {
-            (Outcome::Timeout, "no drone is left alive".to_owned())
+            Verdict::new(Outcome::Timeout, "no drone is left alive")
         } else if !params.without_way.is_empty() {
-            (Outcome::Stuck, without_way(&params.without_way))
+            Verdict::new(Outcome::Stuck, without_way(&params.without_way))
         } else if state.end >= SimTime::from_secs(params.timeout_s) {
-            (Outcome::Timeout, format!("the time of {} s is over", params.timeout_s))
+            self.timed_out(params, &state)
         } else {
             return;
         };
         self.end = Some(match state.violations {
-            0 => (outcome, reason),
-            count => (Outcome::Unsafe, format!("{reason}, but invariants were broken {count} times")),
+            0 => verdict,
+            count => {
+                let reason = format!("{}, but invariants were broken {count} times", verdict.reason);
+                Verdict { outcome: Outcome::Unsafe, reason, ..verdict }
+            }
         });
+    }
+
+    /// The time is over. Says which drones are not done, and whether the swarm stands still.
+    fn timed_out(&self, params: &WorldParams, state: &MissionState<'_>) -> Verdict {
+        let &MissionState { bodies, processes, stages, stillness, end: now, .. } = state;
+        let condition = &self.condition;
+        let living = || vec![(0..bodies.len()).filter(|&drone| bodies[drone].is_alive()).collect()];
+        let parts = match params.parts {
+            PartsRule::Each { .. } => Some(state.parts.settled(now)).filter(|parts| !parts.is_empty()),
+            PartsRule::One => None,
+        };
+        let parts = parts.unwrap_or_else(living);
+        let mut unfinished = Unfinished { params, bodies, processes, condition, stages, stillness, now }.drones(&parts);
+        let standstill_s = stillness.swarm_still_s(bodies, now).filter(|&still_s| still_s >= STANDSTILL_S);
+        let reason = unfinished_text::reason(params.timeout_s, &unfinished, standstill_s);
+        unfinished.truncate(UNFINISHED_MAX);
+        Verdict { unfinished, standstill_s, ..Verdict::new(Outcome::Timeout, reason) }
     }
 
     /// Why the mission has reached its end; `None` if it has not.

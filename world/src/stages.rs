@@ -68,6 +68,11 @@ impl Stages {
         self.stages[number].centre_x_m
     }
 
+    /// The first set whose middle is ahead of this abscissa, m.
+    pub(crate) fn ahead_of(&self, x_m: f64) -> Option<u32> {
+        self.stages.iter().position(|stage| stage.centre_x_m > x_m).map(|number| number as u32)
+    }
+
     /// Whether a living drone has sensed the set.
     pub(crate) fn is_detected(&self, number: usize) -> bool {
         self.stages[number].detected

@@ -18,6 +18,14 @@ pub(crate) const PLANS_KEPT: usize = 16;
 /// has hardly noticed, since a leader is missed after one second by default, and after twelve on a bad link.
 pub(crate) const PARTED_S: f64 = 10.0;
 
+/// A drone that has not moved for this long, s, stands still. 10. Chosen by hand: longer than a drone waits for the answer to a message
+/// or for the drone before it in a queue. It changes what is said of a mission and nothing else.
+pub(crate) const STANDSTILL_S: f64 = 10.0;
+
+/// Up to this number of drones, the formation that fits those in their slots best is searched for. Chosen by hand: the search takes the
+/// cube of the number, and at 256 drones some tens of milliseconds. It changes what is said of a mission and nothing else.
+pub(crate) const FIT_MAX_DRONES: usize = 256;
+
 /// Tolerance for rounding when distances are checked, m. It is no softer limit. Chosen by hand, far above the rounding
 /// error of coordinates within 10⁶ m and far below any distance that matters.
 pub(crate) const ROUNDING_M: f64 = 1e-6;

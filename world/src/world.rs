@@ -8,12 +8,13 @@ use crate::fault_plan::ProcessCommand;
 use crate::faults::engine::FaultEngine;
 use crate::geometry::Outline;
 use crate::invariants::InvariantMonitor;
-use crate::judge::{MissionJudge, MissionState};
+use crate::judge::{MissionJudge, MissionState, Verdict};
 use crate::params::{PartsRule, WorldError, WorldParams};
 use crate::parts::Parts;
 use crate::sense_writer::{SenseWriter, Sensed};
 use crate::sensor_model::SensorModel;
 use crate::stages::Stages;
+use crate::stillness::Stillness;
 use crate::sweep::{SensorSweep, SweepRange};
 use crate::telemetry_log::TelemetryLog;
 use crate::tick_digest::TickDigest;
@@ -53,6 +54,7 @@ pub struct World {
     decisions: DecisionLog,
     judge: MissionJudge,
     parts: Parts,
+    stillness: Stillness,
     uplink: Uplink,
     sense_writer: SenseWriter,
     sensors: SensorModel,
@@ -85,6 +87,8 @@ impl World {
             decisions: DecisionLog::new(starts.len()),
             judge: MissionJudge::default(),
             parts: Parts::default(),
+            // A drone that flies from one slot to another moves.
+            stillness: Stillness::new(drones.bodies(), params.spacing_m / 2.0),
             uplink: Uplink::new(params.channel),
             sense_writer: SenseWriter::new(obstacles),
             sensors: SensorModel::new(params.sensors, params.dt_s(), starts.len()),
@@ -254,11 +258,11 @@ impl World {
     /// digest of the tick that ended last. `stats` are the merged link counters of all drones. `wall_s` is the wall time
     /// from the opening of the first tick to the end of the last one, s. A mission that has not ended is aborted.
     pub fn finish(&mut self, stats: &LinkStats, wall_s: f64) {
-        let (outcome, reason) = self.judge.abort("the mission was stopped");
+        let Verdict { outcome, reason, unfinished, standstill_s } = self.judge.abort("the mission was stopped");
         let parts = matches!(self.params.parts, PartsRule::Each { .. }).then(|| self.parts.count() as u32);
         let totals = Box::new(Totals { parts, ..self.counters.close(stats, self.params.dt_s(), wall_s) });
         let stuck = if outcome == Outcome::Stuck { self.params.without_way.clone() } else { Vec::new() };
-        self.log.push(self.now(), EventKind::End { outcome, reason, stuck, totals });
+        self.log.push(self.now(), EventKind::End { outcome, reason, stuck, unfinished, standstill_s, totals });
         self.log.end_tick();
         self.record.close_mission(self.digest(), self.log.ended().len());
     }
@@ -392,8 +396,11 @@ impl World {
             let faults = self.faults.schedule();
             self.parts.look(end, self.drones.bodies(), |id| faults.standing(id).link_faults, reach_m);
         }
+        self.stillness.look(end, self.drones.bodies());
         let state = MissionState {
             bodies: self.drones.bodies(),
+            processes: self.drones.processes(),
+            stillness: &self.stillness,
             all_done: self.drones.all_done(),
             parts: &self.parts,
             stages: &self.stages,

@@ -59,6 +59,8 @@ fn events(tick: u64, wall: u32) -> Vec<RunEvent> {
             outcome: Outcome::Reached,
             reason: "there".into(),
             stuck: Vec::new(),
+            unfinished: Vec::new(),
+            standstill_s: None,
             totals: Box::new(totals),
         },
         _ => return Vec::new(),
