@@ -23,8 +23,6 @@ use crate::visibility::VisibilityMap;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 
-/// A corner of a path counts as passed when the drone is nearer to it than this, m.
-const PASSED_M: f64 = 1.0;
 /// If the target moves by more than this, a new path is searched, m.
 const MOVED_M: f64 = 10.0;
 /// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
@@ -74,7 +72,7 @@ impl Navigator {
     #[must_use]
     pub fn new(clearance_m: f64, planning_m: f64) -> Self {
         Self {
-            wide: VisibilityMap::new(planning_m),
+            wide: VisibilityMap::new(planning_m.max(clearance_m + TIGHT_M)),
             tight: VisibilityMap::new(clearance_m + TIGHT_M),
             changes: 0,
             path: None,
@@ -135,9 +133,11 @@ impl Navigator {
             self.retry_at = tick + RETRY_TICKS;
             return Heading::NoPath;
         };
+        let first = corners.first().copied();
         corners.reverse();
         self.path = Some(Path { target: to, corners });
-        self.follow(from, to).map_or(Heading::NoPath, Heading::Via)
+        // A drone that is nearer to an obstacle than the least distance may leave it on a path that is not free by the map.
+        self.follow(from, to).or(first).map_or(Heading::NoPath, Heading::Via)
     }
 
     /// The shortest path with the planning distance; or with the least distance, if that is much shorter: then it leads through
@@ -150,8 +150,9 @@ impl Navigator {
         }
     }
 
-    /// The next corner of the present path. `None` if the path no longer leads to the target, or the way to the next corner is
-    /// blocked.
+    /// The next corner of the present path. A corner is passed as soon as the way to the one after it is free, however near it is: on
+    /// the way round a small obstacle, corners are close together. `None` if the path no longer leads to the target, or the way to
+    /// the next corner is blocked.
     fn follow(&mut self, from: Vec2, to: Vec2) -> Option<Vec2> {
         let path = self.path.as_mut()?;
         if (path.target - to).norm() > MOVED_M {
@@ -160,8 +161,8 @@ impl Navigator {
         if let Some(end) = path.corners.first_mut() {
             *end = to;
         }
-        while let [.., after, next] = path.corners[..]
-            && ((next - from).norm() <= PASSED_M || self.tight.is_free(from, after))
+        while let [.., after, _] = path.corners[..]
+            && self.tight.is_free(from, after)
         {
             path.corners.pop();
         }
@@ -196,6 +197,42 @@ mod tests {
             }
         }
         assert!((position - target).norm() < 1.0 && flown_m < 900.0, "{position} after {flown_m} m");
+    }
+
+    /// Flies from `from` to `to` in steps of 6 cm, as a small drone does in a tick. Gives the length of the flight, m.
+    fn flown_m(navigator: &mut Navigator, from: Vec2, to: Vec2) -> f64 {
+        let (mut position, mut flown_m) = (from, 0.0);
+        for tick in 0..10_000 {
+            let next = match navigator.head(tick, position, to) {
+                Heading::Straight => to,
+                Heading::Via(corner) => corner,
+                Heading::NoPath => panic!("no path from {position}"),
+            };
+            let step = (next - position).normalize() * 0.06;
+            position += step;
+            flown_m += step.norm();
+            if (position - to).norm() < 0.1 {
+                return flown_m;
+            }
+        }
+        panic!("at {position} after {flown_m} m");
+    }
+
+    #[test]
+    fn a_small_drone_turns_a_corner_whose_points_are_close_together() {
+        let wall = ConvexShape::rectangle(Vec2::new(249.09, 21.76), Vec2::new(1.31, 31.31), 0.0).unwrap();
+        let (from, to) = (Vec2::new(246.47, 50.0), Vec2::new(386.9, 0.0));
+        let mut navigator = Navigator::new(1.26, 1.32);
+        navigator.learn(1, [&wall].into_iter());
+        assert!(flown_m(&mut navigator, from, to) < 160.0);
+    }
+
+    #[test]
+    fn paths_with_the_planning_distance_keep_the_least_distance() {
+        let wall = ConvexShape::rectangle(Vec2::new(249.09, 21.76), Vec2::new(1.31, 31.31), 0.0).unwrap();
+        let mut navigator = Navigator::new(1.26, 1.26);
+        navigator.learn(1, [&wall].into_iter());
+        assert!(flown_m(&mut navigator, Vec2::new(200.0, 50.0), Vec2::new(386.9, 0.0)) < 210.0);
     }
 
     #[test]
