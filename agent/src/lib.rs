@@ -23,6 +23,7 @@ mod braking_motion;
 pub mod braking_path;
 pub mod command_delay;
 pub mod detection;
+mod detour;
 mod distant_peers;
 pub mod emergency_route;
 pub mod escape;

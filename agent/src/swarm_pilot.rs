@@ -4,6 +4,7 @@
 use crate::altitude::Altitude;
 use crate::braking_filter::{BrakingFilter, Moving, OwnMotion};
 use crate::detection::Detection;
+use crate::detour::{Detour, RouteView};
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::Escape;
 use crate::guidance::anchor;
@@ -55,8 +56,7 @@ pub struct SwarmPilot {
     braking_filter: BrakingFilter,
     altitude: Altitude,
     navigator: Navigator,
-    /// The end of the planned route, while a known obstacle blocks it (world frame, m).
-    detour_to: Option<Vec2>,
+    detour: Detour,
     reaction: ReactionDelay,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
@@ -95,7 +95,7 @@ impl SwarmPilot {
                 params.safety.clearance_m + params.sensing.obstacle_m,
                 params.planner.routes.planning_distance_m,
             ),
-            detour_to: None,
+            detour: Detour::default(),
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             stepped: None,
             predictor: StatePredictor::default(),
@@ -288,14 +288,14 @@ impl SwarmPilot {
     fn detour(&mut self, senses: &Senses<'_>, route_m: f64) -> Option<Vec2> {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
-            let blocked = self.route.end_if_blocked(senses.position(), |a, b| self.navigator.is_free(a, b));
-            let begun = self.detour_to.filter(|to| self.route.end() == Some(*to));
-            let shorter = || self.navigator.left_m(senses.position()).is_some_and(|left_m| left_m < route_m);
-            let is_clear = |a, b| self.navigator.is_clear(a, b);
-            let near = || self.route.end_if_blocked(senses.position(), is_clear).is_some();
-            self.detour_to = blocked.or_else(|| begun.filter(|_| shorter() && near()));
+            let (route, navigator, position) = (&self.route, &self.navigator, senses.position());
+            let blocked = route.end_if_blocked(position, |a, b| navigator.is_free(a, b)).is_some();
+            let view = route.end().map(|end| RouteView { end, route_m, blocked });
+            let shorter = || navigator.left_m(position).is_some_and(|left_m| left_m < route_m);
+            let near = || route.end_if_blocked(position, |a, b| navigator.is_clear(a, b)).is_some();
+            self.detour.look(view, self.params.safety.clearance_m, || shorter() && near());
         }
-        let target = self.detour_to?;
+        let target = self.detour.to()?;
         let next = match self.navigator.head(senses.tick, senses.position(), target) {
             Heading::Straight => target,
             Heading::Via(corner) => corner,
