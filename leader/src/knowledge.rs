@@ -351,7 +351,7 @@ impl Knowledge {
 }
 
 /// Whether a plan closes one formation of the whole swarm.
-fn is_formation_of_all(plan: &Plan) -> bool {
+pub(crate) fn is_formation_of_all(plan: &Plan) -> bool {
     plan.phase() == Phase::Reform && plan.group == GroupId::ALL
 }
 

@@ -1,7 +1,7 @@
 //! When a drone takes up leading, or hands it over, although its leader is healthy.
 
 use crate::election::Input;
-use crate::knowledge::Knowledge;
+use crate::knowledge::{Knowledge, is_formation_of_all};
 use crate::member::Member;
 use crate::onward;
 use crate::own_state::OwnState;
@@ -17,6 +17,8 @@ pub(crate) struct Roles {
     part: Option<SimTime>,
     /// Since when the parts could be one group again.
     whole: Option<SimTime>,
+    /// Since when drones that left this leader's formation have nothing to pass any more.
+    torn: Option<SimTime>,
     transfer: Option<Transfer>,
     /// The leader's term and since when it has planned without this drone.
     left_out: Option<(Ballot, SimTime)>,
@@ -65,8 +67,23 @@ impl Roles {
         // Plans and claims of the drones with a lower rank must have time to arrive.
         let wait_s = k.election().wait_s().max(2.0 * k.peers().delay_s()) * rank as f64;
         let claim_part = held(&mut self.part, part, now, wait_s);
-        let claim_whole = held(&mut self.whole, whole && !part, now, wait_s);
+        let claim_whole = held(&mut self.whole, whole && !part, now, wait_s) || self.claims_torn(k, now);
         if claim_part { Some(group) } else { claim_whole.then_some(GroupId::ALL) }
+    }
+
+    /// Whether this leader of the whole swarm is to claim it anew: some drones left its formation for an obstacle that they learnt of
+    /// only then, and are past it. They obey later terms, so they do not hear of this leader's plans any more. And they may wait for
+    /// drones that stand in slots before that obstacle. Leaders of parts that can claim the swarm do so before.
+    fn claims_torn(&mut self, k: &Knowledge, now: SimTime) -> bool {
+        let (election, forms) =
+            (k.election(), k.ledger().obeyed().is_some_and(|bundle| is_formation_of_all(&bundle.plan)));
+        let torn = election.leads() && election.scope() == GroupId::ALL && forms && {
+            let gone = k.living_peers(now).filter(|m| k.term_of(m.id) > election.obeyed());
+            gone.clone().next().is_some() && !has_ahead(k, gone)
+        };
+        let leaders = || k.peers().living(now).filter(|(_, pose)| pose.leads()).count();
+        let wait_s = if torn { election.wait_s().max(2.0 * k.peers().delay_s()) * (1 + leaders()) as f64 } else { 0.0 };
+        held(&mut self.torn, torn, now, wait_s)
     }
 
     /// The scope that this drone is to lead because its leader, although healthy, has planned without it for too long.
