@@ -249,6 +249,21 @@ mod tests {
     }
 
     #[test]
+    fn many_rows_are_repeated_only_as_often_as_the_share_of_the_bandwidth_allows() {
+        let mut exchange = PlanExchange::new(100, 0.2, 0.1);
+        let mut ask = |now_s: f64| {
+            let mut said = Vec::new();
+            let rows = || (0..UNPACED as u32 + 10).map(|drone| row_of(drone, now_s, 7)).collect();
+            exchange.ask(at(now_s), 7, rows, &mut said);
+            said.len()
+        };
+        assert_eq!(ask(1.0), UNPACED + 10);
+        assert_eq!((ask(1.2), ask(1.98)), (0, 0));
+        assert_eq!(ask(2.01), UNPACED + 10, "ten rows more than are free take a second");
+        assert_eq!(exchange.asked(at(2.5)), None);
+    }
+
+    #[test]
     fn a_late_question_is_answered_but_not_in_every_tick() {
         let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         exchange.hear(at(1.0), &Arrivals { kind: ArrivalsKind::Query.to_wire(), ..row_of(2, 1.0, 7) });

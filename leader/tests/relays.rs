@@ -8,7 +8,7 @@ use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
 use skein_protocol::payload::{Assignment, Leadership, MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, PlanStamp, SimTime, Vec2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use swarm::{DEFAULT, params, step};
 
 const DRONES: u32 = 600;
@@ -37,16 +37,38 @@ impl Middle {
 
     /// Hears that these drones obey a plan.
     fn hear_of(&mut self, drones: impl Iterator<Item = u32>, obeyed: PlanStamp) {
+        self.hear_of_lives(drones, obeyed, 1);
+    }
+
+    /// Hears that these drones, in this incarnation, obey a plan.
+    fn hear_of_lives(&mut self, drones: impl Iterator<Item = u32>, obeyed: PlanStamp, incarnation: u32) {
         let stamp = self.now();
         for drones in drones.collect::<Vec<_>>().chunks(MAX_PRESENT) {
             let mut presence = Presence { obeyed, group: GroupId::ALL, term: TERM, ..Presence::default() };
             presence.count = drones.len() as u32;
             for (entry, &drone) in presence.drones.iter_mut().zip(drones) {
                 let position_m = [-40.0 * drone as f32, 0.0, 50.0];
-                *entry = Present { stamp, drone: DroneId(drone), incarnation: 1, position_m, ..Present::zeroed() };
+                *entry = Present { stamp, drone: DroneId(drone), incarnation, position_m, ..Present::zeroed() };
             }
             self.hear(2, Message::Presence(presence));
         }
+    }
+
+    /// Hears an assignment of each drone.
+    fn hear_assignments(&mut self) {
+        for drone in 2..DRONES {
+            let (scope, group) = (GroupId::ALL, GroupId::ALL);
+            let part =
+                Assignment { id: PLAN, scope, group, drone: DroneId(drone), leader: DroneId(0), ..Zeroable::zeroed() };
+            self.hear(0, Message::Assignment(part));
+        }
+    }
+
+    /// The drones whose assignments it says within this many ticks.
+    fn passes_on(&mut self, ticks: u32) -> BTreeSet<u32> {
+        let said = (0..ticks).flat_map(|_| self.step());
+        said.filter_map(|message| if let Message::Assignment(part) = message { Some(part.drone.0) } else { None })
+            .collect()
     }
 
     /// One tick, in which both neighbours are heard. Returns what the drone says.
@@ -81,12 +103,7 @@ fn many_assignments_starve_neither_each_other_nor_the_states_of_drones() {
     for _ in 0..300 {
         middle.step();
     }
-    for drone in 2..DRONES {
-        let (scope, group) = (GroupId::ALL, GroupId::ALL);
-        let part =
-            Assignment { id: PLAN, scope, group, drone: DroneId(drone), leader: DroneId(0), ..Zeroable::zeroed() };
-        middle.hear(0, Message::Assignment(part));
-    }
+    middle.hear_assignments();
     let mut parts: BTreeMap<u32, u32> = BTreeMap::new();
     let mut news_after = None;
     for tick in 0..400 {
@@ -109,4 +126,21 @@ fn many_assignments_starve_neither_each_other_nor_the_states_of_drones() {
         late.map(|drone| parts.get(&drone).copied().unwrap_or(0)).fold((u32::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
     assert!(news_after.is_some_and(|ticks| ticks <= 20), "news after {news_after:?} ticks");
     assert!(least >= 1 && most <= 2 * least + 1, "assignments were passed on {least} to {most} times");
+}
+
+/// Assignments that were obeyed are not looked at again, unless what their drone obeys changes.
+#[test]
+fn a_drone_that_was_restarted_gets_its_assignment_again() {
+    let mut middle = Middle::new();
+    for _ in 0..60 {
+        middle.step();
+    }
+    middle.hear_of(3..DRONES, PlanStamp::default());
+    middle.hear_assignments();
+    assert!(middle.passes_on(300).len() > 500);
+    middle.hear_of(3..DRONES, PLAN);
+    middle.passes_on(100);
+    assert!(middle.passes_on(100).is_empty(), "all drones obey the plan");
+    middle.hear_of_lives(500..501, PlanStamp::default(), 2);
+    assert_eq!(middle.passes_on(50), BTreeSet::from([500]));
 }
