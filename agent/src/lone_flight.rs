@@ -4,7 +4,7 @@
 use crate::guidance::GuidanceParams;
 use crate::tuning::{LEAD_S, OVERSHOOT_S};
 use skein_leader::params::{Destination, PlannerParams};
-use skein_leader::peers::{Peers, extrapolated};
+use skein_leader::peers::Peers;
 use skein_protocol::{SimTime, Vec2};
 
 /// Time between two looks for the last drone, s.
@@ -44,7 +44,7 @@ impl LoneFlight {
     pub(crate) fn speed_mps(&mut self, now: SimTime, position: Vec2, peers: &Peers, guidance: &GuidanceParams) -> f64 {
         if now >= self.next_look {
             self.next_look = now.after(LOOK_S);
-            let living = peers.living(now).map(|(_, pose)| extrapolated(pose, now).x);
+            let living = peers.living(now).map(|(_, pose)| pose.extrapolated(now).x);
             self.last_x_m = living.fold(f64::INFINITY, f64::min);
         }
         let room_m = (self.last_x_m + self.lead_m).min(self.limit_x_m) - position.x;

@@ -3,7 +3,7 @@
 use crate::distant_peers::DistantPeers;
 use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
-use skein_leader::peers::{Peers, extrapolated};
+use skein_leader::peers::Peers;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
@@ -85,7 +85,7 @@ impl NeighbourTable {
                 continue;
             }
             let (id, pose) = view.peers.at(index);
-            let position_m = extrapolated(pose, senses.now) - senses.position();
+            let position_m = pose.extrapolated(senses.now) - senses.position();
             if position_m.norm_squared() > reach_m * reach_m {
                 self.distant.note(index, position_m.norm() - reach_m, pose.velocity().norm());
                 continue;
@@ -94,7 +94,7 @@ impl NeighbourTable {
                 continue;
             }
             let velocity_mps = pose.velocity() - senses.velocity();
-            let (age_s, share) = (senses.now.since(pose.stamp), self.share(view, id));
+            let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
             self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
         }
     }
@@ -109,14 +109,14 @@ impl NeighbourTable {
     /// beacon shows that the other obeys the same plan.
     fn share(&self, view: &NeighbourView<'_>, other: DroneId) -> f64 {
         let Some(pose) = view.peers.last_of_living(other, view.now) else { return 1.0 };
-        let age_s = view.now.since(pose.stamp);
+        let age_s = view.now.since(pose.stamp());
         for mine in view.places.iter().filter(|place| place.set != 0) {
-            let same = |place: &&QueuePlace| place.set == mine.set && place.route == mine.route;
-            let Some(theirs) = pose.queue.iter().find(same) else { continue };
+            let same = |place: &QueuePlace| place.set == mine.set && place.route == mine.route;
+            let Some(theirs) = pose.queue().find(same) else { continue };
             if mine.rank > theirs.rank {
                 return self.params.precedence_share;
             }
-            if mine.rank < theirs.rank && age_s <= FRESH_BEACON_S && pose.obeyed == view.obeyed {
+            if mine.rank < theirs.rank && age_s <= FRESH_BEACON_S && pose.obeyed() == view.obeyed {
                 return 1.0 - self.params.precedence_share;
             }
         }

@@ -1,8 +1,9 @@
 //! The queue of drones on a shared route. The foremost drone has precedence; the others merge behind it (paper, results).
 
+use skein_leader::beacons::Beacon;
 use skein_leader::peers::Peers;
 use skein_protocol::SimTime;
-use skein_protocol::payload::{Pose, QueuePlace};
+use skein_protocol::payload::QueuePlace;
 
 /// A drone ahead in a queue, as far as this drone knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,17 +104,17 @@ impl QueuePacer {
         }
         for (index, &stamp) in peers.stamps().iter().enumerate() {
             if std::mem::replace(&mut self.stamps[index], stamp) != stamp {
-                self.note(index as u32, peers.at(index).1);
+                self.note(index as u32, &peers.at(index).1);
             }
         }
     }
 
     /// Notes the places of a peer that are before one of this drone's.
-    fn note(&mut self, peer: u32, pose: &Pose) {
+    fn note(&mut self, peer: u32, pose: &Beacon<'_>) {
         let mine = &self.mine;
-        let is_before = |place: &&QueuePlace| mine.iter().any(|own| is_ahead(place, own));
-        let (stamp, speed_mps) = (pose.stamp, pose.velocity().norm());
-        let news = pose.queue.iter().filter(is_before).map(|&place| Queued { peer, stamp, speed_mps, place });
+        let is_before = |place: &QueuePlace| mine.iter().any(|own| is_ahead(place, own));
+        let (stamp, speed_mps) = (pose.stamp(), pose.velocity().norm());
+        let news = pose.queue().filter(is_before).map(|place| Queued { peer, stamp, speed_mps, place });
         let from = self.before.partition_point(|known| known.peer < peer);
         let known = self.before[from..].iter().take_while(|known| known.peer == peer).count();
         self.before.splice(from..from + known, news);
@@ -144,6 +145,7 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
     use skein_protocol::DroneId;
+    use skein_protocol::payload::Pose;
 
     const PARAMS: QueueParams = QueueParams { headway_s: 4.0, speed_mps: 10.0, speed_change_mps: 5.0 };
 

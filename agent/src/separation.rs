@@ -240,8 +240,8 @@ impl Separations {
         for &(_, index) in &self.order {
             let known = &mut self.known[index];
             known.said = now;
-            if let Some(pose) = peers.last(known.peer) {
-                let pose = known.seen.map_or(*pose, |seen| seen.at(now, pose));
+            if let Some(pose) = peers.last(known.peer).map(|beacon| beacon.pose()) {
+                let pose = known.seen.map_or(pose, |seen| seen.at(now, &pose));
                 self.params.propose(known, &pose, peers.delay_s(), path);
             }
             separators.extend(known.statement().map(|said| separator(known.peer, &said)));

@@ -200,7 +200,7 @@ fn is_open(k: &Knowledge, id: ObstacleId) -> bool {
 /// the obstacle.
 fn is_missed(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
     let Some(set) = k.ledger().sets().iter().find(|set| set.ids.contains(&id)) else { return false };
-    k.peers().direct(now).any(|(_, pose)| set.scope.contains(pose.group) && pose.obeyed < set.stamp)
+    k.peers().direct(now).any(|(_, pose)| set.scope.contains(pose.group()) && pose.obeyed() < set.stamp)
 }
 
 /// Says which sets this drone has passed, until the swarm re-forms.
@@ -216,10 +216,10 @@ fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message
 fn say_parts(k: &Knowledge, bundle: &PlanBundle, now: SimTime, extent: Extent, say: &mut Vec<Message>) {
     let (stamp, peers) = (bundle.plan.id, k.peers());
     let heard = |id: DroneId| if extent.far { peers.is_living(id, now) } else { peers.is_direct(id, now) };
-    let late = |id: DroneId| heard(id) && peers.last(id).is_some_and(|pose| pose.obeyed < stamp);
+    let late = |id: DroneId| heard(id) && peers.last(id).is_some_and(|pose| pose.obeyed() < stamp);
     let first = say.len();
     let parts = bundle.parts.iter().filter(|part| extent.all || late(part.drone));
-    say.extend(parts.map(|part| Message::Assignment(*part)));
+    say.extend(parts.map(Message::Assignment));
     if say.len() == first {
         return;
     }

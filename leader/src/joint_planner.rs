@@ -160,7 +160,7 @@ impl JointPlanner {
             return;
         }
         let (plan, set) = (bundle.plan, set_ids(&bundle.plan.set, bundle.plan.set_count));
-        let row = |part: &Assignment| {
+        let row = |part: Assignment| {
             let mut gate_s = vec![f64::INFINITY; plan.routes as usize];
             if let Some(arrival_s) = gate_s.get_mut(usize::from(part.route)) {
                 *arrival_s = part.arrival_s;
@@ -243,7 +243,7 @@ fn add_others(
 ) {
     let (plan, now_s) = (bundle.plan, s.now.since(SimTime::ZERO));
     for (row, (&route, rank)) in table.iter().zip(split.routes.iter().zip(places(s, table, survey, split))) {
-        bundle.parts.add(Assignment {
+        bundle.parts.add(&Assignment {
             id: plan.id,
             scope: s.scope,
             group: row.group,

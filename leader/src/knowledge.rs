@@ -6,7 +6,7 @@ use crate::member::Member;
 use crate::obstacles::Obstacles;
 use crate::own_state::OwnState;
 use crate::params::{LeadingParams, PlannerParams};
-use crate::peers::{Peers, extrapolated};
+use crate::peers::Peers;
 use crate::plan_bundle::PlanBundle;
 use crate::tuning::MAX_REJECTIONS;
 use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
@@ -116,7 +116,7 @@ impl Knowledge {
 
     /// The term that a peer obeys, by its last beacon.
     pub(crate) fn term_of(&self, peer: DroneId) -> Ballot {
-        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term)
+        self.peers.last(peer).map_or(Ballot::NONE, |pose| pose.term())
     }
 
     /// Whether a peer's last beacon says that all its sensors work.
@@ -136,13 +136,13 @@ impl Knowledge {
     pub(crate) fn living_peers(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
-            let hears = |ballot| pose.term == ballot || (pose.term < ballot && ballot == self.election.obeyed());
-            let will_obey = |plan: &PlanStamp| pose.obeyed < *plan && hears(plan.ballot);
+            let hears = |ballot| pose.term() == ballot || (pose.term() < ballot && ballot == self.election.obeyed());
+            let will_obey = |plan: &PlanStamp| pose.obeyed() < *plan && hears(plan.ballot);
             let pending = plans.into_iter().flatten().filter(|bundle| will_obey(&bundle.plan.id));
             let group = pending.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
-            let group = group.unwrap_or(pose.group);
+            let group = group.unwrap_or_else(|| pose.group());
             let velocity = pose.velocity();
-            let (position, follows) = (extrapolated(pose, now), pose.term == self.election.obeyed());
+            let (position, follows) = (pose.extrapolated(now), pose.term() == self.election.obeyed());
             Member { id, position, speed_mps: velocity.norm(), velocity, group, follows }
         })
     }
@@ -164,12 +164,12 @@ impl Knowledge {
     /// Whether it leads and hears others, none of which follows it. If this persists, no other drone can hear this one.
     pub(crate) fn is_unfollowed(&self, now: SimTime) -> bool {
         let mut peers = self.peers.living(now).peekable();
-        self.election.leads() && peers.peek().is_some() && peers.all(|(_, pose)| pose.term != self.election.obeyed())
+        self.election.leads() && peers.peek().is_some() && peers.all(|(_, pose)| pose.term() != self.election.obeyed())
     }
 
     /// Whether a beacon comes from a drone that may have missed what others said: from a new process, or after a silence.
     pub(crate) fn is_back(&self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
-        self.peers.last_of_living(source, now).is_none_or(|last| last.incarnation != pose.incarnation)
+        self.peers.last_of_living(source, now).is_none_or(|last| last.incarnation() != pose.incarnation)
     }
 
     /// Hears a beacon. Returns whether it shows a plan of this leader's term that this leader never made.

@@ -186,7 +186,7 @@ impl Leading {
     #[must_use]
     pub fn united_ledger(&self, now: SimTime) -> Ledger {
         let living = self.peers().living(now);
-        let places = living.flat_map(|(id, pose)| pose.queue.into_iter().map(move |place| (id, place)));
+        let places = living.flat_map(|(id, pose)| pose.pose().queue.into_iter().map(move |place| (id, place)));
         let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
         self.ledger().united(self.first_term(), &flown)
     }
@@ -246,7 +246,7 @@ impl Leading {
     /// What this drone knows of another one, if it would pass it on.
     fn news_of(&self, drone: DroneId) -> Option<News> {
         let wide = self.relays.is_wide();
-        self.peers().last(drone).filter(|_| wide).map(News::of)
+        self.peers().last(drone).filter(|_| wide).map(News::of_last)
     }
 
     /// Hears of drones that `source` has heard of. Most of it is known: several drones pass the same states on.

@@ -1,6 +1,7 @@
 //! What a drone knows of plans: the newest one it has heard of, the one it obeys, and the assignments in it. Leaders and
 //! followers use the same ledger; a new leader continues from its own.
 
+use crate::assignments::Assignments;
 use crate::obstacles::{Obstacles, set_ids};
 use crate::plan_bundle::PlanBundle;
 use crate::planned_set::PlannedSet;
@@ -22,7 +23,7 @@ pub struct Ledger {
     /// The plan of that stamp.
     plan: Option<Plan>,
     /// The assignments of that stamp, until the plan is obeyed. Then they are in `obeyed`.
-    parts: Roster,
+    parts: Assignments,
     obeyed: Option<PlanBundle>,
     /// This drone's assignment in `obeyed`: a copy that can be read without a search.
     mine: Option<Assignment>,
@@ -47,7 +48,7 @@ impl Ledger {
             params,
             stamp: PlanStamp::default(),
             plan: None,
-            parts: Roster::default(),
+            parts: Assignments::default(),
             obeyed: None,
             mine: None,
             origin: None,
@@ -122,7 +123,7 @@ impl Ledger {
     }
 
     fn find_part(&self) -> Option<Assignment> {
-        self.obeyed.as_ref()?.parts.get(self.me).copied()
+        self.obeyed.as_ref()?.parts.get(self.me)
     }
 
     /// Whether the newest plan, as far as it was heard, has no assignment for this drone.
@@ -178,12 +179,12 @@ impl Ledger {
             return;
         }
         if let Some(bundle) = self.obeyed.as_mut().filter(|bundle| bundle.plan.id == part.id) {
-            bundle.parts.add(*part);
+            bundle.parts.add(part);
             for set in self.sets.iter_mut().filter(|set| set.stamp == part.id) {
                 set.parts.add(part.into());
             }
         } else {
-            self.parts.add(*part);
+            self.parts.add(part);
             self.settle(obstacles);
         }
     }
@@ -233,6 +234,15 @@ impl Ledger {
         self.redrawn
     }
 
+    /// The places in the newest plan, with room for those that were not heard yet.
+    fn set_places(&self, plan: &Plan) -> Roster<SetPlace> {
+        let mut places = Roster::with_capacity(plan.members.min(self.drones) as usize);
+        for part in self.parts.iter() {
+            places.add(SetPlace::from(&part));
+        }
+        places
+    }
+
     /// Obeys the newest plan once the plan, this drone's assignment and all obstacles of the set are known. Call again when
     /// an obstacle was learnt.
     pub fn settle(&mut self, obstacles: &Obstacles) {
@@ -245,7 +255,7 @@ impl Ledger {
             let Some(shapes) = obstacles.shapes(ids) else { return };
             let routes = Routes::new(&shapes, &self.params);
             self.sets.retain(|set| !set.ids.iter().any(|id| ids.contains(id)));
-            let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.parts.iter().map(SetPlace::from).collect());
+            let (ids, tag, parts) = (ids.to_vec(), set_tag(ids), self.set_places(&plan));
             let (stamp, made, members, scope) = (plan.id, plan.stamp, plan.members, plan.group);
             self.sets.push(PlannedSet { ids, tag, stamp, made, members, scope, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));

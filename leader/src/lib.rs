@@ -38,13 +38,16 @@
 //! ```
 
 mod adaptive_timeout;
+pub mod assignments;
 mod avoidance;
+pub mod beacons;
 mod beats;
 mod broadcaster;
 pub mod candidates;
 pub mod changes;
 pub mod cost;
 mod draft;
+mod drone_set;
 pub mod election;
 mod formation_planner;
 pub mod funnel;
@@ -78,6 +81,7 @@ mod roles;
 pub mod roster;
 pub mod routes;
 pub mod set_place;
+mod shared_values;
 mod situation;
 pub mod slots;
 pub mod split;

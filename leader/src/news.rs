@@ -1,5 +1,6 @@
 //! What other drones must know at once about a drone. See [`crate::relays`].
 
+use crate::beacons::Beacon;
 use skein_protocol::payload::Pose;
 use skein_protocol::{Ballot, GroupId, PlanStamp};
 
@@ -18,5 +19,11 @@ impl News {
     pub(crate) fn of(pose: &Pose) -> Self {
         let Pose { obeyed, term, group, flags, incarnation, .. } = *pose;
         Self { obeyed, term, group, flags, incarnation }
+    }
+
+    /// That of a drone's last beacon.
+    pub(crate) fn of_last(last: Beacon<'_>) -> Self {
+        let (obeyed, term, group) = (last.obeyed(), last.term(), last.group());
+        Self { obeyed, term, group, flags: last.flags(), incarnation: last.incarnation() }
     }
 }

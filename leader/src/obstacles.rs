@@ -1,11 +1,12 @@
 //! What a drone knows of obstacles, from its own senses or from messages, and which drones have passed them.
 
+use crate::drone_set::DroneSet;
 use crate::geometry::{hull, nearest};
 use crate::tuning::OUTLINE_GROWTH_M;
 use skein_protocol::payload::{MAX_SET, Passed};
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
 use skein_protocol::{DroneId, ObstacleId, SimTime, Vec2};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Most obstacles that a drone keeps. Further ones are ignored.
 pub const MAX_KNOWN: usize = 1024;
@@ -25,7 +26,7 @@ pub struct Known {
 #[derive(Clone, Debug, Default)]
 pub struct Obstacles {
     known: BTreeMap<ObstacleId, Known>,
-    passed: BTreeMap<ObstacleId, BTreeSet<DroneId>>,
+    passed: BTreeMap<ObstacleId, DroneSet>,
     drones: u32,
     reach_m: f64,
     sets: Vec<Vec<ObstacleId>>,
@@ -80,7 +81,7 @@ impl Obstacles {
     /// Whether a drone is noted to have passed an obstacle.
     #[must_use]
     pub fn has_passed(&self, drone: DroneId, id: ObstacleId) -> bool {
-        self.passed.get(&id).is_some_and(|drones| drones.contains(&drone))
+        self.passed.get(&id).is_some_and(|drones| drones.contains(drone))
     }
 
     /// One obstacle.

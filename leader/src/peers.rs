@@ -1,11 +1,12 @@
 //! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
 
 use crate::adaptive_timeout::AdaptiveTimeout;
+use crate::beacons::{Beacon, Beacons};
 use crate::changes::Changes;
 use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
-use skein_protocol::{DroneId, GroupId, PlanStamp, SimTime, Vec2};
+use skein_protocol::{DroneId, PlanStamp, SimTime};
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -19,14 +20,13 @@ const NEVER: SimTime = SimTime(i64::MIN / 2);
 /// More than times in nanoseconds lose by rounding, s.
 const ROUNDING_S: f64 = 1e-6;
 
-/// What is known of one peer.
+/// When one peer was heard.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
     /// Of its beacons, by their times of arrival.
     timeout: AdaptiveTimeout,
     /// When it was last heard without a relay; [`NEVER`] if it never was.
     direct: SimTime,
-    pose: Pose,
 }
 
 impl Peer {
@@ -63,11 +63,11 @@ pub struct Peers {
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
-    /// The time stamp of the last beacon of each of them, in the same order.
-    stamps: Vec<SimTime>,
-    /// Of these time stamps.
+    /// The last beacon of each of them, in the same order.
+    beacons: Beacons,
+    /// Of their time stamps.
     changes: Changes,
-    /// What is known of each of them, in the same order.
+    /// When each of them was heard, in the same order.
     last: Vec<Peer>,
     /// Those that were heard without a relay, ascending: all that may still count as heard so, and some that no longer do. In a wide
     /// swarm they are few.
@@ -86,7 +86,7 @@ impl Peers {
             quiet_until: SimTime::MAX,
             next_look: SimTime::ZERO,
             ids: Vec::new(),
-            stamps: Vec::new(),
+            beacons: Beacons::default(),
             changes: Changes::default(),
             last: Vec::new(),
             near: Vec::new(),
@@ -121,24 +121,23 @@ impl Peers {
                     self.note_near(source);
                 }
                 let timeout = self.prior(now, direct.is_some());
-                let peer = Peer { timeout, direct: direct.unwrap_or(NEVER), pose };
+                let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
                 self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 self.ids.insert(place, source);
-                self.stamps.insert(place, pose.stamp);
+                self.beacons.insert(place, &pose);
                 self.last.insert(place, peer);
                 self.changes.note_from(place, self.ids.len());
             }
-            Ok(place) if pose.stamp > self.stamps[place] => {
+            Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
                 let prior = self.prior(now, false);
                 let peer = &mut self.last[place];
                 let longest_s = peer.silence_s(self.timeout_s);
-                peer.pose = pose;
                 if direct.is_none() && peer.timeout.last() <= peer.direct {
                     peer.timeout = prior;
                 }
                 peer.direct = direct.unwrap_or(peer.direct);
                 peer.timeout.hear(now, 0.0, longest_s);
-                self.stamps[place] = pose.stamp;
+                self.beacons.replace(place, &pose);
                 self.changes.note(place);
                 self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 if direct.is_some() {
@@ -173,6 +172,7 @@ impl Peers {
         let mut near = std::mem::take(&mut self.near);
         near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
         self.near = near;
+        self.beacons.tidy();
     }
 
     /// Whether no peer is silent for too long, which needs no look at each.
@@ -182,6 +182,7 @@ impl Peers {
 
     /// The index of a peer, or where it belongs. Once all drones have been heard, no search is needed: the index is the id,
     /// less one for the ids above this drone's own.
+    #[inline]
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
         let guess = |index: usize| (self.ids.get(index) == Some(&peer)).then_some(index);
         let found = guess(peer.index()).or_else(|| guess(peer.index().checked_sub(1)?));
@@ -203,9 +204,10 @@ impl Peers {
     }
 
     /// The peers that are heard without a relay, by id.
-    pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
-        let near = self.near.iter().filter_map(|&id| Some((id, self.get(id)?)));
-        near.filter(move |(_, known)| known.is_direct(now, self.timeout_s)).map(|(id, known)| (id, &known.pose))
+    pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
+        let near = self.near.iter().filter_map(|&id| Some((id, self.place(id).ok()?)));
+        let direct = near.filter(move |&(_, place)| self.last[place].is_direct(now, self.timeout_s));
+        direct.map(|(id, place)| (id, self.beacons.get(place)))
     }
 
     /// What drone `me` says in [`Pose::hears`].
@@ -227,7 +229,7 @@ impl Peers {
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.ids.remove(place);
-            self.stamps.remove(place);
+            self.beacons.remove(place);
             self.last.remove(place);
             self.changes.note_from(place, self.ids.len());
             self.near.retain(|near| *near != peer);
@@ -236,9 +238,7 @@ impl Peers {
 
     /// Makes all peers members of one group that obeys this plan.
     pub fn unite(&mut self, stamp: PlanStamp) {
-        for Peer { pose, .. } in &mut self.last {
-            (pose.group, pose.term, pose.obeyed) = (GroupId::ALL, stamp.ballot, stamp);
-        }
+        self.beacons.unite(stamp);
     }
 
     /// Whether the peer is not silent for too long.
@@ -249,41 +249,40 @@ impl Peers {
 
     /// The last beacon of a peer, however old.
     #[must_use]
-    pub fn last(&self, peer: DroneId) -> Option<&Pose> {
-        self.get(peer).map(|known| &known.pose)
+    pub fn last(&self, peer: DroneId) -> Option<Beacon<'_>> {
+        self.place(peer).ok().map(|place| self.beacons.get(place))
     }
 
     /// The time stamp of a peer's last beacon.
     pub(crate) fn stamp_of(&self, peer: DroneId) -> Option<SimTime> {
-        self.place(peer).ok().map(|place| self.stamps[place])
+        self.place(peer).ok().map(|place| self.stamps()[place])
     }
 
     /// The last beacon of a peer that is not silent for too long.
     #[must_use]
-    pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<&Pose> {
-        let all = self.all_live(now);
-        self.get(peer).filter(|known| all || known.lives(now, self.timeout_s)).map(|known| &known.pose)
+    pub fn last_of_living(&self, peer: DroneId, now: SimTime) -> Option<Beacon<'_>> {
+        let place = self.place(peer).ok().filter(|&place| self.is_living_at(place, now));
+        place.map(|place| self.beacons.get(place))
     }
 
     /// Peers that are not silent for too long, by id.
-    pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> + Clone {
+    pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let all = self.all_live(now);
-        self.known()
-            .filter(move |(_, known)| all || known.lives(now, self.timeout_s))
-            .map(|(id, known)| (id, &known.pose))
+        let living = self.known().filter(move |(_, known, _)| all || known.lives(now, self.timeout_s));
+        living.map(|(id, _, beacon)| (id, beacon))
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
-    pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, &Pose)> {
+    pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
         let some = if self.all_live(now) { 0 } else { self.ids.len() };
-        let silent = self.known().take(some).filter(move |(_, known)| !known.lives(now, self.timeout_s));
-        silent.map(|(id, known)| (id, &known.pose))
+        let silent = self.known().take(some).filter(move |(_, known, _)| !known.lives(now, self.timeout_s));
+        silent.map(|(id, _, beacon)| (id, beacon))
     }
 
     /// The time stamps of the last beacons of all peers ever heard, by id, without the beacons themselves.
     #[must_use]
     pub fn stamps(&self) -> &[SimTime] {
-        &self.stamps
+        self.beacons.stamps()
     }
 
     /// The changes of [`Self::stamps`].
@@ -293,8 +292,8 @@ impl Peers {
     }
 
     /// All peers ever heard, by id, with their last beacons.
-    pub fn all(&self) -> impl Iterator<Item = (DroneId, &Pose)> {
-        self.known().map(|(id, known)| (id, &known.pose))
+    pub fn all(&self) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
+        self.known().map(|(id, _, beacon)| (id, beacon))
     }
 
     /// The id and the last beacon of the peer at this index of [`Self::stamps`].
@@ -302,8 +301,8 @@ impl Peers {
     /// # Panics
     /// If there is no such peer.
     #[must_use]
-    pub fn at(&self, index: usize) -> (DroneId, &Pose) {
-        (self.ids[index], &self.last[index].pose)
+    pub fn at(&self, index: usize) -> (DroneId, Beacon<'_>) {
+        (self.ids[index], self.beacons.get(index))
     }
 
     /// Whether the peer at this index of [`Self::stamps`] is not silent for too long.
@@ -319,15 +318,16 @@ impl Peers {
     pub fn ages_s(&self, now: SimTime) -> impl Iterator<Item = f64> {
         let all = self.all_live(now);
         let living = self
-            .stamps
+            .stamps()
             .iter()
             .enumerate()
             .filter(move |(index, _)| all || self.last[*index].lives(now, self.timeout_s));
         living.map(move |(_, stamp)| now.since(*stamp))
     }
 
-    fn known(&self) -> impl Iterator<Item = (DroneId, &Peer)> + Clone {
-        self.ids.iter().copied().zip(&self.last)
+    fn known(&self) -> impl Iterator<Item = (DroneId, &Peer, Beacon<'_>)> + Clone {
+        let known = self.ids.iter().zip(&self.last).zip(self.beacons.iter());
+        known.map(|((&id, peer), beacon)| (id, peer, beacon))
     }
 }
 
@@ -335,12 +335,6 @@ impl Peers {
 fn hash_of(drones: impl Iterator<Item = DroneId>) -> u32 {
     let sum = drones.fold(0_u64, |sum, id| sum.wrapping_add(Digest::chain(1, u64::from(id.0))));
     ((sum >> 32) as u32).max(1)
-}
-
-/// Where a drone is at `now` if it has kept the velocity of its beacon, world frame, m.
-#[must_use]
-pub fn extrapolated(pose: &Pose, now: SimTime) -> Vec2 {
-    pose.position() + pose.velocity() * now.since(pose.stamp)
 }
 
 #[cfg(test)]
@@ -366,9 +360,9 @@ mod tests {
         peers.hear(now, DroneId(1), pose(1.4, 4.0));
         peers.hear(now, DroneId(1), pose(9.0, 90.0));
         peers.hear(now, DroneId(7), pose(1.5, 5.0));
-        assert_eq!(peers.last(DroneId(1)).unwrap().position_m[0], 5.0);
+        assert_eq!(peers.last(DroneId(1)).unwrap().position().x, 5.0);
         assert!(peers.last(DroneId(7)).is_none());
-        assert_eq!(extrapolated(peers.last(DroneId(1)).unwrap(), now).x, 10.0);
+        assert_eq!(peers.last(DroneId(1)).unwrap().extrapolated(now).x, 10.0);
     }
 
     #[test]
@@ -393,9 +387,9 @@ mod tests {
             }
             let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
-            let lives = |id: &u32| peers.known().any(|(known, peer)| known.0 == *id && peer.lives(now, 1.0));
+            let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, 1.0));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
-            let ages: Vec<f64> = peers.living(now).map(|(_, pose)| now.since(pose.stamp)).collect();
+            let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
             assert_eq!(peers.ages_s(now).collect::<Vec<_>>(), ages);
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
@@ -423,6 +417,6 @@ mod tests {
         let now = SimTime::from_secs(3.0);
         peers.hear(now, DroneId(1), Pose { incarnation: u32::MAX, ..pose(1.0, 1.0) });
         peers.hear(now, DroneId(1), pose(2.0, 2.0));
-        assert_eq!(peers.last(DroneId(1)).unwrap().position_m[0], 2.0);
+        assert_eq!(peers.last(DroneId(1)).unwrap().position().x, 2.0);
     }
 }

@@ -1,7 +1,7 @@
 //! A plan together with the assignments of its drones.
 
+use crate::assignments::Assignments;
 use crate::member::Member;
-use crate::roster::Roster;
 use skein_protocol::payload::Plan;
 use skein_protocol::{GroupId, PlanStamp};
 
@@ -11,7 +11,7 @@ pub struct PlanBundle {
     /// The plan.
     pub plan: Plan,
     /// One assignment per drone, by id.
-    pub parts: Roster,
+    pub parts: Assignments,
 }
 
 impl PlanBundle {
@@ -19,17 +19,13 @@ impl PlanBundle {
     pub fn unsplit(&mut self, members: &[Member], scope: GroupId) {
         for member in members {
             let group = if scope.contains(member.group) { member.group } else { scope };
-            if let Some(part) = self.parts.get_mut(member.id) {
-                part.group = group;
-            }
+            self.parts.change(member.id, |part| part.group = group);
         }
     }
 
     /// Turns this into a bundle for all drones as one group, under this stamp.
     pub fn unite(&mut self, stamp: PlanStamp) {
         (self.plan.id, self.plan.group) = (stamp, GroupId::ALL);
-        for part in self.parts.iter_mut() {
-            (part.id, part.scope, part.group) = (stamp, GroupId::ALL, GroupId::ALL);
-        }
+        self.parts.change_all(|part| (part.id, part.scope, part.group) = (stamp, GroupId::ALL, GroupId::ALL));
     }
 }

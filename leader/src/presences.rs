@@ -104,8 +104,8 @@ impl Presences {
             *told = Told::new(drone);
         }
         if let Some(pose) = near
-            && News::of(pose) == News::of(newest)
-            && newest.stamp.since(pose.stamp) < self.period_s
+            && News::of(pose) == News::of_last(newest)
+            && newest.stamp().since(pose.stamp) < self.period_s
         {
             told.covered = now;
             told.left = told.left.saturating_sub(1);
@@ -136,7 +136,7 @@ impl Presences {
             if (told.left > 0 || stale)
                 && let Some(pose) = k.peers().last_of_living(id, now)
             {
-                due.entry((pose.obeyed, pose.group, pose.term)).or_default().push((
+                due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push((
                     NEWS_TIMES - told.left.min(NEWS_TIMES),
                     (id.0 + self.drones - first) % self.drones,
                     id,
@@ -154,7 +154,7 @@ impl Presences {
                 let mut presence = Presence { obeyed, group, term, ..Presence::default() };
                 for (entry, &(_, _, id)) in presence.drones.iter_mut().zip(chunk) {
                     let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(id)) else { continue };
-                    *entry = present(id, pose);
+                    *entry = present(id, &pose.pose());
                     presence.count += 1;
                     told.covered = now;
                     told.left = told.left.saturating_sub(1);

@@ -2,11 +2,12 @@
 //!
 //! A large swarm has a thousand assignments, so a drone looks at those only whose turn has come.
 
+use crate::beacons::Beacon;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
-use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan, Pose};
+use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
@@ -216,7 +217,7 @@ fn need(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> Need {
     match (subject, &one.fact) {
         (Subject::Plan(scope), Fact::Plan(plan)) => now_or_later(is_plan_wanted(k, now, scope, plan)),
         (Subject::Part(..), Fact::Part(part)) => match k.peers().last_of_living(part.drone, now) {
-            Some(pose) if is_late(pose, part.id.ballot, part.id.epoch) => Need::Now,
+            Some(pose) if is_late(&pose, part.id.ballot, part.id.epoch) => Need::Now,
             // Unless it was said, it is said once if the drone falls silent.
             Some(_) if one.gossip.is_first() => Need::Later,
             Some(_) => Need::Over,
@@ -238,11 +239,11 @@ fn is_on_the_way(k: &Knowledge, position: Vec2, one: &Relayed) -> bool {
 
 /// Whether a neighbour of the plan's group does not obey it yet.
 fn is_plan_wanted(k: &Knowledge, now: SimTime, scope: GroupId, plan: &Plan) -> bool {
-    let late = |pose: &Pose| scope.contains(pose.group) && is_late(pose, plan.id.ballot, plan.id.epoch);
-    k.peers().direct(now).any(|(_, pose)| late(pose))
+    let late = |pose: &Beacon<'_>| scope.contains(pose.group()) && is_late(pose, plan.id.ballot, plan.id.epoch);
+    k.peers().direct(now).any(|(_, pose)| late(&pose))
 }
 
 /// Whether a drone has not obeyed a plan yet, and will.
-fn is_late(pose: &Pose, ballot: Ballot, epoch: u32) -> bool {
-    (pose.obeyed.ballot, pose.obeyed.epoch) < (ballot, epoch) && pose.term <= ballot
+fn is_late(pose: &Beacon<'_>, ballot: Ballot, epoch: u32) -> bool {
+    (pose.obeyed().ballot, pose.obeyed().epoch) < (ballot, epoch) && pose.term() <= ballot
 }

@@ -116,8 +116,8 @@ impl Relays {
             let away_m = (pose.position() - own.position).norm();
             (near_m, far_m) = (near_m.min(away_m), far_m.max(away_m));
             // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
-            differs |= pose.hears != 0 && pose.hears != mine;
-            self.lags |= pose.term < term && scope.contains(pose.group);
+            differs |= pose.hears() != 0 && pose.hears() != mine;
+            self.lags |= pose.term() < term && scope.contains(pose.group());
         }
         self.near_m = NEAR * far_m;
         self.crowded = near_m <= self.near_m;
@@ -145,7 +145,7 @@ impl Relays {
         relay: Option<(DroneId, &Pose)>,
     ) {
         let near = relay.filter(|(relay, _)| self.is_near(k, *relay)).map(|(_, pose)| pose);
-        let has_news = self.wide && k.peers().last(drone).map(News::of) != before;
+        let has_news = self.wide && k.peers().last(drone).map(News::of_last) != before;
         self.presences.hear(k, now, drone, has_news, near);
         if has_news {
             self.facts.wake(now, drone);

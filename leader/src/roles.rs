@@ -6,7 +6,6 @@ use crate::member::Member;
 use crate::onward;
 use crate::own_state::OwnState;
 use crate::params::Between;
-use crate::peers::extrapolated;
 use crate::tuning::{BEHIND_S, LEFT_OUT_S};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
@@ -216,5 +215,5 @@ fn rank_in_part(k: &Knowledge, now: SimTime, me: &Member) -> usize {
 fn rank_among_leaders(k: &Knowledge, now: SimTime, me: &Member) -> usize {
     let mine = k.claim_key(me.position, me.id);
     let leaders = k.peers().living(now).filter(|(_, pose)| pose.leads());
-    leaders.filter(|(id, pose)| k.claim_key(extrapolated(pose, now), *id) < mine).count()
+    leaders.filter(|(id, pose)| k.claim_key(pose.extrapolated(now), *id) < mine).count()
 }

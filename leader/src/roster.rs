@@ -1,8 +1,7 @@
-//! One entry per drone, such as the assignments of a plan: one block of memory, sorted by drone. It is read far more often than
+//! One entry per drone, such as its place in a queue: one block of memory, sorted by drone. It is read far more often than
 //! added to, and additions mostly come in the order of ids.
 
 use skein_protocol::DroneId;
-use skein_protocol::payload::Assignment;
 
 /// An entry that belongs to one drone.
 pub trait OfDrone {
@@ -10,15 +9,9 @@ pub trait OfDrone {
     fn drone(&self) -> DroneId;
 }
 
-impl OfDrone for Assignment {
-    fn drone(&self) -> DroneId {
-        self.drone
-    }
-}
-
 /// At most one entry per drone, by id.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Roster<T = Assignment>(Vec<T>);
+pub struct Roster<T>(Vec<T>);
 
 impl<T> Default for Roster<T> {
     fn default() -> Self {
@@ -27,6 +20,11 @@ impl<T> Default for Roster<T> {
 }
 
 impl<T: OfDrone> Roster<T> {
+    /// No entry yet, and room for so many.
+    pub(crate) fn with_capacity(count: usize) -> Self {
+        Self(Vec::with_capacity(count))
+    }
+
     /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id; if all but one have,
     /// it may be one less.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
@@ -71,11 +69,6 @@ impl<T: OfDrone> Roster<T> {
         self.0.iter()
     }
 
-    /// All entries, by drone, to be changed. Their drones must stay the same.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
-        self.0.iter_mut()
-    }
-
     /// Number of entries.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -88,11 +81,6 @@ impl<T: OfDrone> Roster<T> {
         self.0.is_empty()
     }
 
-    /// Removes the entries of all other drones.
-    pub fn retain(&mut self, stays: impl Fn(DroneId) -> bool) {
-        self.0.retain(|part| stays(part.drone()));
-    }
-
     /// Removes all entries.
     pub fn clear(&mut self) {
         self.0.clear();
@@ -103,7 +91,7 @@ impl<T: OfDrone> Roster<T> {
 impl<T: OfDrone> FromIterator<T> for Roster<T> {
     fn from_iter<I: IntoIterator<Item = T>>(parts: I) -> Self {
         let parts = parts.into_iter();
-        let mut roster = Self(Vec::with_capacity(parts.size_hint().0));
+        let mut roster = Self::with_capacity(parts.size_hint().0);
         for part in parts {
             roster.add(part);
         }
@@ -114,21 +102,31 @@ impl<T: OfDrone> FromIterator<T> for Roster<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bytemuck::Zeroable;
 
-    fn part(drone: u32, rank: u16) -> Assignment {
-        Assignment { drone: DroneId(drone), rank, ..Assignment::zeroed() }
+    struct Place {
+        drone: DroneId,
+        rank: u16,
+    }
+
+    impl OfDrone for Place {
+        fn drone(&self) -> DroneId {
+            self.drone
+        }
+    }
+
+    fn part(drone: u32, rank: u16) -> Place {
+        Place { drone: DroneId(drone), rank }
     }
 
     #[test]
-    fn assignments_are_sorted_by_drone_and_the_first_of_each_drone_counts() {
-        let mut roster: Roster = [part(5, 0), part(1, 1), part(9, 2), part(5, 3), part(3, 4)].into_iter().collect();
-        let all = |roster: &Roster| roster.iter().map(|p| (p.drone.0, p.rank)).collect::<Vec<_>>();
+    fn entries_are_sorted_by_drone_and_the_first_of_each_drone_counts() {
+        let mut roster: Roster<Place> =
+            [part(5, 0), part(1, 1), part(9, 2), part(5, 3), part(3, 4)].into_iter().collect();
+        let all = |roster: &Roster<Place>| roster.iter().map(|p| (p.drone.0, p.rank)).collect::<Vec<_>>();
         assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2)]);
         assert_eq!(roster.add(part(3, 7)).rank, 4);
         assert_eq!(roster.add(part(10, 8)).rank, 8);
         assert!(roster.contains(DroneId(9)) && !roster.contains(DroneId(4)) && roster.get(DroneId(11)).is_none());
-        roster.retain(|id| id.0 != 5);
-        assert_eq!(all(&roster), [(1, 1), (3, 4), (9, 2), (10, 8)]);
+        assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2), (10, 8)]);
     }
 }

@@ -157,9 +157,7 @@ fn superseding(mut bundle: PlanBundle, decision: SimTime) -> PlanBundle {
     id.epoch = id.epoch.saturating_add(1);
     let id = *id;
     bundle.plan.stamp = decision;
-    for part in bundle.parts.iter_mut() {
-        part.id = id;
-    }
+    bundle.parts.change_all(|part| part.id = id);
     bundle
 }
 

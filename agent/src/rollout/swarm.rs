@@ -113,7 +113,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
             let kept: Vec<Assignment> =
                 left_out.map(|drone| drone.pilot.own_part(&bundle.plan, drone.position)).collect();
             for part in kept {
-                bundle.parts.add(part);
+                bundle.parts.add(&part);
             }
         }
         bundle.unite(PlanStamp { epoch: newest.epoch.saturating_add(1), ..newest });

@@ -3,7 +3,7 @@
 use super::*;
 use crate::test_params::planner;
 use bytemuck::Zeroable;
-use skein_leader::roster::Roster;
+use skein_leader::assignments::Assignments;
 use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
 use skein_protocol::payload::{Assignment, Plan};
 use skein_protocol::{PlanStamp, Vec2};
@@ -75,8 +75,8 @@ fn params() -> RolloutParams {
 
 /// A plan whose only slot is at this abscissa, m.
 fn bundle(slot_x_m: f64) -> PlanBundle {
-    let mut parts = Roster::default();
-    parts.add(Assignment::zeroed());
+    let mut parts = Assignments::default();
+    parts.add(&Assignment::zeroed());
     PlanBundle { plan: Plan { anchor_m: [slot_x_m, 0.0], ..Plan::zeroed() }, parts }
 }
 

@@ -143,7 +143,7 @@ impl Watch {
         }
         let Some(bundle) = leading.obeyed() else { return Ok(()) };
         let plan = (DroneId::NONE, hash(bytemuck::bytes_of(&bundle.plan)));
-        let parts = bundle.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(part))));
+        let parts = bundle.parts.iter().map(|part| (part.drone, hash(bytemuck::bytes_of(&part))));
         for (of, value) in std::iter::once(plan).chain(parts) {
             if *self.parts.entry((stamp, of)).or_insert(value) != value {
                 return Err(Breach::TwoPlans { drone, of, stamp });
