@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import functools
 import json
 import os
@@ -239,5 +240,11 @@ def _table(path: Path) -> Any:
     except ImportError:
         import numpy
 
-        return numpy.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
+        # numpy knows no quotes, and the texts of a cell have commas: cells are joined again with a character that no text has.
+        with open(path, encoding="utf-8", newline="") as file:
+            lines = ["\x1f".join(cells).replace("\n", " ") for cells in csv.reader(file)]
+        table = numpy.genfromtxt(
+            lines, delimiter="\x1f", comments=None, names=True, deletechars="", dtype=None, encoding="utf-8"
+        )
+        return numpy.atleast_1d(table)
     return pandas.read_csv(path)

@@ -271,7 +271,16 @@ def test_a_sweep_flies_python_pilots(tmp_path, scenario):
         'name = "loss"\nscenario = "gossip.toml"\nseeds = 2\nmetrics = ["mission_s"]\n[grid]\nradio.loss = [0.0, 0.5]\n'
     )
     sweep = skein.sweep(experiment, pilots={"gossip": gossip.Gossip}, out=tmp_path / "sweep", jobs=2)
-    assert len(sweep.results["seed"]) == 4
+    assert list(sweep.results["radio.loss"]) == [0.0, 0.0, 0.5, 0.5]
+
+
+def test_a_sweep_gives_texts_with_commas(tmp_path):
+    experiment = tmp_path / "short.toml"
+    scenario = Path(__file__).parents[2] / "scenarios" / "paper" / "s2-right.toml"
+    experiment.write_text(f'name = "short"\nscenario = {json.dumps(str(scenario))}\nseeds = 1\n[grid]\ntime.timeout_s = [1.0]\n')
+    results = skein.sweep(experiment, out=tmp_path / "sweep", jobs=1).results
+    assert list(results["outcome"]) == ["timeout"]
+    assert "," in results["reason"][0] and "drone" in results["reason"][0]
 
 
 def test_the_example_is_the_same_in_both_runtimes(tmp_path):
