@@ -286,14 +286,18 @@ fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<
     envelopes
 }
 
+/// More than the rounding errors of positions within 1000 km, m.
+const ROUNDING_M: f64 = 1e-6;
+
 /// The envelopes from right to left, by lateral position. If a line across the flight can meet two of them, the one that
 /// lies to the right on that line comes first, so that there is a route between them. Ranks from the right and from the
-/// left count alike, so that a mirrored set has the reverse order.
+/// left count alike, so that a mirrored set has the reverse order. Two of them that are exactly behind each other are ordered
+/// by lateral position alone: the sign of a rounding error is not mirrored.
 fn ordered(envelopes: Vec<Envelope>, params: &RouteParams) -> Vec<Envelope> {
     let reach_m = 2.0 * params.planning_distance_m;
     let right_of = |a: &Envelope, b: &Envelope| {
         let apart_m = (b.low.x - a.high.x).max(a.low.x - b.high.x);
-        apart_m < reach_m && a.gap(b).0.y > 0.0
+        apart_m < reach_m && a.gap(b).0.y > ROUNDING_M
     };
     let lateral_m: Vec<f64> = envelopes.iter().map(|envelope| (envelope.low.y + envelope.high.y) / 2.0).collect();
     let right: Vec<Vec<bool>> = envelopes.iter().map(|a| envelopes.iter().map(|b| right_of(a, b)).collect()).collect();
