@@ -145,7 +145,7 @@ mod tests {
     use skein_protocol::record::{DroneRow, RecordHeader};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use std::time::Duration;
+    use std::time::{Duration, Instant};
 
     /// A slow disk that fails once it holds `room` bytes.
     struct Disk {
@@ -221,7 +221,13 @@ mod tests {
         let path = folder.path().join(SPOOL);
         let mut spool = Spool::start(disk(&path, 100_000, 0), 4096).unwrap();
         let refused = (0..100_000).find(|&tick| !give(&mut spool, tick));
-        assert!(refused.is_some() && spool.ready(), "the spool waits for a full disk");
+        assert!(refused.is_some(), "the disk never was full");
+        // The thread closes its channels before it ends, so that a record can be refused a moment earlier.
+        let deadline = Instant::now() + Duration::from_secs(10);
+        while !spool.ready() && Instant::now() < deadline {
+            std::thread::yield_now();
+        }
+        assert!(spool.ready(), "the spool waits for a full disk");
         assert_eq!(spool.finish().unwrap_err().kind(), ErrorKind::StorageFull);
         let kept = ticks(&path);
         assert!(kept.len() > 90 && kept.iter().zip(0..).all(|(&tick, place)| tick == place), "{kept:?}");
