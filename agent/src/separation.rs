@@ -3,10 +3,12 @@
 //! late, lost, doubled or reordered. `docs/safety.md`, "By word alone", states and proves the rule.
 
 pub mod own_path;
+mod relayed_lines;
 pub mod separating_line;
 pub mod separation_pair;
 
 use own_path::OwnPath;
+use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
 use separation_pair::{NumberedLine, SeparationPair, Statement};
 use skein_leader::peers::Peers;
@@ -121,6 +123,12 @@ pub struct Separations {
     /// Whether what the drones range of each other keeps them apart where there is no line.
     ranges: bool,
     known: Vec<Known>,
+    /// How far away the farthest drone is that this drone hears, m; `None` while all drones hear each other.
+    reach_m: Option<f64>,
+    /// Lines of others that this drone passes on.
+    relayed: RelayedLines,
+    /// Whether this drone passed lines on when it last spoke.
+    relays_last: bool,
     /// Order in which lines are stated: scratch memory.
     order: Vec<(f64, usize)>,
 }
@@ -138,7 +146,8 @@ impl Separations {
             };
             Known::new(pair, peer, now, incarnation < 2)
         });
-        Self { known: known.collect(), params, ranges: false, order: Vec::new() }
+        let known = known.collect();
+        Self::of(params, known, false)
     }
 
     /// No lines: so far, what the drones range of each other keeps them apart.
@@ -149,7 +158,13 @@ impl Separations {
             let pair = SeparationPair::restarted(side_of(me, peer), incarnation);
             Known::new(pair, peer, now, false)
         });
-        Self { known: known.collect(), params, ranges: true, order: Vec::new() }
+        let known = known.collect();
+        Self::of(params, known, true)
+    }
+
+    fn of(params: SeparationParams, known: Vec<Known>, ranges: bool) -> Self {
+        let relayed = RelayedLines::default();
+        Self { params, ranges, known, reach_m: None, relayed, relays_last: false, order: Vec::new() }
     }
 
     /// From now on, makes a first line with every other drone with which there is none.
@@ -182,11 +197,43 @@ impl Separations {
             .flat_map(|known| known.pair.lines().iter().map(|numbered| (&numbered.line, known.pair.side())))
     }
 
-    /// Hears the lines of another drone. `path`: this drone's path with full braking from now on.
-    pub fn hear(&mut self, source: DroneId, separation: &Separation, path: &OwnPath) {
+    /// Notes how far away the farthest drone is that this drone hears, m; `None` while all drones hear each other. Lines of others are
+    /// passed on only where some drones do not hear each other.
+    pub fn set_reach(&mut self, reach_m: Option<f64>) {
+        self.reach_m = reach_m;
+        if reach_m.is_none() {
+            self.relayed.clear();
+        }
+    }
+
+    /// Hears the lines in a message of `source`. `path`: this drone's path with full braking from now on.
+    pub fn hear(&mut self, source: DroneId, separation: &Separation, peers: &Peers, path: &OwnPath) {
+        let speaker = separation.drone(source);
+        self.hear_own(speaker, separation, path);
+        if let Some(reach_m) = self.reach_m.filter(|_| self.params.knows(speaker) && speaker != self.params.me) {
+            self.hear_others(source, separation, reach_m, peers, path);
+        }
+    }
+
+    /// Hears the lines in a message of `source` that are meant for other drones.
+    fn hear_others(&mut self, source: DroneId, separation: &Separation, reach_m: f64, peers: &Peers, path: &OwnPath) {
+        let (me, params) = (self.params.me, &self.params);
+        let place = |drone: DroneId| peers.last(drone).map_or(params.start(drone), |pose| pose.position());
+        let speaker = separation.drone(source);
+        let (from, of) = (place(source), place(speaker));
+        for line in separation.separators().iter().filter(|line| line.peer != me && params.knows(line.peer)) {
+            let to = place(line.peer);
+            let (said_m, own_m) = ((from - to).norm(), (path.end() - to).norm());
+            let distances = Distances { said_m, own_m, pair_m: (of - to).norm(), reach_m };
+            self.relayed.hear(path.now(), speaker, line, source == speaker, distances);
+        }
+    }
+
+    /// Hears the lines of `speaker` that are meant for this drone.
+    fn hear_own(&mut self, speaker: DroneId, separation: &Separation, path: &OwnPath) {
         let (me, half_m) = (self.params.me, self.params.keep_m / 2.0);
         let ranges = self.ranges;
-        let Some(known) = self.find(source) else { return };
+        let Some(known) = self.find(speaker) else { return };
         for separator in separation.separators().iter().filter(|s| s.peer == me) {
             let heard = statement(separator);
             let motion_s = heard.bound_to.line.rests_after_s(path.now());
@@ -227,6 +274,23 @@ impl Separations {
     }
 
     fn state(&mut self, peers: &Peers, path: &OwnPath, say: &mut Vec<Message>) {
+        let messages = messages(self.params.starts_m.len());
+        let passes_on = self.pass_on(path.now(), messages, say);
+        self.state_own(messages - usize::from(passes_on), peers, path, say);
+    }
+
+    /// Passes lines of others on, in one of the messages that this drone may say now. A drone that may say one message says its own
+    /// lines every other time. Returns whether it passed lines on.
+    fn pass_on(&mut self, now: SimTime, messages: usize, say: &mut Vec<Message>) -> bool {
+        let is_turn = self.reach_m.is_some() && (messages > 1 || !self.relays_last);
+        let relayed = if is_turn { self.relayed.speak(now) } else { None };
+        self.relays_last = relayed.is_some();
+        say.extend(relayed.map(Message::Separation));
+        self.relays_last
+    }
+
+    /// States the lines to which this drone is bound, in so many messages.
+    fn state_own(&mut self, messages: usize, peers: &Peers, path: &OwnPath, say: &mut Vec<Message>) {
         let now = path.now();
         self.order.clear();
         for (index, known) in self.known.iter().enumerate() {
@@ -235,12 +299,14 @@ impl Separations {
             self.order.push((-urgency, index));
         }
         self.order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.order.truncate(messages(self.params.starts_m.len()) * MAX_SEPARATORS);
+        self.order.truncate(messages * MAX_SEPARATORS);
         let mut separators = Vec::with_capacity(self.order.len());
         for &(_, index) in &self.order {
             let known = &mut self.known[index];
             known.said = now;
             if let Some(pose) = peers.last(known.peer).map(|beacon| beacon.pose()) {
+                // A drone that is out of reach may have been restarted: its state is passed on.
+                known.pair.hear_incarnation(pose.incarnation);
                 let pose = known.seen.map_or(pose, |seen| seen.at(now, &pose));
                 self.params.propose(known, &pose, peers.delay_s(), path);
             }
@@ -288,7 +354,7 @@ fn separator(peer: DroneId, said: &Statement) -> Separator {
 }
 
 fn message(separators: &[Separator]) -> Message {
-    let mut message = Separation { count: separators.len() as u32, reserved: 0, separators: Default::default() };
+    let mut message = Separation { count: separators.len() as u32, of: 0, separators: Default::default() };
     message.separators[..separators.len()].copy_from_slice(separators);
     Message::Separation(message)
 }
@@ -312,6 +378,16 @@ impl SeparationParams {
         (0..self.starts_m.len() as u32).map(DroneId).filter(move |&peer| peer != me)
     }
 
+    /// Whether there is a drone with this id.
+    fn knows(&self, drone: DroneId) -> bool {
+        drone.index() < self.starts_m.len()
+    }
+
+    /// Where a drone starts, m.
+    fn start(&self, drone: DroneId) -> Vec2 {
+        self.starts_m.get(drone.index()).copied().unwrap_or_default()
+    }
+
     /// Whether a statement is due. Those of different drones fall into different ticks.
     fn is_due(&self, tick: u64) -> bool {
         let period = ((self.period_s / self.dt_s).round() as u64).max(1);
@@ -320,12 +396,11 @@ impl SeparationParams {
 
     /// The line between two drones at the start. `front` has the lower id.
     fn first_line(&self, front: DroneId, back: DroneId) -> SeparatingLine {
-        let start = |drone: DroneId| self.starts_m.get(drone.index()).copied().unwrap_or_default();
         let (velocity, braking) = (self.start_velocity, self.braking_mps2);
-        let normal = (start(front) - start(back)).try_normalize(1e-9).unwrap_or(Vec2::x());
+        let normal = (self.start(front) - self.start(back)).try_normalize(1e-9).unwrap_or(Vec2::x());
         let line = SeparatingLine::resting(SimTime::ZERO, normal, 0.0);
         let speed = velocity.norm();
-        let middle = (start(front) + start(back)) / 2.0 + velocity * (speed / (2.0 * braking));
+        let middle = (self.start(front) + self.start(back)) / 2.0 + velocity * (speed / (2.0 * braking));
         let along = line.normal().dot(&velocity);
         let way_m = along * speed / (2.0 * braking);
         let moving = line.shifted(line.normal().dot(&middle));

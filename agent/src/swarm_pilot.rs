@@ -480,7 +480,7 @@ impl SwarmPilot {
     fn hear_separation(&mut self, source: DroneId, message: MessageRef<'_>, path: Option<&OwnPath>) {
         let (Some(separations), Some(path)) = (&mut self.separations, path) else { return };
         match message {
-            MessageRef::Separation(lines) => separations.hear(source, lines, path),
+            MessageRef::Separation(lines) => separations.hear(source, lines, self.leading.peers(), path),
             MessageRef::Pose(pose) => separations.hear_incarnation(source, pose.incarnation),
             _ => {}
         }
@@ -493,6 +493,7 @@ impl SwarmPilot {
                 let position = senses.position() + seen.position();
                 separations.see(seen.drone, Sighting { position, velocity: senses.velocity() + seen.velocity() });
             }
+            separations.set_reach(self.leading.reach_m());
             separations.speak(self.leading.peers(), path, say);
         }
     }

@@ -100,3 +100,26 @@ pub(crate) const CLIMB_GAIN_PER_S: f64 = 2.0;
 /// Share of the acceleration that the horizontal command leaves which may be vertical. Chosen by hand, below 1, so that rounding never
 /// shortens the horizontal part.
 pub(crate) const CLIMB_SHARE: f64 = 0.99;
+
+/// Time after which a line is passed on whose two drones may be out of each other's reach, s: at most; less for drones that are nearer to
+/// the one it is meant for. Chosen by hand. `skein sweep experiments/wide-presets.toml --set sensors.ranging=false`.
+pub(crate) const LINE_FIRST_S: f64 = 0.5;
+
+/// Time after which a drone passes a line on again, s. It is doubled each time. Chosen by hand. The same command.
+pub(crate) const LINE_REPEAT_S: f64 = 1.0;
+
+/// Two drones that are nearer to each other than this, as a share of the distance over which a drone hears others, are taken to hear each
+/// other: what they say to each other is passed on most rarely. Chosen by hand. The same command.
+pub(crate) const LINE_NEAR: f64 = 0.5;
+
+/// Number of nearer drones that have to say a line before a drone does not, in one turn. Chosen by hand: with one, a line would be lost
+/// where that one does not reach the drone it is meant for. The same command.
+pub(crate) const LINE_REDUNDANCY: u32 = 2;
+
+/// How long a line is not passed on after it was answered, s. Chosen by hand: longer than two drones that hear each other take for an
+/// answer. The same command.
+pub(crate) const LINE_ANSWERED_S: f64 = 2.0;
+
+/// How long a drone remembers a line that it does not hear any more, s. Chosen by hand: longer than the longest time between two
+/// repetitions. The same command.
+pub(crate) const LINE_FORGET_S: f64 = 30.0;

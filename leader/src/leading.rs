@@ -67,6 +67,13 @@ impl Leading {
         Self { knowledge, relays: Relays::unused(params), ..Self::new(params) }
     }
 
+    /// Distance to the farthest drone that this drone hears without a relay, m; `None` while, as far as it knows, all living drones hear each
+    /// other.
+    #[must_use]
+    pub fn reach_m(&self) -> Option<f64> {
+        self.relays.reach_m()
+    }
+
     /// Whether this drone leads a group.
     #[must_use]
     pub fn is_leader(&self) -> bool {

@@ -90,6 +90,11 @@ impl Relays {
         self.wide
     }
 
+    /// Distance to the farthest drone that this drone hears without a relay, m; `None` if all living drones hear each other.
+    pub(crate) fn reach_m(&self) -> Option<f64> {
+        self.wide.then_some(self.near_m / NEAR)
+    }
+
     /// Whether a drone hears much the same drones as this one: it is close.
     pub(crate) fn is_near(&self, k: &Knowledge, other: DroneId) -> bool {
         k.peers().last(other).is_some_and(|pose| (pose.position() - self.position).norm() <= self.near_m)

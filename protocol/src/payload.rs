@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
 /// Version of all layouts in this module. A receiver rejects a frame of another version.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
@@ -413,8 +413,7 @@ impl Passed {
     }
 }
 
-/// A line between the source of a message and one other drone. The source is bound to stay on its side of it
-/// (docs/safety.md, "By word alone"). The line moves along its normal, brakes and stops.
+/// A line between two drones. The drone that says it is bound to stay on its side of it (docs/safety.md, "By word alone"). The line moves along its normal, brakes and stops.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Separator {
@@ -432,25 +431,31 @@ pub struct Separator {
     pub peer: DroneId,
     /// Number of the line among the lines of the two drones. Later lines have higher numbers.
     pub number: u32,
-    /// The incarnation of the source, from 1.
+    /// The incarnation of the drone that is bound to the line, from 1.
     pub incarnation: u16,
     /// The incarnation of the other drone for which the line is meant, from 1.
     pub peer_incarnation: u16,
 }
 
-/// Lines that the source is bound to, each between the source and one other drone.
+/// Lines that a drone is bound to, each between that drone and one other drone.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Separation {
     /// Number of entries of `separators` in use, at most [`MAX_SEPARATORS`].
     pub count: u32,
-    /// Always 0.
-    pub reserved: u32,
+    /// 0 if the source itself is bound to the lines. Otherwise the source passes on lines of the drone with this number less 1.
+    pub of: u32,
     /// The lines.
     pub separators: [Separator; MAX_SEPARATORS],
 }
 
 impl Separation {
+    /// The drone that is bound to the lines, in a message of `source`.
+    #[must_use]
+    pub fn drone(&self, source: DroneId) -> DroneId {
+        self.of.checked_sub(1).map_or(source, DroneId)
+    }
+
     /// The entries in use.
     #[must_use]
     pub fn separators(&self) -> &[Separator] {

@@ -28,6 +28,10 @@ fn separations(me: u32, incarnation: u32) -> Separations {
     Separations::new(params, SimTime::ZERO)
 }
 
+fn no_peers() -> Peers {
+    Peers::new(3, 1.0)
+}
+
 fn path(tick: u64, position: Vec2, velocity: Vec2) -> OwnPath {
     let now = SimTime::from_secs(tick as f64 * FILTER.dt_s);
     OwnPath::new((tick, now), vec![position], velocity, FILTER.law(), FILTER.stride())
@@ -72,7 +76,7 @@ fn the_drone_ahead_gives_room_to_its_follower() {
     let [Message::Separation(said)] = say[..] else { panic!("{say:?}") };
     let at = Vec2::new(-30.0 - FILTER.keep_m() / 2.0 - 1e-6, 0.0);
     assert!(command(&follower, at, Vec2::zeros()).x < 0.2, "it is at its line");
-    follower.hear(DroneId(0), &said, &path(tick, at, Vec2::zeros()));
+    follower.hear(DroneId(0), &said, &peers, &path(tick, at, Vec2::zeros()));
     assert_eq!(command(&follower, at, Vec2::zeros()), Vec2::new(5.0, 0.0));
 }
 
@@ -95,7 +99,7 @@ fn a_restarted_drone_hovers_until_all_others_have_addressed_it() {
                 &mut say,
             );
             let [Message::Separation(said)] = say[..] else { panic!("{say:?}") };
-            restarted.hear(source, &said, &here);
+            restarted.hear(source, &said, &no_peers(), &here);
         }
     }
     assert!(!restarted.must_hover());
@@ -122,9 +126,53 @@ proptest! {
             };
             let mut separators = [Separator::default(); MAX_SEPARATORS];
             separators[0] = separator;
-            drone.hear(DroneId(source), &Separation { count: 1, reserved: 0, separators }, &here);
+            drone.hear(DroneId(source), &Separation { count: 1, of: 0, separators }, &no_peers(), &here);
             let acceleration = command(&drone, Vec2::new(-60.0, 0.0), Vec2::new(3.0, 1.0));
             prop_assert!(acceleration.norm() <= FILTER.acceleration_max_mps2 * (1.0 + 1e-9));
         }
     }
+}
+
+/// Flies three drones in line along x for a minute. Only neighbours in the line hear each other's lines. Returns where they are then.
+fn fly_a_chain(passes_on: bool) -> [f64; 3] {
+    let mut drones = [0, 1, 2].map(|me| separations(me, 1));
+    let mut peers = [0, 1, 2].map(|_| Peers::new(3, 2.0));
+    let mut bodies = [0.0, -60.0, -120.0].map(|x| (Vec2::new(x, 0.0), Vec2::zeros()));
+    for tick in 0..3000 {
+        let now = SimTime::from_secs(f64::from(tick) * FILTER.dt_s);
+        let mut said = Vec::new();
+        for (me, drone) in drones.iter_mut().enumerate() {
+            let (position, velocity) = bodies[me];
+            let mut say = Vec::new();
+            drone.set_reach(passes_on.then_some(70.0));
+            drone.speak(&peers[me], &path(tick as u64, position, velocity), &mut say);
+            said.extend(say.into_iter().map(|message| (me, message)));
+        }
+        for me in 0..3 {
+            let here = path(tick as u64, bodies[me].0, bodies[me].1);
+            for from in (0..3).filter(|&from| from != me) {
+                peers[me].hear(now, DroneId(from as u32), pose(now, bodies[from].0, bodies[from].1));
+            }
+            for (from, message) in said.iter().filter(|(from, _)| from.abs_diff(me) == 1) {
+                let Message::Separation(lines) = message else { panic!("{message:?}") };
+                drones[me].hear(DroneId(*from as u32), lines, &peers[me], &here);
+            }
+        }
+        for (drone, (position, velocity)) in drones.iter().zip(&mut bodies) {
+            let next = *velocity + command(drone, *position, *velocity) * FILTER.dt_s;
+            *position += (*velocity + next) * (FILTER.dt_s / 2.0);
+            *velocity = next;
+        }
+    }
+    bodies.map(|(position, _)| position.x)
+}
+
+#[test]
+fn a_drone_out_of_reach_is_freed_by_lines_that_others_pass_on() {
+    let [_, _, last] = fly_a_chain(false);
+    let start_line_x = -60.0;
+    assert!(last <= start_line_x - FILTER.keep_m() / 2.0 + 1e-6, "it stays behind the line from the start: {last}");
+    let [first, middle, last] = fly_a_chain(true);
+    assert!(last > 100.0, "{first}, {middle}, {last}");
+    assert!(first - middle >= FILTER.keep_m() - 1e-6 && middle - last >= FILTER.keep_m() - 1e-6);
 }

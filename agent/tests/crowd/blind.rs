@@ -77,7 +77,9 @@ impl Crowd {
         for (_, from, message) in heard {
             match (message, &mut member.lines) {
                 (Message::Pose(pose), _) => member.peers.hear(now, DroneId(from as u32), pose),
-                (Message::Separation(said), Some(lines)) => lines.hear(DroneId(from as u32), &said, &path),
+                (Message::Separation(said), Some(lines)) => {
+                    lines.hear(DroneId(from as u32), &said, &member.peers, &path)
+                }
                 _ => {}
             }
         }

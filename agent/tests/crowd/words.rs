@@ -25,12 +25,31 @@ pub(crate) struct Adversary {
     pub(crate) loss: f64,
     /// Share of the drones that die for a while and are restarted with empty memory.
     pub(crate) restarts: f64,
+    /// Distance over which lines are heard, m. Drones that are farther apart pass them on. States are heard by all.
+    pub(crate) reach_m: f64,
 }
 
 impl Adversary {
-    /// Delays up to 3 s, up to 80 % lost; half of the crowds have restarts.
+    /// Everybody hears everybody.
+    pub(crate) fn new(delay_s: f64, loss: f64, restarts: f64) -> Self {
+        Self { delay_s, loss, restarts, reach_m: f64::INFINITY }
+    }
+
+    /// Lines are heard over `reach_m` only, and passed on.
+    pub(crate) fn with_reach(self, reach_m: f64) -> Self {
+        Self { reach_m, ..self }
+    }
+
+    /// Delays up to 3 s, up to 80 % lost; half of the crowds have restarts, and half of them pass lines on.
     pub(crate) fn random(random: &mut Keyed) -> Self {
-        Self { delay_s: random.within(0.0, 3.0), loss: random.within(0.0, 0.8), restarts: random.within(-0.2, 0.2) }
+        let adversary = Self::new(random.within(0.0, 3.0), random.within(0.0, 0.8), random.within(-0.2, 0.2));
+        let wide = random.unit() < 0.5;
+        if wide { adversary.with_reach(random.within(30.0, 200.0)) } else { adversary }
+    }
+
+    /// Whether a message reaches a drone at this distance.
+    fn reaches(&self, message: &Message, distance_m: f64) -> bool {
+        distance_m <= self.reach_m || matches!(message, Message::Pose(_))
     }
 }
 
@@ -172,7 +191,7 @@ impl Talk {
                     separations.hear_incarnation(source, pose.incarnation);
                     peers.hear(now, source, Pose { stamp: pose.stamp.min(now), ..pose });
                 }
-                Message::Separation(lines) => separations.hear(source, &lines, &path),
+                Message::Separation(lines) => separations.hear(source, &lines, peers, &path),
                 _ => {}
             }
         }
@@ -187,9 +206,12 @@ impl Talk {
                 ..Pose::zeroed()
             };
             let mut said = vec![Message::Pose(pose)];
+            separations.set_reach(Some(self.adversary.reach_m).filter(|reach_m| reach_m.is_finite()));
             separations.speak(peers, &path, &mut said);
             for message in said {
-                for to in (0..crowd.bodies.len()).filter(|&to| to != i) {
+                let away_m = |to: usize| (crowd.bodies[to].0 - crowd.bodies[i].0).norm();
+                let reached = |&to: &usize| to != i && self.adversary.reaches(&message, away_m(to));
+                for to in (0..crowd.bodies.len()).filter(reached) {
                     self.air[to].extend(self.adversary.transmit(crowd, i, message, random));
                 }
             }

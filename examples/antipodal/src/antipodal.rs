@@ -97,7 +97,7 @@ impl Antipodal {
                     self.separations.hear_incarnation(heard.source, pose.incarnation);
                     self.peers.hear(now, heard.source, *pose);
                 }
-                MessageRef::Separation(lines) => self.separations.hear(heard.source, lines, path),
+                MessageRef::Separation(lines) => self.separations.hear(heard.source, lines, &self.peers, path),
                 _ => {}
             }
         }
