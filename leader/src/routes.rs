@@ -4,6 +4,7 @@
 //! corners of the inflated obstacles that the path has to pass on a given side.
 
 use crate::geometry::{hull, inflate, inscribed, lower_chain, nearest, separation, upper_chain};
+use crate::tuning::ROUNDING_M;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 
@@ -285,9 +286,6 @@ fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<
     }
     envelopes
 }
-
-/// More than the rounding errors of positions within 1000 km, m.
-const ROUNDING_M: f64 = 1e-6;
 
 /// The envelopes from right to left, by lateral position. If a line across the flight can meet two of them, the one that
 /// lies to the right on that line comes first, so that there is a route between them. Ranks from the right and from the

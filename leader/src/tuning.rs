@@ -156,6 +156,11 @@ pub(crate) const OPEN_RANKS: f64 = 1.6;
 /// A formation in which all drones have been stalled for this long is stuck, s. 3. By hand.
 pub(crate) const STALLED_S: f64 = 3.0;
 
+// ---- Routes (`routes.rs`) ----
+
+/// More than the rounding errors of positions within 1000 km, m. 1e-6. Not tuned.
+pub(crate) const ROUNDING_M: f64 = 1e-6;
+
 // ---- Paths (`funnel.rs`) ----
 
 /// Distance of a corridor's target behind the last set's exit, m. 60. By hand; `skein reproduce`.

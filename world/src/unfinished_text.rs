@@ -1,6 +1,7 @@
 //! In words: why the time of a mission is over and its goal is not reached.
 
 use crate::tuning::STANDSTILL_S;
+use skein_protocol::payload::QueuePlace;
 use skein_protocol::{Lack, Phase, UnfinishedDrone};
 
 /// This number of drones is described; the others are counted.
@@ -58,6 +59,9 @@ fn one(drone: &UnfinishedDrone) -> String {
         facts.push(format!("before stage {}", stage + 1));
     }
     facts.push(match (drone.route, drone.rank, drone.phase) {
+        (Some(route), Some(QueuePlace::NO_RANK), _) => {
+            format!("behind all others in the queue of {} on route {route}", drone.group)
+        }
         (Some(route), Some(rank), _) => {
             format!("place {} in the queue of {} on route {route}", u32::from(rank) + 1, drone.group)
         }
@@ -96,6 +100,13 @@ mod tests {
             "the time of 932 s is over; no drone has moved for 380 s; not in a slot: drone 3 (61 m from the slot left for it, \
              still for 400 s, before stage 2, place 2 in the queue of N1 on route 0, obeys 7)"
         );
+    }
+
+    #[test]
+    fn a_drone_that_gave_its_place_up_is_named_as_the_last_of_its_queue() {
+        let last = UnfinishedDrone { rank: Some(QueuePlace::NO_RANK), ..late(3, 400.0) };
+        let text = reason(932.0, &[last], None);
+        assert!(text.contains(", behind all others in the queue of N1 on route 0, "), "{text}");
     }
 
     #[test]
