@@ -32,6 +32,12 @@ const PATIENCE_S: f64 = 0.5;
 /// A path is kept this far beyond what a new line demands, m, so that rounding does not matter.
 const ROUNDING_M: f64 = 1e-6;
 
+/// Of two drones that are both slower than this, m/s, and nearer to each other than [`CLOSE`], the one with the lower id has all the room
+/// between them.
+const STILL_MPS: f64 = 0.3;
+/// A distance that is short, in distances to keep.
+const CLOSE: f64 = 2.0;
+
 /// A line that moves for longer than this is no line that a drone makes, s.
 const LONGEST_MOTION_S: f64 = 300.0;
 
@@ -483,7 +489,15 @@ impl SeparationParams {
         let (own_mps, peer_mps) = (n.dot(&own.velocity), n.dot(&peer.velocity));
         let middle_m = (own_m + peer_m + (own_mps + peer_mps) * late_s) / 2.0;
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
-        let stop_m = middle_m.max(peer_needs_m).min(own_m - half_m);
+        let close = own_m - peer_m < CLOSE * self.keep_m;
+        let still = own.velocity.norm().max(peer.velocity.norm()) < STILL_MPS;
+        let aimed_m = match side {
+            _ if !close || !still => middle_m,
+            // Two drones that block each other would wait for ever if each of them always left the other one half of the room.
+            Side::Front => peer_m + half_m,
+            Side::Back => own_m - half_m,
+        };
+        let stop_m = aimed_m.max(peer_needs_m).min(own_m - half_m);
         // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.
         let speed = own.velocity.norm();
         let spare_m = own_m - half_m - stop_m;

@@ -176,3 +176,32 @@ fn a_drone_out_of_reach_is_freed_by_lines_that_others_pass_on() {
     assert!(last > 100.0, "{first}, {middle}, {last}");
     assert!(first - middle >= FILTER.keep_m() - 1e-6 && middle - last >= FILTER.keep_m() - 1e-6);
 }
+
+#[test]
+fn of_two_drones_that_block_each_other_the_one_with_the_lower_id_has_the_room_between_them() {
+    let mut drones = [separations(0, 1), separations(1, 1)];
+    let places = [Vec2::new(-40.0, 0.0), Vec2::new(-80.0, 0.0)];
+    let mut peers = [Peers::new(3, 2.0), Peers::new(3, 2.0)];
+    for tick in 0..100 {
+        let now = SimTime::from_secs(f64::from(tick) * FILTER.dt_s);
+        let here = places.map(|place| path(tick as u64, place, Vec2::zeros()));
+        for me in 0..2 {
+            let (other, mut say) = (1 - me, Vec::new());
+            peers[me].hear(now, DroneId(other as u32), pose(now, places[other], Vec2::zeros()));
+            drones[me].speak(&peers[me], &here[me], &mut say);
+            for message in say {
+                let Message::Separation(lines) = message else { panic!("{message:?}") };
+                drones[other].hear(DroneId(me as u32), &lines, &peers[other], &here[other]);
+            }
+        }
+    }
+    let room_m = [0, 1].map(|me: usize| {
+        let peer = DroneId(1 - me as u32);
+        let known = drones[me].known.iter().find(|known| known.peer == peer).expect("they know each other");
+        let side = known.pair.side();
+        let lines = known.pair.lines().iter();
+        let here = path(100, places[me], Vec2::zeros());
+        lines.map(|line| here.distance_m(&line.line, side) - FILTER.keep_m() / 2.0).fold(f64::INFINITY, f64::min)
+    });
+    assert!((room_m[0] - (40.0 - FILTER.keep_m())).abs() < 0.01 && room_m[1].abs() < 0.01, "{room_m:?}");
+}
