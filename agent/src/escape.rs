@@ -4,9 +4,11 @@ use skein_protocol::{SimTime, Vec2};
 
 /// Speed below which a drone counts as still, m/s.
 const STILL_MPS: f64 = 0.3;
-/// A still drone counts as stuck if it wants to fly faster than this, m/s, or than the speed at which it would escape. A drone whose
-/// nominal speed is lower than this would never be stuck otherwise.
+/// A still drone counts as stuck if it wants to fly faster than this, m/s, or than [`EAGER_SHARE`] of the speed at which it would escape. A
+/// drone whose nominal speed is lower than this would never be stuck otherwise.
 const EAGER_MPS: f64 = 3.0;
+/// See [`EAGER_MPS`]. Less than 1, because a drone in a queue wants to fly at the speed at which it would escape.
+const EAGER_SHARE: f64 = 0.9;
 /// Duration of the first attempt, s.
 const FIRST_S: f64 = 6.0;
 /// Increase of the duration from each attempt to the next, s.
@@ -49,7 +51,7 @@ impl Escape {
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        if velocity.norm() >= STILL_MPS || wanted.norm() <= EAGER_MPS.min(speed_mps) {
+        if velocity.norm() >= STILL_MPS || wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
             self.still_since = None;
             return wanted;
         }
@@ -88,6 +90,14 @@ mod tests {
         let at = |second: u32| SimTime::from_secs(f64::from(second));
         let flown: Vec<Vec2> = (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7)).collect();
         assert_eq!(flown[2], wanted);
+        assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
+    }
+
+    #[test]
+    fn a_slow_drone_in_a_queue_gets_stuck_as_well() {
+        let (mut escape, wanted) = (Escape::default(), Vec2::new(1.7, 0.0));
+        let at = |second: u32| SimTime::from_secs(f64::from(second));
+        let flown: Vec<Vec2> = (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7)).collect();
         assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
     }
 
