@@ -1,9 +1,8 @@
 //! Escape of a stuck drone. A drone is stuck if it wants to move and cannot. It first backs off and then tries the sides.
 
+use crate::tuning::STILL_MPS;
 use skein_protocol::{SimTime, Vec2};
 
-/// Speed below which a drone counts as still, m/s.
-const STILL_MPS: f64 = 0.3;
 /// A still drone counts as stuck if it wants to fly faster than this, m/s, or than [`EAGER_SHARE`] of the speed at which it would escape. A
 /// drone whose nominal speed is lower than this would never be stuck otherwise.
 const EAGER_MPS: f64 = 3.0;

@@ -7,6 +7,7 @@ mod relayed_lines;
 pub mod separating_line;
 pub mod separation_pair;
 
+use crate::tuning::STILL_MPS;
 use own_path::OwnPath;
 use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
@@ -32,10 +33,8 @@ const PATIENCE_S: f64 = 0.5;
 /// A path is kept this far beyond what a new line demands, m, so that rounding does not matter.
 const ROUNDING_M: f64 = 1e-6;
 
-/// Of two drones that are both slower than this, m/s, and nearer to each other than [`CLOSE`], the one with the lower id has all the room
+/// Of two drones that are both still and nearer to each other than this, in distances to keep, the one with the lower id has all the room
 /// between them.
-const STILL_MPS: f64 = 0.3;
-/// A distance that is short, in distances to keep.
 const CLOSE: f64 = 2.0;
 
 /// A line that moves for longer than this is no line that a drone makes, s.
@@ -491,11 +490,11 @@ impl SeparationParams {
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
         let still = own.velocity.norm().max(peer.velocity.norm()) < STILL_MPS;
-        let aimed_m = match side {
-            _ if !close || !still => middle_m,
+        let aimed_m = match (close && still, side) {
+            (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.
-            Side::Front => peer_m + half_m,
-            Side::Back => own_m - half_m,
+            (true, Side::Front) => peer_m + half_m,
+            (true, Side::Back) => own_m - half_m,
         };
         let stop_m = aimed_m.max(peer_needs_m).min(own_m - half_m);
         // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.

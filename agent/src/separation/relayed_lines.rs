@@ -4,8 +4,8 @@
 //! unchanged. What is passed on decides only how fast drones fly that are out of each other's reach.
 //!
 //! A line is passed on by drones that are nearer to the drone it is meant for than those that have said it. It is repeated more and
-//! more rarely. A new line of the same two drones shortens the wait. A line is not passed on while the two drones show that they hear
-//! each other.
+//! more rarely; from the start most rarely if its two drones are near each other. A new line of the same two drones shortens the wait. A
+//! line is not passed on for a while after the other drone answered it. Answers themselves are not answered: they are only repeated rarely.
 
 use crate::tuning::{LINE_ANSWERED_S, LINE_FIRST_S, LINE_FORGET_S, LINE_NEAR, LINE_REDUNDANCY, LINE_REPEAT_S};
 use skein_protocol::payload::{MAX_SEPARATORS, Separation, Separator};
@@ -17,14 +17,14 @@ const MAX_LINES: usize = 2048;
 /// The time between two repetitions is doubled at most this often.
 const MAX_DOUBLINGS: u32 = 3;
 
-/// How far those are from a drone who say a line that is meant for it, m.
+/// What decides whether and when a drone passes on a line that is meant for another drone, the addressee. Distances, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Distances {
-    /// From the drone that says the line in the message that was heard.
+    /// From the source of the message that was heard to the addressee.
     pub(crate) said_m: f64,
-    /// From this drone.
+    /// From this drone to the addressee.
     pub(crate) own_m: f64,
-    /// From the drone whose line it is.
+    /// From the drone that is bound to the line to the addressee.
     pub(crate) pair_m: f64,
     /// From this drone to the farthest drone that it hears.
     pub(crate) reach_m: f64,

@@ -25,7 +25,7 @@ pub(crate) struct Adversary {
     pub(crate) loss: f64,
     /// Share of the drones that die for a while and are restarted with empty memory.
     pub(crate) restarts: f64,
-    /// Distance over which lines are heard, m. Drones that are farther apart pass them on. States are heard by all.
+    /// Distance over which lines are heard, m. Drones that are farther apart, and every third pair, only get them passed on. States are heard by all.
     pub(crate) reach_m: f64,
 }
 
@@ -47,9 +47,11 @@ impl Adversary {
         if wide { adversary.with_reach(random.within(30.0, 200.0)) } else { adversary }
     }
 
-    /// Whether a message reaches a drone at this distance.
-    fn reaches(&self, message: &Message, distance_m: f64) -> bool {
-        distance_m <= self.reach_m || matches!(message, Message::Pose(_))
+    /// Whether a message of one drone reaches another one at this distance. Where lines are passed on, every third pair of drones
+    /// never hears the lines that one says to the other, so that they matter however near the two are.
+    fn reaches(&self, message: &Message, (from, to): (usize, usize), distance_m: f64) -> bool {
+        let deaf = self.reach_m.is_finite() && (from + to).is_multiple_of(3);
+        matches!(message, Message::Pose(_)) || (distance_m <= self.reach_m && !deaf)
     }
 }
 
@@ -210,7 +212,7 @@ impl Talk {
             separations.speak(peers, &path, &mut said);
             for message in said {
                 let away_m = |to: usize| (crowd.bodies[to].0 - crowd.bodies[i].0).norm();
-                let reached = |&to: &usize| to != i && self.adversary.reaches(&message, away_m(to));
+                let reached = |&to: &usize| to != i && self.adversary.reaches(&message, (i, to), away_m(to));
                 for to in (0..crowd.bodies.len()).filter(reached) {
                     self.air[to].extend(self.adversary.transmit(crowd, i, message, random));
                 }
