@@ -9,6 +9,7 @@ use crate::rollout::RolloutParams;
 use crate::safety::SafetyParams;
 use crate::sensing_errors::SensingErrors;
 use crate::separation::SeparationParams;
+use skein_leader::channel_params::ChannelParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
@@ -67,8 +68,8 @@ pub struct PilotParams {
     pub separation_period_s: f64,
     /// Time between two repetitions of a message that has to be repeated, s.
     pub repeat_period_s: f64,
-    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
-    pub bandwidth_bytes_per_s: f64,
+    /// The channel that it shares with the drones near it.
+    pub channel: ChannelParams,
     /// Silence after which a peer counts as gone, s.
     pub peer_timeout_s: f64,
 }
@@ -87,7 +88,7 @@ impl PilotParams {
             planner: self.planner.clone(),
             beacon_period_s: self.beacon_period_s,
             repeat_period_s: self.repeat_period_s,
-            bandwidth_bytes_per_s: self.bandwidth_bytes_per_s,
+            channel: self.channel,
             peer_timeout_s: self.peer_timeout_s,
         }
     }

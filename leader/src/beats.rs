@@ -67,6 +67,12 @@ impl Beats {
         self.beats.values().any(|beat| beat.message.ballot == ballot && now.since(beat.since) <= within_s)
     }
 
+    /// The newest message of a leader of this group, if it was news within the last `within_s`.
+    pub(crate) fn newest(&self, now: SimTime, group: GroupId, within_s: f64) -> Option<Leadership> {
+        let beat = self.beats.get(&group)?;
+        (now.since(beat.since) <= within_s).then_some(beat.message)
+    }
+
     /// Forgets what was news long ago.
     pub(crate) fn forget(&mut self, now: SimTime) {
         self.beats.retain(|_, beat| now.since(beat.since) < RELAY_MEMORY_S);

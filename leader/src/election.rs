@@ -324,15 +324,16 @@ impl Election {
             self.parted = None;
             self.adaptive_timeout.hear(now, SAME_BEAT * self.heartbeat_period_s, self.silence_s());
         }
-        if ballot == self.obeyed || (parted && self.may_be_taken_in(now)) {
+        if ballot == self.obeyed || (parted && self.may_be_taken_in(now, hops)) {
             self.heard = now;
             self.pre_voted = None;
         }
     }
 
-    /// Whether the leaders of parts still have time to take this drone in.
-    fn may_be_taken_in(&mut self, now: SimTime) -> bool {
-        now.since(*self.parted.get_or_insert(now)) < PARTED_TIMEOUTS * self.leader_timeout_s
+    /// Whether the leaders of parts still have time to take this drone in. Word takes longer over several hops.
+    fn may_be_taken_in(&mut self, now: SimTime, hops: u16) -> bool {
+        let patience_s = PARTED_TIMEOUTS * self.leader_timeout_s * (1.0 + f64::from(hops));
+        now.since(*self.parted.get_or_insert(now)) < patience_s
     }
 
     fn tick(&mut self, now: SimTime, epoch: u32, closer: usize, delay_s: f64) -> Option<Leadership> {

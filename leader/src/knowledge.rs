@@ -136,8 +136,7 @@ impl Knowledge {
     pub(crate) fn living_peers(&self, now: SimTime) -> impl Iterator<Item = Member> + Clone {
         let plans = [self.ledger.obeyed(), self.ledger.origin()];
         self.peers.living(now).map(move |(id, pose)| {
-            let hears = |ballot| pose.term() == ballot || (pose.term() < ballot && ballot == self.election.obeyed());
-            let will_obey = |plan: &PlanStamp| pose.obeyed() < *plan && hears(plan.ballot);
+            let will_obey = |plan: &PlanStamp| pose.obeyed() < *plan && pose.term() <= plan.ballot;
             let pending = plans.into_iter().flatten().filter(|bundle| will_obey(&bundle.plan.id));
             let group = pending.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
             let group = group.unwrap_or_else(|| pose.group());
@@ -244,6 +243,8 @@ impl Knowledge {
         if self.obeys(now, Term { ballot, scope, named, goes_on }, source) {
             self.ledger.hear_assignment(part, &self.obstacles);
             self.join(now);
+        } else {
+            self.ledger.complete(part);
         }
     }
 

@@ -234,9 +234,14 @@ impl Leading {
                 }
             }
             MessageRef::Plan(plan) => self.knowledge.hear_plan(now, source, plan),
-            MessageRef::Assignment(part) => {
-                let goes_on = self.relays.knows_term(now, part.id.ballot, self.leader_timeout_s);
-                self.knowledge.hear_assignment(now, source, part, goes_on);
+            MessageRef::Assignment(part) => self.hear_assignment(now, source, part),
+            MessageRef::AssignmentList(list) => {
+                for part in list.assignments() {
+                    self.hear_assignment(now, source, &part);
+                    if self.relays.is_wide() {
+                        self.relays.hear(&self.knowledge, now, source, MessageRef::Assignment(&part));
+                    }
+                }
             }
             MessageRef::Arrivals(row) => self.planner.hear(now, row),
             MessageRef::Passed(passed) => self.knowledge.hear_passed(source, passed),
@@ -248,6 +253,11 @@ impl Leading {
         if is_fact && self.relays.is_wide() {
             self.relays.hear(&self.knowledge, now, source, message);
         }
+    }
+
+    fn hear_assignment(&mut self, now: SimTime, source: DroneId, part: &Assignment) {
+        let goes_on = self.relays.knows_term(now, part.id.ballot, self.leader_timeout_s);
+        self.knowledge.hear_assignment(now, source, part, goes_on);
     }
 
     /// What this drone knows of another one, if it would pass it on.
@@ -297,10 +307,21 @@ impl Leading {
         if self.relays.is_settling(&self.knowledge, now) {
             self.knowledge.elect(now, Input::Settling);
         }
+        self.follow_part(now);
         let (closer, delay_s) = (self.knowledge.closer(now, own), self.peers().delay_s());
         say.extend(self.knowledge.elect(now, Input::Tick { closer, delay_s }).map(Message::Leadership));
         if let Some(input) = self.roles.decide(&self.knowledge, now, own) {
             say.extend(self.knowledge.elect(now, input).map(Message::Leadership));
+        }
+    }
+
+    /// Obeys the leader of this drone's part of a split group, if that leader was heard before this drone knew which part it is in.
+    fn follow_part(&mut self, now: SimTime) {
+        let (scope, group) = (self.knowledge.election().scope(), self.knowledge.election().group());
+        if scope != group
+            && let Some(message) = self.relays.newest_of(now, group, self.leader_timeout_s)
+        {
+            self.knowledge.elect(now, Input::Heard(message));
         }
     }
 
@@ -323,6 +344,7 @@ impl Leading {
             members: self.membership.members(),
             others: self.membership.others(),
             delay_s: k.peers().delay_s(),
+            wide: self.relays.is_wide(),
             silent,
             obstacles: k.obstacles(),
             ledger: k.ledger(),

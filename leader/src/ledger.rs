@@ -189,6 +189,22 @@ impl Ledger {
         }
     }
 
+    /// Takes note of another drone's assignment in a plan that this drone obeys, or that made its group, although it obeys a later
+    /// term by now. So the leader of a part knows which drones are in other parts.
+    pub(crate) fn complete(&mut self, part: &Assignment) {
+        if part.drone.0 >= self.drones || part.drone == self.me {
+            return;
+        }
+        let plans = [self.obeyed.as_mut(), self.origin.as_mut()];
+        let Some(bundle) = plans.into_iter().flatten().find(|bundle| bundle.plan.id == part.id) else { return };
+        if !bundle.parts.contains(part.drone) {
+            bundle.parts.add(part);
+            for set in self.sets.iter_mut().filter(|set| set.stamp == part.id && !set.parts.contains(part.drone)) {
+                set.parts.add(part.into());
+            }
+        }
+    }
+
     /// Takes the queue places in a beacon for the drone's assignments, where those were not heard.
     pub fn hear_place(&mut self, drone: DroneId, pose: &Pose) {
         for place in pose.queue.iter().filter(|place| place.rank != QueuePlace::NO_RANK) {

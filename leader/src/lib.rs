@@ -45,6 +45,7 @@ mod beats;
 mod broadcaster;
 pub mod candidates;
 pub mod changes;
+pub mod channel_params;
 pub mod cost;
 mod draft;
 mod drone_set;

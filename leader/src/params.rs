@@ -1,5 +1,6 @@
 //! Parameters of planning and of leading.
 
+use crate::channel_params::ChannelParams;
 use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
@@ -148,8 +149,8 @@ pub struct LeadingParams {
     pub beacon_period_s: f64,
     /// Period of repetitions, s.
     pub repeat_period_s: f64,
-    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
-    pub bandwidth_bytes_per_s: f64,
+    /// The channel that it shares with the drones near it.
+    pub channel: ChannelParams,
     /// A peer that is silent for longer counts as gone, s. Longer on a bad link.
     pub peer_timeout_s: f64,
 }
@@ -157,6 +158,6 @@ pub struct LeadingParams {
 impl LeadingParams {
     /// Time that a message with a payload of this size takes in one leader's share of the bandwidth, s; 0 if bandwidth is no limit.
     pub(crate) fn leader_frame_s(&self, bytes: usize) -> f64 {
-        (HEAD_BYTES as f64 + bytes as f64) / (LEADER_SHARE * self.bandwidth_bytes_per_s)
+        (HEAD_BYTES as f64 + bytes as f64) / (LEADER_SHARE * self.channel.bandwidth_bytes_per_s)
     }
 }

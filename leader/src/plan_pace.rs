@@ -111,6 +111,7 @@ mod tests {
                 members: &members_at(now_s),
                 others: &[],
                 delay_s,
+                wide: false,
                 silent: &[],
                 obstacles: &obstacles,
                 ledger: &ledger,

@@ -1,5 +1,6 @@
 //! How much a drone may pass on: a token bucket, so that relays leave the channel room for beacons and plans.
 
+use crate::channel_params::ChannelParams;
 use crate::params::LeadingParams;
 use crate::tuning::{BEAT_SHARE, MAX_RELAYED_PER_TICK, RELAY_SHARE};
 use skein_protocol::payload::{Leadership, Presence};
@@ -9,7 +10,11 @@ use skein_protocol::{Message, SimTime};
 /// What one drone may pass on now.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RelayPace {
-    bytes_per_s: f64,
+    channel: ChannelParams,
+    /// The part of the bandwidth that these messages of all drones that share it may take. No unit.
+    share: f64,
+    /// Number of drones that share the bandwidth.
+    drones: u32,
     /// The longest frame that is passed on, bytes.
     longest_bytes: f64,
     credit_bytes: f64,
@@ -20,17 +25,28 @@ pub(crate) struct RelayPace {
 impl RelayPace {
     /// That of messages of leaders, with all the credit that it can have.
     pub(crate) fn of_beats(params: &LeadingParams) -> Self {
-        Self::at(params.start, BEAT_SHARE * share_of_drone(params), size_of::<Leadership>())
+        Self::at(params.start, params.channel, BEAT_SHARE, size_of::<Leadership>())
     }
 
     /// That of all other messages, with all the credit that it can have.
     pub(crate) fn of_facts(params: &LeadingParams) -> Self {
-        Self::at(params.start, RELAY_SHARE * share_of_drone(params), size_of::<Presence>())
+        Self::at(params.start, params.channel, RELAY_SHARE, size_of::<Presence>())
     }
 
-    fn at(start: SimTime, bytes_per_s: f64, longest_bytes: usize) -> Self {
+    fn at(start: SimTime, channel: ChannelParams, share: f64, longest_bytes: usize) -> Self {
         let longest_bytes = HEAD_BYTES as f64 + longest_bytes as f64;
-        Self { bytes_per_s, longest_bytes, credit_bytes: most(longest_bytes), last: start }
+        let drones = channel.drones;
+        Self { channel, share, drones, longest_bytes, credit_bytes: most(longest_bytes), last: start }
+    }
+
+    /// Takes note of how many drones share the bandwidth now. Never fewer than in the formation count.
+    pub(crate) fn set_drones(&mut self, drones: u32) {
+        self.drones = drones.max(self.channel.drones);
+    }
+
+    /// What it may say on average, bytes/s.
+    fn bytes_per_s(&self) -> f64 {
+        self.share * self.channel.part_bytes_per_s(self.drones)
     }
 
     /// How many frames it may say now, however long they are.
@@ -38,7 +54,7 @@ impl RelayPace {
         let passed_s = now.since(self.last);
         self.last = now;
         if passed_s > 0.0 {
-            self.credit_bytes = (self.credit_bytes + passed_s * self.bytes_per_s).min(most(self.longest_bytes));
+            self.credit_bytes = (self.credit_bytes + passed_s * self.bytes_per_s()).min(most(self.longest_bytes));
         }
         (self.credit_bytes / self.longest_bytes) as usize
     }
@@ -46,7 +62,7 @@ impl RelayPace {
     /// Notes what it said.
     pub(crate) fn note(&mut self, said: &[Message]) {
         let bytes = |message: &Message| (HEAD_BYTES + u64::from(message.encode().len)) as f64;
-        if self.bytes_per_s.is_finite() {
+        if self.bytes_per_s().is_finite() {
             self.credit_bytes -= said.iter().map(bytes).sum::<f64>();
         }
     }
@@ -55,11 +71,6 @@ impl RelayPace {
 /// The most that a drone saves up, bytes: what it may say in one tick.
 fn most(longest_bytes: f64) -> f64 {
     MAX_RELAYED_PER_TICK as f64 * longest_bytes
-}
-
-/// One drone's equal part of the bandwidth, bytes/s.
-fn share_of_drone(params: &LeadingParams) -> f64 {
-    params.bandwidth_bytes_per_s / f64::from(params.drones.max(1))
 }
 
 #[cfg(test)]
@@ -73,7 +84,8 @@ mod tests {
 
     /// What a drone says in 500 ticks of 20 ms that wants to say this many messages in each.
     fn said(bytes_per_s: f64, wanted: usize, message: Message) -> Vec<usize> {
-        let mut pace = RelayPace::at(SimTime::ZERO, bytes_per_s, size_of::<Presence>());
+        let channel = ChannelParams { bandwidth_bytes_per_s: bytes_per_s, ..ChannelParams::default() };
+        let mut pace = RelayPace::at(SimTime::ZERO, channel, 1.0, size_of::<Presence>());
         let tick = |tick: u32| {
             let frames = pace.frames(SimTime::from_secs(0.02 * f64::from(tick))).min(wanted);
             pace.note(&vec![message; frames]);

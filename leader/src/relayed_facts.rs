@@ -7,7 +7,7 @@ use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
-use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan};
+use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
@@ -134,17 +134,25 @@ impl RelayedFacts {
         }
     }
 
-    /// Says what is due, until `last` messages are said. This drone is at `position`, world frame, m.
+    /// Says what is due, until `last` messages are said. Assignments of one group share messages. This drone is at `position`,
+    /// world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
-        while say.len() < last
-            && let Some(&(turn, subject)) = self.turns.first()
+        let first = say.len();
+        while let Some(&(turn, subject)) = self.turns.first()
             && turn <= now
         {
+            let open = self.known.get(&subject).and_then(|one| open_list(&say[first..], &one.fact));
+            if open.is_none() && say.len() >= last {
+                break;
+            }
             self.turns.pop_first();
             let Some(one) = self.known.get_mut(&subject) else { continue };
             let need = need(k, now, subject, one);
             if need == Need::Now && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
-                say.push(one.passed_on());
+                match (open.and_then(|place| say.get_mut(first + place)), &one.fact) {
+                    (Some(Message::AssignmentList(list)), Fact::Part(part)) => drop(list.push(part)),
+                    _ => say.push(one.passed_on()),
+                }
             }
             one.turn = one.next_look(now, need, self.repeat_s);
             self.turns.extend(one.turn.map(|turn| (turn, subject)));
@@ -168,13 +176,19 @@ impl Relayed {
     fn passed_on(&self) -> Message {
         match &self.fact {
             Fact::Plan(plan) => Message::Plan(**plan),
-            Fact::Part(part) => Message::Assignment(*part),
+            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(part)),
             Fact::Arrivals(row) => Message::Arrivals(**row),
             Fact::Passed(passed) => {
                 Message::Passed(Passed { of: passed.drone(self.from).0.saturating_add(1), ..**passed })
             }
         }
     }
+}
+
+/// The place among these messages of a list with room for this assignment.
+fn open_list(said: &[Message], fact: &Fact) -> Option<usize> {
+    let Fact::Part(part) = fact else { return None };
+    said.iter().position(|message| matches!(message, Message::AssignmentList(list) if list.takes(part)))
 }
 
 /// What a message is about, and its version; `None` if it is not passed on.

@@ -8,7 +8,8 @@
 //! - The newest message of a term is repeated until the next one comes: see [`crate::beats`].
 //! - Arrivals and passages are passed on once by each drone.
 //! - A plan is repeated while a neighbour does not obey it.
-//! - An assignment is repeated while its drone does not obey it; first only by drones that are closer to that drone.
+//! - An assignment is repeated while its drone does not obey it; first only by drones that are closer to that drone. Assignments
+//!   that are due together share a frame.
 //! - The states of drones are collected, so that a frame holds several.
 
 use crate::beats::Beats;
@@ -19,9 +20,11 @@ use crate::params::LeadingParams;
 use crate::presences::Presences;
 use crate::relay_pace::RelayPace;
 use crate::relayed_facts::RelayedFacts;
-use crate::tuning::{CLOCKS_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, SETTLED_S, UNSETTLED_S, WIDE_S};
+use crate::tuning::{
+    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, SETTLED_S, UNSETTLED_S, WIDE_S,
+};
 use skein_protocol::payload::{Leadership, Pose};
-use skein_protocol::{Ballot, DroneId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
 
 /// What one drone passes on. Memory is bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +55,10 @@ pub(crate) struct Relays {
     facts: RelayedFacts,
     /// When it next forgets what was not heard for long.
     forgets: SimTime,
+    /// Distance within which drones share the bandwidth, m.
+    carrier_sense_m: f64,
+    /// When it next counts the drones that share the bandwidth with it.
+    counts: SimTime,
     presences: Presences,
 }
 
@@ -76,6 +83,8 @@ impl Relays {
             beats: Beats::new(params),
             facts: RelayedFacts::new(params),
             forgets: params.start,
+            carrier_sense_m: params.channel.carrier_sense_m,
+            counts: params.start,
             presences: Presences::new(params),
         }
     }
@@ -131,6 +140,10 @@ impl Relays {
         let first = !k.election().obeyed().is_some();
         self.wide = self.differs.is_some_and(|since| first || now.since(since) >= patience_s);
         self.presences.set_open(k, self.wide);
+        if self.wide && self.carrier_sense_m.is_finite() && now >= self.counts {
+            self.counts = now.after(COUNT_S);
+            self.count_channel_drones(k, now);
+        }
         self.beats.forget(now);
         if !self.wide {
             self.facts.clear();
@@ -138,6 +151,16 @@ impl Relays {
             self.facts.forget(now);
             self.forgets = now.after(FORGET_S);
         }
+    }
+
+    /// Counts the drones that share the bandwidth with this one, and sets its part accordingly.
+    fn count_channel_drones(&mut self, k: &Knowledge, now: SimTime) {
+        let square_m2 = self.carrier_sense_m * self.carrier_sense_m;
+        let near =
+            k.peers().living(now).filter(|(_, pose)| (pose.position() - self.position).norm_squared() <= square_m2);
+        let drones = 1 + u32::try_from(near.count()).unwrap_or(u32::MAX - 1);
+        self.pace.set_drones(drones);
+        self.beat_pace.set_drones(drones);
     }
 
     /// Notes that a drone's state was heard: from itself, or in a message of `relay`. `before`: what was known of it.
@@ -187,6 +210,11 @@ impl Relays {
     /// Whether this drone had news of this term's leader, from itself or passed on, within the last `within_s`.
     pub(crate) fn knows_term(&self, now: SimTime, ballot: Ballot, within_s: f64) -> bool {
         self.beats.knows(now, ballot, within_s)
+    }
+
+    /// The newest message of a leader of this group, if it was news within the last `within_s`.
+    pub(crate) fn newest_of(&self, now: SimTime, group: GroupId, within_s: f64) -> Option<Leadership> {
+        self.beats.newest(now, group, within_s)
     }
 
     /// Notes a message of a term. Returns whether it is news.

@@ -24,6 +24,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) others: &'a [Member],
     /// How long a message takes to arrive, s.
     pub(crate) delay_s: f64,
+    /// Whether some drones do not hear each other, so that messages are passed on.
+    pub(crate) wide: bool,
     /// Where silent drones may hover, world frame, m.
     pub(crate) silent: &'a [Vec2],
     /// Known obstacles.

@@ -3,7 +3,7 @@
 use crate::member::Member;
 use crate::planned_set::PlannedSet;
 use crate::situation::Situation;
-use crate::tuning::ASSIGNMENTS_DUE_S;
+use crate::tuning::{ASSIGNMENTS_DUE_S, FAR_REPEATS};
 use skein_protocol::{ObstacleId, SimTime};
 
 /// What a leader has to decide next.
@@ -59,9 +59,11 @@ pub(crate) fn learnt(s: &Situation<'_>, set: &[ObstacleId]) -> SimTime {
 /// order of a queue that others already fly in.
 fn is_awaited(planned: &PlannedSet, s: &Situation<'_>) -> bool {
     let age_s = s.now.since(planned.made);
+    // A leader repeats the assignments of drones that it does not hear itself less often.
+    let due_s = ASSIGNMENTS_DUE_S * if s.wide { f64::from(FAR_REPEATS) } else { 1.0 };
     planned.stamp.ballot != s.ballot
         && planned.parts.len() < planned.members as usize
-        && (0.0..ASSIGNMENTS_DUE_S + 2.0 * s.delay_s).contains(&age_s)
+        && (0.0..due_s + 2.0 * s.delay_s).contains(&age_s)
 }
 
 /// Whether the plan for a set was made in this term, or by the leader of the group that this one was split from.

@@ -105,6 +105,8 @@ pub(crate) const FOREIGN_BEATS: f64 = 10.0;
 pub(crate) const RELAY_MEMORY_S: f64 = 30.0;
 /// Time between two looks at what was not heard for long, s. 3: a tenth of that. By hand.
 pub(crate) const FORGET_S: f64 = 3.0;
+/// Time between two counts of the drones that share the bandwidth, s. 1. By hand.
+pub(crate) const COUNT_S: f64 = 1.0;
 /// An assignment that its drone obeys is looked at again after this many repeat periods. No unit. 8: with the default period
 /// 1.6 s. By hand.
 pub(crate) const UNWANTED_REPEATS: f64 = 8.0;

@@ -6,7 +6,7 @@ mod swarm;
 use bytemuck::Zeroable;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
-use skein_protocol::payload::{Assignment, Leadership, MAX_PRESENT, Pose, Presence, Present};
+use skein_protocol::payload::{Assignment, Leadership, MAX_LISTED, MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, PlanStamp, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 use swarm::{DEFAULT, params, step};
@@ -67,7 +67,9 @@ impl Middle {
     /// The drones whose assignments it says within this many ticks.
     fn passes_on(&mut self, ticks: u32) -> BTreeSet<u32> {
         let said = (0..ticks).flat_map(|_| self.step());
-        said.filter_map(|message| if let Message::Assignment(part) = message { Some(part.drone.0) } else { None })
+        let listed = |message| if let Message::AssignmentList(list) = message { Some(list) } else { None };
+        said.filter_map(listed)
+            .flat_map(|list| list.assignments().map(|part| part.drone.0).collect::<Vec<_>>())
             .collect()
     }
 
@@ -105,14 +107,17 @@ fn many_assignments_starve_neither_each_other_nor_the_states_of_drones() {
     }
     middle.hear_assignments();
     let mut parts: BTreeMap<u32, u32> = BTreeMap::new();
-    let mut news_after = None;
+    let (mut news_after, mut lists) = (None, Vec::new());
     for tick in 0..400 {
         if tick == 25 {
             middle.hear_of(500..501, PLAN);
         }
         for message in middle.step() {
             match message {
-                Message::Assignment(part) => *parts.entry(part.drone.0).or_default() += 1,
+                Message::AssignmentList(list) => {
+                    list.assignments().for_each(|part| *parts.entry(part.drone.0).or_default() += 1);
+                    lists.push(list.count);
+                }
                 Message::Presence(presence) if tick >= 25 && presence.obeyed == PLAN => {
                     let is_news = presence.poses().any(|(drone, _)| drone == DroneId(500));
                     news_after = news_after.or(is_news.then_some(tick - 25));
@@ -125,6 +130,8 @@ fn many_assignments_starve_neither_each_other_nor_the_states_of_drones() {
     let (least, most) =
         late.map(|drone| parts.get(&drone).copied().unwrap_or(0)).fold((u32::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
     assert!(news_after.is_some_and(|ticks| ticks <= 20), "news after {news_after:?} ticks");
+    let full = lists.iter().filter(|count| **count as usize == MAX_LISTED).count();
+    assert!(2 * full > lists.len(), "{full} of {} lists are full", lists.len());
     assert!(least >= 1 && most <= 2 * least + 1, "assignments were passed on {least} to {most} times");
 }
 

@@ -5,7 +5,10 @@
 
 use crate::frame::{FRAME_PAYLOAD, Frame};
 use crate::ids::GroupId;
-use crate::payload::{self, Arrivals, Assignment, Leadership, Obstacle, Passed, Plan, Pose, Presence, Separation};
+use crate::payload::MAX_LISTED;
+use crate::payload::{
+    self, Arrivals, Assignment, AssignmentList, Leadership, Obstacle, Passed, Plan, Pose, Presence, Separation,
+};
 use crate::topic_name::OWN_TOPIC;
 use crate::user_message::UserMessage;
 use crate::wire::{ArrivalsKind, LeadershipKind, Phase, UnknownCode};
@@ -28,6 +31,8 @@ pub enum Message {
     Plan(Plan),
     /// One drone's part in a plan.
     Assignment(Assignment),
+    /// Parts of several drones in a plan, passed on.
+    AssignmentList(AssignmentList),
     /// The times at which one member of a group can reach the gate of an obstacle set.
     Arrivals(Arrivals),
     /// A drone's notice that it has passed an obstacle set.
@@ -49,7 +54,7 @@ impl Message {
             Self::Obstacle(_) => Topic::Obstacle,
             Self::Leadership(_) => Topic::Leadership,
             Self::Plan(_) => Topic::Plan,
-            Self::Assignment(_) => Topic::Assignment,
+            Self::Assignment(_) | Self::AssignmentList(_) => Topic::Assignment,
             Self::Arrivals(_) => Topic::Arrivals,
             Self::Passed(_) => Topic::Passed,
             Self::Separation(_) => Topic::Separation,
@@ -69,6 +74,9 @@ impl Message {
             Self::Leadership(payload) => bytemuck::bytes_of(payload),
             Self::Plan(payload) => bytemuck::bytes_of(payload),
             Self::Assignment(payload) => bytemuck::bytes_of(payload),
+            Self::AssignmentList(list) => {
+                &bytemuck::bytes_of(list)[..AssignmentList::len_of(MAX_LISTED.min(list.count as usize))]
+            }
             Self::Arrivals(payload) => bytemuck::bytes_of(payload),
             Self::Passed(payload) => bytemuck::bytes_of(payload),
             Self::Separation(payload) => bytemuck::bytes_of(payload),
@@ -107,6 +115,8 @@ pub enum MessageRef<'a> {
     Plan(&'a Plan),
     /// See [`Message::Assignment`].
     Assignment(&'a Assignment),
+    /// See [`Message::AssignmentList`].
+    AssignmentList(&'a AssignmentList),
     /// See [`Message::Arrivals`].
     Arrivals(&'a Arrivals),
     /// See [`Message::Passed`].
@@ -127,6 +137,7 @@ impl<'a> From<&'a Message> for MessageRef<'a> {
             Message::Leadership(payload) => Self::Leadership(payload),
             Message::Plan(payload) => Self::Plan(payload),
             Message::Assignment(payload) => Self::Assignment(payload),
+            Message::AssignmentList(payload) => Self::AssignmentList(payload),
             Message::Arrivals(payload) => Self::Arrivals(payload),
             Message::Passed(payload) => Self::Passed(payload),
             Message::Separation(payload) => Self::Separation(payload),
@@ -154,6 +165,10 @@ impl<'a> MessageRef<'a> {
             Topic::Obstacle => Self::Obstacle(read(frame)?),
             Topic::Leadership => Self::Leadership(read(frame)?),
             Topic::Plan => Self::Plan(read(frame)?),
+            // A list is longer than a single assignment, even if it has one entry.
+            Topic::Assignment if frame.len as usize > size_of::<Assignment>() => {
+                Self::AssignmentList(read_list(frame)?)
+            }
             Topic::Assignment => Self::Assignment(read(frame)?),
             Topic::Arrivals => Self::Arrivals(read(frame)?),
             Topic::Passed => Self::Passed(read(frame)?),
@@ -173,6 +188,7 @@ impl<'a> MessageRef<'a> {
             Self::Leadership(payload) => Message::Leadership(*payload),
             Self::Plan(payload) => Message::Plan(*payload),
             Self::Assignment(payload) => Message::Assignment(*payload),
+            Self::AssignmentList(payload) => Message::AssignmentList(*payload),
             Self::Arrivals(payload) => Message::Arrivals(*payload),
             Self::Passed(payload) => Message::Passed(*payload),
             Self::Separation(payload) => Message::Separation(*payload),
@@ -223,6 +239,14 @@ impl<'a> MessageRef<'a> {
                 finite(&a.slot_m, "slot")?;
                 finite(&[a.arrival_s], "arrival")
             }
+            Self::AssignmentList(a) => {
+                lineage(a.scope)?;
+                lineage(a.group)?;
+                a.assignments().try_for_each(|part| {
+                    finite(&part.slot_m, "slot")?;
+                    finite(&[part.arrival_s], "arrival")
+                })
+            }
             Self::Arrivals(a) => {
                 lineage(a.group)?;
                 known(ArrivalsKind::from_wire(a.kind))?;
@@ -268,6 +292,20 @@ fn read<T: Pod>(frame: &Frame) -> Result<&T, DecodeError> {
     Ok(bytemuck::from_bytes(&frame.payload[..size_of::<T>()]))
 }
 
+/// A list is as long as its entries in use. The other entries are 0.
+fn read_list(frame: &Frame) -> Result<&AssignmentList, DecodeError> {
+    const { assert!(size_of::<AssignmentList>() == FRAME_PAYLOAD, "a list fills a frame") };
+    let list: &AssignmentList = bytemuck::from_bytes(&frame.payload);
+    if !(1..=MAX_LISTED as u32).contains(&list.count) {
+        return Err(DecodeError::Field("assignment count"));
+    }
+    let len = AssignmentList::len_of(list.count as usize);
+    if frame.len as usize != len {
+        return Err(DecodeError::Length(frame.len, len));
+    }
+    Ok(list)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -284,6 +322,29 @@ mod tests {
     #[test]
     fn a_decoded_message_equals_the_encoded_one() {
         assert_eq!(Message::decode(&obstacle().encode()), Ok(obstacle()));
+    }
+
+    #[test]
+    fn a_list_of_assignments_is_as_long_as_its_entries() {
+        let part = |drone: u32| payload::Assignment {
+            drone: DroneId(drone),
+            slot_m: [f64::from(drone), 0.5],
+            leader: DroneId(3),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let mut list = AssignmentList::of(&part(0));
+        assert_eq!(Message::AssignmentList(list).encode().len as usize, size_of::<Assignment>() + 8);
+        let other_leader = payload::Assignment { leader: DroneId(4), ..part(1) };
+        assert!(!list.push(&other_leader) && (1..8).all(|drone| list.push(&part(drone))) && !list.push(&part(8)));
+        let frame = Message::AssignmentList(list).encode();
+        assert_eq!((frame.kind, frame.len as usize), (Topic::Assignment as u16, FRAME_PAYLOAD));
+        let Ok(Message::AssignmentList(heard)) = Message::decode(&frame) else { panic!("expected a list") };
+        assert!(heard.assignments().eq((0..8).map(part)));
+        let shorter = Frame { len: frame.len - 8, ..frame };
+        assert_eq!(Message::decode(&shorter), Err(DecodeError::Length(296, 304)));
+        let mut crowded = frame;
+        crowded.payload[std::mem::offset_of!(AssignmentList, count)] = 9;
+        assert_eq!(Message::decode(&crowded), Err(DecodeError::Field("assignment count")));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
 /// Version of all layouts in this module. A receiver rejects a frame of another version.
-pub const VERSION: u16 = 5;
+pub const VERSION: u16 = 6;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
@@ -341,6 +341,90 @@ pub struct Assignment {
     pub rank: u16,
     /// Always 0.
     pub reserved: u32,
+}
+
+/// Maximum number of drones in one [`AssignmentList`].
+pub const MAX_LISTED: usize = 8;
+
+/// What an [`AssignmentList`] says of one drone.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ListedAssignment {
+    /// The drone.
+    pub drone: DroneId,
+    /// As in [`Assignment::route`].
+    pub route: u16,
+    /// As in [`Assignment::rank`].
+    pub rank: u16,
+    /// As in [`Assignment::slot_m`], m.
+    pub slot_m: [f64; 2],
+    /// As in [`Assignment::arrival_s`], s.
+    pub arrival_s: f64,
+}
+
+/// Assignments of drones of one group that the source passes on. On the wire it is as long as the entries in use.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct AssignmentList {
+    /// The plan that the assignments belong to.
+    pub id: PlanStamp,
+    /// The group that the plan is for.
+    pub scope: GroupId,
+    /// The drones' group under this plan.
+    pub group: GroupId,
+    /// Leader of that group.
+    pub leader: DroneId,
+    /// Number of entries of `drones` in use, at most [`MAX_LISTED`].
+    pub count: u32,
+    /// Always 0.
+    pub reserved: u64,
+    /// The drones.
+    pub drones: [ListedAssignment; MAX_LISTED],
+}
+
+impl AssignmentList {
+    /// A list of one assignment.
+    #[must_use]
+    pub fn of(first: &Assignment) -> Self {
+        let Assignment { id, scope, group, leader, .. } = *first;
+        let mut list = Self { id, scope, group, leader, ..Self::default() };
+        list.push(first);
+        list
+    }
+
+    /// Adds an assignment. Returns whether it fits: it belongs to the same plan and group, and there is room.
+    pub fn push(&mut self, part: &Assignment) -> bool {
+        let fits = self.takes(part);
+        if let Some(entry) = self.drones.get_mut(self.count as usize).filter(|_| fits) {
+            let Assignment { drone, route, rank, slot_m, arrival_s, .. } = *part;
+            *entry = ListedAssignment { drone, route, rank, slot_m, arrival_s };
+            self.count += 1;
+        }
+        fits
+    }
+
+    /// Whether an assignment would fit.
+    #[must_use]
+    pub fn takes(&self, part: &Assignment) -> bool {
+        let same = (self.id, self.scope, self.group, self.leader) == (part.id, part.scope, part.group, part.leader);
+        same && (self.count as usize) < MAX_LISTED
+    }
+
+    /// The assignments.
+    pub fn assignments(&self) -> impl Iterator<Item = Assignment> + '_ {
+        let Self { id, scope, group, leader, .. } = *self;
+        let listed = self.drones.iter().take(self.count as usize);
+        listed.map(move |one| {
+            let ListedAssignment { drone, route, rank, slot_m, arrival_s } = *one;
+            Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved: 0 }
+        })
+    }
+
+    /// Number of bytes on the wire of a list of so many assignments.
+    #[must_use]
+    pub(crate) const fn len_of(count: usize) -> usize {
+        size_of::<Self>() - (MAX_LISTED - count) * size_of::<ListedAssignment>()
+    }
 }
 
 /// When one member of the source's group can be at the gate of an obstacle set. If several groups have the same set ahead,

@@ -16,7 +16,8 @@ pub enum Topic {
     Leadership = 3,
     /// Carries a [`Plan`](crate::payload::Plan).
     Plan = 4,
-    /// Carries an [`Assignment`](crate::payload::Assignment).
+    /// Carries an [`Assignment`](crate::payload::Assignment), or several in an
+    /// [`AssignmentList`](crate::payload::AssignmentList).
     Assignment = 5,
     /// Carries an [`Arrivals`](crate::payload::Arrivals).
     Arrivals = 6,

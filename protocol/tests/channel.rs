@@ -25,7 +25,7 @@ fn sent(tick: u64, source: u32, sequence: u32) -> AirFrame {
 #[test]
 fn frames_queue_for_the_channel_over_ticks() {
     // A frame of 100 bytes occupies the channel for 10 ms. A tick is 20 ms.
-    let channel = SharedChannel { seed: 1, rate_bps: 80_000.0, limit_s: 0.05 };
+    let channel = SharedChannel { seed: 1, rate_bps: 80_000.0, limit_s: 0.05, carrier_sense_m: f64::INFINITY };
     let mut queue = ChannelQueue::new(channel);
     let mut queue_times = |tick: u64, count: u32| {
         let mut frames: Vec<AirFrame> = (0..count).map(|source| sent(tick, source, tick as u32)).collect();
@@ -46,8 +46,37 @@ fn frames_queue_for_the_channel_over_ticks() {
 }
 
 #[test]
+fn drones_that_do_not_sense_each_other_transmit_at_the_same_time() {
+    // A frame of 100 bytes occupies the channel for 10 ms. The outer two of three drones are 1000 m apart.
+    let waits = |carrier_sense_m: f64, ticks: u64| {
+        let mut queue = ChannelQueue::new(SharedChannel { seed: 1, rate_bps: 80_000.0, limit_s: 1.0, carrier_sense_m });
+        let mut tick = |tick: u64| {
+            let place = |source: u32| [500.0 * f64::from(source), 0.0, 0.0];
+            let mut frames: Vec<AirFrame> =
+                (0..3).map(|source| AirFrame { position_m: place(source), ..sent(tick, source, 0) }).collect();
+            queue.schedule(SimTime(tick as i64 * 20_000_000), &mut frames);
+            frames.iter().map(|frame| frame.queue_ns / 1_000_000).collect::<Vec<_>>()
+        };
+        (0..ticks).map(&mut tick).collect::<Vec<_>>()
+    };
+    assert!(waits(400.0, 3).iter().all(|tick| *tick == [10, 10, 10]));
+    for tick in waits(600.0, 20) {
+        // The one in the middle waits for both others, or they wait for it.
+        assert!(
+            tick == [10, 20, 10] || tick == [20, 10, 20] || tick == [10, 20, 30] || tick == [30, 20, 10],
+            "{tick:?}"
+        );
+    }
+    let all_wait = waits(1000.0, 1).concat();
+    assert_eq!(all_wait.iter().sum::<u64>(), 60, "{all_wait:?}");
+    let late = waits(1000.0, 3);
+    assert_eq!(late[2].iter().sum::<u64>(), 60 + 3 * 20, "three frames in 30 ms are more than a tick has room for");
+}
+
+#[test]
 fn no_drone_gets_the_channel_first_because_of_its_id() {
-    let mut queue = ChannelQueue::new(SharedChannel { seed: 1, rate_bps: 1e9, limit_s: 1.0 });
+    let mut queue =
+        ChannelQueue::new(SharedChannel { seed: 1, rate_bps: 1e9, limit_s: 1.0, carrier_sense_m: f64::INFINITY });
     let mut first = [0u32; 8];
     for tick in 0..8000u64 {
         let mut frames: Vec<AirFrame> = (0..8).flat_map(|source| (0..2).map(move |n| sent(tick, source, n))).collect();

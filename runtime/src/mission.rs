@@ -7,6 +7,7 @@ use skein_agent::detection::Braking;
 use skein_agent::guidance::GuidanceParams;
 use skein_agent::safety::SafetyParams;
 use skein_agent::sensing_errors::SensingErrors;
+use skein_leader::channel_params::ChannelParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::{Between, Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
@@ -206,7 +207,11 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         beacon_period_s: scenario.beacon_period_s(),
         separation_period_s: scenario.separation_period_s(skein_agent::separation::messages(drones(scenario))),
         repeat_period_s: protocol.repeat_period_s,
-        bandwidth_bytes_per_s: scenario.bandwidth_bytes_per_s(),
+        channel: ChannelParams {
+            bandwidth_bytes_per_s: scenario.bandwidth_bytes_per_s(),
+            carrier_sense_m: scenario.carrier_sense_m(),
+            drones: scenario.channel_drones(),
+        },
         peer_timeout_s: protocol.peer_timeout_s,
     }
 }

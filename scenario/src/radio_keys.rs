@@ -42,9 +42,12 @@ pub struct RadioKeys {
     /// Whether random numbers are keyed by link and time instead of the frame's number, so that strategies that send different
     /// frames meet the same air. Frames of one topic that a drone sends in one tick then share their fate at a receiver.
     pub keyed_by_time: bool,
-    /// Bit rate of the channel that all drones share. Frames queue for it; absent: no limit.
+    /// Bit rate of the channel that drones near each other share. Frames queue for it; absent: no limit.
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub rate_bps: Option<f64>,
+    /// A drone waits for the channel while a drone within this distance transmits; absent: while any drone transmits.
+    #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
+    pub carrier_sense_m: Option<f64>,
     /// A frame that would wait longer than this for the channel is dropped.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub queue_limit_s: f64,
@@ -72,6 +75,7 @@ impl Default for RadioKeys {
             asymmetry: 0.0,
             keyed_by_time: false,
             rate_bps: None,
+            carrier_sense_m: None,
             queue_limit_s: 1.0,
             burst: None,
             rules: Vec::new(),

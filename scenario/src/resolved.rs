@@ -246,8 +246,8 @@ impl Scenario {
         own_s + fault_bounds::clock_s(self)
     }
 
-    /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or 0.1 s, or longer where the beacons of all drones
-    /// would take more than a quarter of the bandwidth.
+    /// Time between two beacons of a drone, s: `protocol.beacon_period_s`; or 0.1 s, or longer where the beacons of the drones that
+    /// share a channel would take more than a quarter of the bandwidth.
     #[must_use]
     pub fn beacon_period_s(&self) -> f64 {
         let least_s = self.period_within_share_s(size_of::<Pose>());
@@ -263,17 +263,41 @@ impl Scenario {
         least_s.clamp(self.beacon_period_s(), self.beacon_period_s().max(SEPARATION_PERIOD_MAX_S))
     }
 
-    /// Bandwidth that all drones share, bytes/s; infinite if it is no limit.
+    /// Bandwidth that drones near each other share, bytes/s; infinite if it is no limit.
     #[must_use]
     pub fn bandwidth_bytes_per_s(&self) -> f64 {
         self.share_bps(1.0) / 8.0
     }
 
-    /// The time in which all drones say one message each, if the messages take a quarter of the bandwidth, s. `bytes`: size of
-    /// the payload.
+    /// Distance within which drones share the bandwidth, m; infinite if all do.
+    #[must_use]
+    pub fn carrier_sense_m(&self) -> f64 {
+        self.radio.carrier_sense_m.unwrap_or(f64::INFINITY)
+    }
+
+    /// The greatest number of drones that share a channel in the formation: those within [`Self::carrier_sense_m`] of one slot.
+    #[must_use]
+    pub fn channel_drones(&self) -> u32 {
+        let reach_m = self.carrier_sense_m();
+        if reach_m.is_infinite() || self.radio.rate_bps.is_none() {
+            return self.formation.drones;
+        }
+        let mut slots = self.slots();
+        slots.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let mut first = 0;
+        let shares = slots.iter().map(|here| {
+            first += slots[first..].iter().take_while(|slot| slot.x < here.x - reach_m).count();
+            let ahead = slots[first..].iter().take_while(|slot| slot.x <= here.x + reach_m);
+            ahead.filter(|slot| (*slot - here).norm_squared() <= reach_m * reach_m).count()
+        });
+        shares.max().and_then(|most| u32::try_from(most).ok()).unwrap_or(1)
+    }
+
+    /// The time in which all drones that share a channel say one message each, if the messages take a quarter of the bandwidth, s.
+    /// `bytes`: size of the payload.
     fn period_within_share_s(&self, bytes: usize) -> f64 {
         let frame_bits = 8.0 * (HEAD_BYTES as f64 + bytes as f64);
-        f64::from(self.formation.drones) * frame_bits / self.share_bps(BEACON_SHARE)
+        f64::from(self.channel_drones()) * frame_bits / self.share_bps(BEACON_SHARE)
     }
 
     /// A share of the bandwidth, bit/s.
@@ -298,7 +322,7 @@ impl Scenario {
         declared
     }
 
-    /// The channel that all drones share; `None` if bandwidth is no limit.
+    /// The channel that drones near each other share; `None` if bandwidth is no limit.
     #[must_use]
     pub fn channel(&self) -> Option<SharedChannel> {
         radio::channel(self.seed, &self.radio)

@@ -27,6 +27,7 @@ fn every_key_reaches_the_radio_model() {
     let s = parse(
         "delay_s = 0.1\njitter_s = 0.02\ndelay_model = \"gamma\"\nloss = 0.1\nrange_m = 300\nshadowing_db = 4\n\
          path_loss_exponent = 2.5\nduplicate = 0.05\nasymmetry = 0.5\nrate_bps = 1e6\nqueue_limit_s = 0.5\n\
+         carrier_sense_m = 700\n\
          burst = { share = 0.2, length_s = 0.3, loss = 0.9, scope = \"link\" }",
         &[],
     );
@@ -38,7 +39,10 @@ fn every_key_reaches_the_radio_model() {
         duplicate: 0.05,
     };
     assert_eq!(s.radio(), Radio { seed: 7, channel: air, asymmetry: 0.5, keyed_by_time: false, rules: Vec::new() });
-    assert_eq!(s.channel(), Some(SharedChannel { seed: 7, rate_bps: 1e6, limit_s: 0.5 }));
+    let channel = SharedChannel { seed: 7, rate_bps: 1e6, limit_s: 0.5, carrier_sense_m: 700.0 };
+    assert_eq!(s.channel(), Some(channel));
+    let everywhere = parse("rate_bps = 1e6", &[]).channel().map(|channel| channel.carrier_sense_m);
+    assert_eq!(everywhere, Some(f64::INFINITY));
 }
 
 #[test]

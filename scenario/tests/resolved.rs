@@ -39,6 +39,10 @@ fn defaults_follow_the_scenario() {
     assert!((beacon_s("satellite", "16") - 16.0 * frame_bits / 64_000.0).abs() < 1e-12);
     assert_eq!(beacon_s("satellite", "200"), 0.5, "a third of the peer time-out");
     assert_eq!(of(&[("radio.preset", "satellite"), ("protocol.beacon_period_s", "0.2")]).beacon_period_s(), 0.2);
+    // Of a column with 40 m between two drones, 31 are within 600 m of one; all share the channel of a satellite.
+    let column =
+        |preset: &str| of(&[("radio.preset", preset), ("formation.shape", "column"), ("formation.drones", "64")]);
+    assert_eq!((column("wifi").channel_drones(), column("satellite").channel_drones()), (31, 64));
     // A column of 64 is 2520 m long and takes 252 s to pass a point; 64 headways of 3.85 s come on top.
     assert_eq!(of(&[]).timeout_s(), 180.0);
     let column = of(&[("formation.shape", "column"), ("formation.drones", "64")]);

@@ -4,6 +4,7 @@
 
 pub(crate) mod air;
 
+use skein_leader::channel_params::ChannelParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
@@ -75,7 +76,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
         },
         beacon_period_s: p.beacon_s,
         repeat_period_s: p.repeat_s,
-        bandwidth_bytes_per_s: f64::INFINITY,
+        channel: ChannelParams::default(),
         peer_timeout_s: p.peer_timeout_s,
     }
 }

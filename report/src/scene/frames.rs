@@ -85,6 +85,7 @@ pub(super) fn content(frame: &AirFrame) -> String {
             Some(drone) => format!("drone {drone} passed {} obstacles", passed.set_count),
             None => format!("passed {} obstacles", passed.set_count),
         },
+        Ok(Message::AssignmentList(list)) => format!("passes on the assignments of {} drones", list.count),
         Ok(Message::Presence(presence)) => format!("passes on the states of {} drones", presence.count),
         Ok(Message::Separation(separation)) => format!("bound to {} separators", separation.separators().len()),
         Ok(Message::User(message)) => format!("{} bytes", message.bytes().len()),

@@ -19,6 +19,9 @@ pub fn message_json(message: &Message) -> Value {
         Message::Leadership(leadership) => of_leadership(leadership),
         Message::Plan(plan) => of_plan(plan),
         Message::Assignment(assignment) => of_assignment(assignment),
+        Message::AssignmentList(list) => {
+            json!({ "assignments": list.assignments().map(|part| of_assignment(&part)).collect::<Vec<_>>() })
+        }
         Message::Arrivals(arrivals) => of_arrivals(arrivals),
         Message::Passed(passed) => of_passed(passed),
         Message::Presence(presence) => of_presence(presence),

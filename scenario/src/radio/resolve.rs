@@ -38,9 +38,10 @@ pub(crate) fn radio(seed: u64, keys: &RadioKeys) -> Radio {
     Radio { seed, channel: channel_model(keys), asymmetry: keys.asymmetry, keyed_by_time: keys.keyed_by_time, rules }
 }
 
-/// The channel that all drones share; `None` if bandwidth is no limit. `seed` keys its random numbers.
+/// The channel that drones share; `None` if bandwidth is no limit. `seed` keys its random numbers.
 pub(crate) fn channel(seed: u64, keys: &RadioKeys) -> Option<SharedChannel> {
-    keys.rate_bps.map(|rate_bps| SharedChannel { seed, rate_bps, limit_s: keys.queue_limit_s })
+    let carrier_sense_m = keys.carrier_sense_m.unwrap_or(f64::INFINITY);
+    keys.rate_bps.map(|rate_bps| SharedChannel { seed, rate_bps, limit_s: keys.queue_limit_s, carrier_sense_m })
 }
 
 /// The keys for frames that match a rule: those of `[radio]`, overridden by those of the rule.
