@@ -143,6 +143,7 @@ kind="blind",at_s=3,target="leader"
 kind="blind",sensor="ranging",on="grouped",drones=[1,3]
 kind="noise",position_bias_m=[0.3,-0.2],position_std_m=0.1,velocity_std_mps=0.05,at_s=1,target="random"
 kind="ranging",ranging_dropout_share=0.5,ranging_std_m=2,on="detected",target="leader"
+kind="ranging",ranging_latency_s=0.5,ranging_field_rad=3,ranging_occlusion=true,on="queued",target="all"
 kind="gnss",position_bias_m=[0,1],position_drift_mps=[0.1,0],position_error_max_m=2,at_s=5,target="member"
 kind="clock",clock_offset_s=-0.5,clock_drift_ppm=100,on="queued",target="leader"
 kind="wind",at_s=0,wind_mps2=[0,0.3],gust_mps2=0.5

@@ -18,7 +18,12 @@ const KINDS: [(&str, &str, Option<u64>); 13] = [
     ("kind=\"partition\", at_s=2, sides=[[0, 1, 2], [3, 4, 5, 6]], for_s=4", "partition", None),
     ("kind=\"blind\", at_s=2, drone=0, for_s=4", "blind", Some(0)),
     ("kind=\"noise\", at_s=1, drone=3, position_std_m=0.2, velocity_bias_mps=[0.1, 0]", "noise", Some(3)),
-    ("kind=\"ranging\", at_s=1, drone=2, ranging_dropout_share=0.4, ranging_std_m=1", "ranging", Some(2)),
+    (
+        "kind=\"ranging\", at_s=1, drone=2, ranging_dropout_share=0.4, ranging_std_m=1, ranging_latency_s=0.5, \
+         ranging_field_rad=3, ranging_occlusion=true, for_s=6",
+        "ranging",
+        Some(2),
+    ),
     (
         "kind=\"gnss\", at_s=1, drone=5, position_bias_m=[0, 0.5], position_drift_mps=[0.02, 0], for_s=6",
         "gnss",

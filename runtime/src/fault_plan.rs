@@ -52,15 +52,7 @@ fn effect(keys: &Keys, drones: u32) -> FaultEffect {
             obstacles: keys.sensor != Some(Sensor::Ranging),
             ranging: keys.sensor != Some(Sensor::Obstacles),
         },
-        FaultKind::Ranging => FaultEffect::Ranging(RangingErrors {
-            std_m: keys.ranging_std_m.unwrap_or(0.0),
-            bearing_std_rad: keys.ranging_bearing_std_rad.unwrap_or(0.0),
-            velocity_std_mps: keys.ranging_velocity_std_mps.unwrap_or(0.0),
-            outlier_share: keys.ranging_outlier_share.unwrap_or(0.0),
-            outlier_m: keys.ranging_outlier_m.unwrap_or(0.0),
-            dropout_share: keys.ranging_dropout_share.unwrap_or(0.0),
-            ..RangingErrors::default()
-        }),
+        FaultKind::Ranging => FaultEffect::Ranging(ranging(keys)),
         FaultKind::Gnss => FaultEffect::Gnss(PositionDrift {
             bias_m: vector(keys.position_bias_m),
             drift_mps: vector(keys.position_drift_mps),
@@ -81,6 +73,21 @@ fn effect(keys: &Keys, drones: u32) -> FaultEffect {
             gust_mps2: keys.gust_mps2.unwrap_or(0.0),
             gust_s: keys.gust_s.unwrap_or(GUST_S),
         }),
+    }
+}
+
+fn ranging(keys: &Keys) -> RangingErrors {
+    let ideal = RangingErrors::default();
+    RangingErrors {
+        std_m: keys.ranging_std_m.unwrap_or(ideal.std_m),
+        bearing_std_rad: keys.ranging_bearing_std_rad.unwrap_or(ideal.bearing_std_rad),
+        velocity_std_mps: keys.ranging_velocity_std_mps.unwrap_or(ideal.velocity_std_mps),
+        outlier_share: keys.ranging_outlier_share.unwrap_or(ideal.outlier_share),
+        outlier_m: keys.ranging_outlier_m.unwrap_or(ideal.outlier_m),
+        dropout_share: keys.ranging_dropout_share.unwrap_or(ideal.dropout_share),
+        latency_s: keys.ranging_latency_s.unwrap_or(ideal.latency_s),
+        field_rad: keys.ranging_field_rad.unwrap_or(ideal.field_rad),
+        occlusion: keys.ranging_occlusion.unwrap_or(ideal.occlusion),
     }
 }
 

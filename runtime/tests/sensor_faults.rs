@@ -23,6 +23,28 @@ fn the_margin_is_what_keeps_drones_apart_when_a_position_is_biased() {
     }
 }
 
+/// Ranging that is late, narrow or hidden by obstacles changes the flight of drones that range each other, and of no others. All of them
+/// arrive with every distance kept. In S2 no drone is behind the wall and in range of another one, so the wall hides none.
+#[test]
+fn late_narrow_and_hidden_ranging_acts_and_is_flown_through() {
+    for name in ["paper/s2-right", "paper/forest"] {
+        for ranging in ["true", "false"] {
+            let flown = |key: &str| {
+                let fault = format!("{{ kind = \"ranging\", on = \"detected\", target = \"all\", ranging_{key} }}");
+                let sets = [PAPERS_RULE, ("sensors.ranging", ranging), ("fault.0", fault.as_str())];
+                fly_to_the_end(&scenario(name, &sets), None)
+            };
+            let harmless = flown("std_m = 0").digest();
+            for key in ["latency_s = 2", "field_rad = 1.5", "occlusion = true"] {
+                let (world, what) = (flown(key), format!("{name}, ranging {ranging}, {key}"));
+                assert_eq!((world.ended(), world.violations()), (Some(Outcome::Reached), 0), "{what}");
+                let acts = ranging == "true" && (name, key) != ("paper/s2-right", "occlusion = true");
+                assert_eq!(world.digest() != harmless, acts, "{what}");
+            }
+        }
+    }
+}
+
 /// The process of a drone with a wrong position and clock is stopped, or replaced, while its faults begin and end.
 #[test]
 fn faults_of_sensors_outlive_the_process() {

@@ -114,7 +114,7 @@ impl FaultRules<'_> {
             Blind, Clock, Freeze, Gnss, HostCut, HostDown, Noise, Partition, Ranging, Restart, Slow, Wind,
         };
         let fault = self.fault;
-        let keys: [(&str, bool, &[FaultKind]); 20] = [
+        let keys: [(&str, bool, &[FaultKind]); 23] = [
             ("reaction_time_s", fault.reaction_time_s.is_some(), &[Slow]),
             ("sides", fault.sides.is_some(), &[Partition]),
             ("sensor", fault.sensor.is_some(), &[Blind]),
@@ -124,6 +124,9 @@ impl FaultRules<'_> {
             ("ranging_outlier_share", fault.ranging_outlier_share.is_some(), &[Ranging]),
             ("ranging_outlier_m", fault.ranging_outlier_m.is_some(), &[Ranging]),
             ("ranging_dropout_share", fault.ranging_dropout_share.is_some(), &[Ranging]),
+            ("ranging_latency_s", fault.ranging_latency_s.is_some(), &[Ranging]),
+            ("ranging_field_rad", fault.ranging_field_rad.is_some(), &[Ranging]),
+            ("ranging_occlusion", fault.ranging_occlusion.is_some(), &[Ranging]),
             ("position_bias_m", fault.position_bias_m.is_some(), &[Noise, Gnss]),
             ("position_std_m", fault.position_std_m.is_some(), &[Noise]),
             ("velocity_bias_mps", fault.velocity_bias_mps.is_some(), &[Noise]),
@@ -155,6 +158,9 @@ impl FaultRules<'_> {
                 "ranging_velocity_std_mps",
                 "ranging_outlier_share",
                 "ranging_outlier_m",
+                "ranging_latency_s",
+                "ranging_field_rad",
+                "ranging_occlusion",
             ],
             Gnss => &["position_bias_m", "position_drift_mps"],
             Clock => &["clock_offset_s", "clock_drift_ppm"],

@@ -7,6 +7,7 @@ use skein_protocol::GroupId;
 use skein_protocol::ids::GROUP_DEPTH;
 use skein_protocol::link_faults::MAX_SIDES;
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -81,7 +82,7 @@ pub struct Fault {
     /// With `kind = "blind"`: the sensor that measures nothing; absent: both.
     pub sensor: Option<Sensor>,
     /// With `kind = "ranging"`: standard deviation of the distance to a neighbour. Of this and the other `ranging_` keys, the
-    /// greatest of `[sensors]` and of the faults in force counts.
+    /// worst of `[sensors]` and of the faults in force counts: the greatest number, and the narrowest field of view.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub ranging_std_m: Option<f64>,
     /// With `kind = "ranging"`: standard deviation of the direction to a neighbour.
@@ -99,6 +100,14 @@ pub struct Fault {
     /// With `kind = "ranging"`: share of the measurements that are missing. With 1, the drone senses no neighbours and does not know it.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub ranging_dropout_share: Option<f64>,
+    /// With `kind = "ranging"`: age of a measurement when the drone reads it.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub ranging_latency_s: Option<f64>,
+    /// With `kind = "ranging"`: width of the field of view in which neighbours are sensed, centred on the direction of flight (at rest on +x).
+    #[schemars(range(max = TAU), extend("exclusiveMinimum" = 0.0))]
+    pub ranging_field_rad: Option<f64>,
+    /// With `kind = "ranging"`: whether obstacles hide the neighbours behind them.
+    pub ranging_occlusion: Option<bool>,
     /// With `kind = "noise"` and `kind = "gnss"`: constant error of the position that the drone reads of itself, [x, y].
     #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
     pub position_bias_m: Option<[f64; 2]>,
@@ -160,6 +169,9 @@ impl Fault {
             ranging_outlier_share: None,
             ranging_outlier_m: None,
             ranging_dropout_share: None,
+            ranging_latency_s: None,
+            ranging_field_rad: None,
+            ranging_occlusion: None,
             position_bias_m: None,
             position_std_m: None,
             velocity_bias_mps: None,

@@ -31,6 +31,7 @@ fn every_kind_is_read_and_survives_json_and_toml() {
         [[fault]]\nkind = \"noise\"\nat_s = 1\ndrone = 0\nposition_bias_m = [1, 0]\n\
         [[fault]]\nkind = \"wind\"\nat_s = 1\ngust_mps2 = 0.2\n\
         [[fault]]\nkind = \"ranging\"\nat_s = 1\ndrone = 0\nranging_dropout_share = 0.5\nranging_std_m = 1\n\
+        ranging_latency_s = 0.2\nranging_field_rad = 3\nranging_occlusion = true\n\
         [[fault]]\nkind = \"gnss\"\nat_s = 1\ndrone = 0\nposition_drift_mps = [0.1, 0]\nposition_error_max_m = 2\n\
         [[fault]]\nkind = \"clock\"\nat_s = 1\ndrone = 0\nclock_offset_s = -1\nclock_drift_ppm = 20\n\
         [[fault]]\nkind = \"host-down\"\nat_s = 1\nhost = \"a\"\n\
@@ -79,6 +80,17 @@ fn the_bounds_of_errors_follow_from_the_faults() {
         clock_offset_s = -1\nclock_drift_ppm = -10000\n";
     assert_eq!(clock(jump), 2.5);
     assert_eq!(clock(&jump.replace("[sensors]", "[sensors]\nclock_error_max_s = 1")), 1.0);
+}
+
+/// One key of ranging is enough for a fault, and any of them leaves the distances of all drones to words.
+#[test]
+fn each_key_of_ranging_makes_a_fault_and_leaves_the_distances_to_words() {
+    let apart_by_words = |text: &str| parse(text, &[]).unwrap_or_else(|errors| panic!("{errors}")).apart_by_words();
+    assert!(!apart_by_words(HEAD));
+    for key in ["dropout_share = 1", "std_m = 1", "latency_s = 0.5", "field_rad = 3", "occlusion = true"] {
+        let fault = format!("{HEAD}[[fault]]\nkind = \"ranging\"\non = \"queued\"\ndrone = 1\nranging_{key}\n");
+        assert!(apart_by_words(&fault), "{key}");
+    }
 }
 
 #[test]
@@ -152,6 +164,22 @@ fn an_invalid_fault_is_rejected_with_its_place() {
         (
             "kind = \"ranging\"\nat_s = 1\ndrone = 1\nranging_dropout_share = 1.5",
             "fault.0.ranging_dropout_share: found 1.5, expected a number from 0 to 1",
+        ),
+        (
+            "kind = \"ranging\"\nat_s = 1\ndrone = 1\nranging_latency_s = 10.5",
+            "f.toml:10:21: fault.0.ranging_latency_s: found 10.5, expected a number from 0 to 10 (s)",
+        ),
+        (
+            "kind = \"ranging\"\nat_s = 1\ndrone = 1\nranging_field_rad = 0",
+            "fault.0.ranging_field_rad: found 0, expected a number above 0, at most 6.283185307179586 (rad)",
+        ),
+        (
+            "kind = \"ranging\"\nat_s = 1\ndrone = 1\nranging_occlusion = 1",
+            "fault.0.ranging_occlusion: found 1, expected true or false",
+        ),
+        (
+            "kind = \"blind\"\nat_s = 1\ndrone = 1\nranging_occlusion = true",
+            "fault.0.ranging_occlusion: belongs to kind = \"ranging\", found kind = \"blind\"",
         ),
         (
             "kind = \"clock\"\nat_s = 1\ndrone = 1\nclock_offset_s = 1\nposition_bias_m = [1, 0]",

@@ -3,6 +3,7 @@
 use crate::sensor_errors::RangingErrors;
 use skein_protocol::record::FaultKind;
 use skein_protocol::{DroneId, GroupId, Vec2};
+use std::f64::consts::TAU;
 
 /// All faults of a mission.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +18,15 @@ impl FaultPlan {
     /// The number of a partition among the plan's partitions, from 0. `place` is its index in the plan.
     pub(crate) fn partition_number(&self, place: usize) -> usize {
         self.faults[..place].iter().filter(|fault| matches!(fault.effect, FaultEffect::Partition(_))).count()
+    }
+
+    /// The greatest latency of a fault of ranging, s.
+    pub(crate) fn ranging_latency_max_s(&self) -> f64 {
+        let latency_s = |fault: &Fault| match &fault.effect {
+            FaultEffect::Ranging(errors) => errors.latency_s,
+            _ => 0.0,
+        };
+        self.faults.iter().map(latency_s).fold(0.0, f64::max)
     }
 }
 
@@ -57,7 +67,7 @@ pub enum FaultEffect {
         /// The ranging sensor, which measures neighbours.
         ranging: bool,
     },
-    /// What the drone ranges of its neighbours is as bad as this, or worse. Latency, field of view and occlusion are ignored.
+    /// What the drone ranges of its neighbours is as bad as this, or worse.
     Ranging(RangingErrors),
     /// The position that the drone reads of itself is biased, or drifts.
     Gnss(PositionDrift),
@@ -237,10 +247,7 @@ impl FaultEffect {
                 (true, false) => "senses no obstacles".to_owned(),
                 _ => "senses no neighbours".to_owned(),
             },
-            Self::Ranging(r) => format!(
-                "ranges with a share of {} missing and {} too long by {} m, ± {} m, ± {} rad, ± {} m/s",
-                r.dropout_share, r.outlier_share, r.outlier_m, r.std_m, r.bearing_std_rad, r.velocity_std_mps
-            ),
+            Self::Ranging(errors) => ranging_words(errors),
             Self::Gnss(g) => {
                 let most = if g.max_m.is_finite() { format!(", {} m at most", g.max_m) } else { String::new() };
                 let (bias, drift) = (g.bias_m, g.drift_mps);
@@ -260,5 +267,38 @@ impl FaultEffect {
                 format!("wind of [{}, {}] m/s² ± {} m/s²", w.acceleration_mps2.x, w.acceleration_mps2.y, w.gust_mps2)
             }
         }
+    }
+}
+
+/// A description of a fault of ranging.
+fn ranging_words(r: &RangingErrors) -> String {
+    let mut words = format!(
+        "ranges with a share of {} missing and {} too long by {} m, ± {} m, ± {} rad, ± {} m/s",
+        r.dropout_share, r.outlier_share, r.outlier_m, r.std_m, r.bearing_std_rad, r.velocity_std_mps
+    );
+    if r.latency_s > 0.0 {
+        words += &format!(", {} s late", r.latency_s);
+    }
+    if r.field_rad < TAU {
+        words += &format!(", in a field of {} rad", r.field_rad);
+    }
+    if r.occlusion {
+        words += ", not past obstacles";
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_of_ranging_is_described_as_far_as_it_goes() {
+        let noisy = RangingErrors { std_m: 2.0, ..RangingErrors::default() };
+        let text = "ranges with a share of 0 missing and 0 too long by 0 m, ± 2 m, ± 0 rad, ± 0 m/s";
+        assert_eq!(FaultEffect::Ranging(noisy).words(), text);
+        let worse = RangingErrors { latency_s: 0.5, field_rad: 1.5, occlusion: true, ..noisy };
+        let more = format!("{text}, 0.5 s late, in a field of 1.5 rad, not past obstacles");
+        assert_eq!(FaultEffect::Ranging(worse).words(), more);
     }
 }

@@ -146,9 +146,8 @@ fn shifted(value: Vec3, error: Vec2) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::geometry::Outline;
-    use crate::sensor_errors::SensorErrors;
     use crate::sweep::SweepRange;
-    use crate::testing::{bodies, rectangle};
+    use crate::testing::{bodies, params, rectangle};
     use proptest::prelude::*;
     use skein_protocol::wire::BrokenSensors;
 
@@ -177,7 +176,7 @@ mod tests {
         let mut down = Downlink::default();
         sweep.sweep(bodies, RANGE);
         let drones = faults.map(|fault| (1, fault));
-        let model = SensorModel::new(SensorErrors::default(), 0.02, bodies.len());
+        let model = SensorModel::new(&params(), bodies.len());
         let sensed = Sensed { bodies, sweep: &sweep, ranging_m, model: &model, now: SimTime::ZERO };
         SenseWriter::new(shapes).write(&sensed, drones, &mut down);
         down.seal(0, SimTime::ZERO);

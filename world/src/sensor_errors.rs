@@ -83,7 +83,7 @@ impl RangingErrors {
         *self == Self { outlier_m: self.outlier_m, ..Self::default() }
     }
 
-    /// Of each of the errors and shares, the greater one of the two; latency, field of view and occlusion as they are.
+    /// Of each error, the worse one of the two: the greater number, the narrower field of view, and occlusion if one of them has it.
     #[must_use]
     pub(crate) fn or_worse(&self, other: &Self) -> Self {
         Self {
@@ -93,7 +93,9 @@ impl RangingErrors {
             outlier_share: self.outlier_share.max(other.outlier_share),
             outlier_m: self.outlier_m.max(other.outlier_m),
             dropout_share: self.dropout_share.max(other.dropout_share),
-            ..*self
+            latency_s: self.latency_s.max(other.latency_s),
+            field_rad: self.field_rad.min(other.field_rad),
+            occlusion: self.occlusion || other.occlusion,
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::body::Body;
 use crate::faults::keyed_rng::KeyedRng;
 use crate::geometry::Outline;
+use crate::params::WorldParams;
 use crate::sensor_errors::{PositionError, RangingErrors, SensorErrors};
 use crate::view::in_view;
 use skein_protocol::shape::ConvexShape;
@@ -31,10 +32,10 @@ pub(crate) struct SensorModel {
     tick: Tick,
     /// The error of each drone's position, m; empty without such errors.
     positions_m: Vec<Vec2>,
-    /// Where the bodies were in the last ticks, the newest last; empty unless measurements are late.
+    /// Where the bodies were in the last ticks, the newest last; empty unless measurements can be late.
     past: VecDeque<Motions>,
-    /// Number of ticks that measurements are late.
-    late: usize,
+    /// Greatest number of ticks that a measurement can be late, by the sensors or by a fault.
+    most_late: usize,
     /// Offset, s, and drift of each drone's clock; empty for exact clocks.
     clocks: Vec<(f64, f64)>,
 }
@@ -43,8 +44,10 @@ pub(crate) struct SensorModel {
 pub(crate) type Measured = (Vec3, Vec3);
 
 impl SensorModel {
-    /// The errors before the first tick, for this number of drones.
-    pub(crate) fn new(errors: SensorErrors, dt_s: f64, drones: usize) -> Self {
+    /// The errors of a world with these parameters before the first tick, for this number of drones.
+    pub(crate) fn new(params: &WorldParams, drones: usize) -> Self {
+        let (errors, dt_s) = (params.sensors, params.dt_s());
+        let latency_max_s = errors.ranging.latency_s.max(params.faults.ranging_latency_max_s());
         let clock = errors.clock;
         let exact = clock.is_exact();
         let mut model = Self {
@@ -54,7 +57,7 @@ impl SensorModel {
             tick: 0,
             positions_m: Vec::new(),
             past: VecDeque::new(),
-            late: (errors.ranging.latency_s / dt_s).round() as usize,
+            most_late: ticks(latency_max_s, dt_s),
             clocks: Vec::new(),
         };
         if !exact {
@@ -79,9 +82,9 @@ impl SensorModel {
             };
             self.positions_m = (0..bodies.len()).map(next).collect();
         }
-        if self.late > 0 {
+        if self.most_late > 0 {
             let mut motions =
-                if self.past.len() > self.late { self.past.pop_front() } else { None }.unwrap_or_default();
+                if self.past.len() > self.most_late { self.past.pop_front() } else { None }.unwrap_or_default();
             motions.clear();
             motions.extend(bodies.iter().map(|body| (body.position(), body.velocity())));
             self.past.push_back(motions);
@@ -129,13 +132,14 @@ impl SensorModel {
             let (own, other) = (&bodies[drone], &bodies[other]);
             return Some((other.position() - own.position(), other.velocity() - own.velocity()));
         }
+        let errors = self.errors.ranging.or_worse(fault);
+        let past = self.past(errors.latency_s);
         let motion = |body: usize| {
-            let past = self.past.front().and_then(|motions| motions.get(body).copied());
+            let past = past.and_then(|motions| motions.get(body).copied());
             past.unwrap_or_else(|| (bodies[body].position(), bodies[body].velocity()))
         };
         let ((here, own), (there, theirs)) = (motion(drone), motion(other));
         let (position, velocity) = (there - here, theirs - own);
-        let errors = self.errors.ranging.or_worse(fault);
         if !sees(errors.field_rad, own.xy(), position.xy()) {
             return None;
         }
@@ -159,6 +163,12 @@ impl SensorModel {
         Some((flat.push(position.z) * stretch, velocity))
     }
 
+    /// How the bodies moved this long ago, s; in the first tick if the mission is younger. `None` if no measurement can be late.
+    fn past(&self, latency_s: f64) -> Option<&Motions> {
+        let newest = self.past.len().checked_sub(1)?;
+        self.past.get(newest.saturating_sub(ticks(latency_s, self.dt_s)))
+    }
+
     fn rng(&self, purpose: Purpose, key: u64, tick: Tick) -> KeyedRng {
         KeyedRng::new(self.errors.seed, [purpose as u64 | 0x5e45_0000_0000, key, tick])
     }
@@ -173,6 +183,11 @@ impl PositionError {
         let length_m = error.norm();
         if length_m > self.max_m { error * (self.max_m / length_m) } else { error }
     }
+}
+
+/// The number of ticks in this time, s.
+fn ticks(seconds: f64, dt_s: f64) -> usize {
+    (seconds / dt_s).round() as usize
 }
 
 /// Whether a neighbour in this direction is in a field of view of this width, rad.

@@ -91,7 +91,7 @@ impl World {
             stillness: Stillness::new(drones.bodies(), params.spacing_m / 2.0),
             uplink: Uplink::new(params.channel),
             sense_writer: SenseWriter::new(obstacles),
-            sensors: SensorModel::new(params.sensors, params.dt_s(), starts.len()),
+            sensors: SensorModel::new(&params, starts.len()),
             downlink: Downlink::default(),
             counters: MissionCounters::default(),
             digest: TickDigest::default(),

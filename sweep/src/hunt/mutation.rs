@@ -2,6 +2,7 @@
 
 use crate::splitmix::SplitMix64;
 use skein_scenario::{Fault, FaultKind, Obstacle, Scenario, ScenarioSource};
+use std::f64::consts::TAU;
 
 /// Attempts to find a change that leaves the scenario valid.
 const ATTEMPTS: u64 = 20;
@@ -15,6 +16,10 @@ const MOST_FAULTS: usize = 3;
 const FAULT_WITHIN_S: f64 = 60.0;
 /// Greatest error of a broken sensor, in safe distances.
 const ERROR: f64 = 0.1;
+/// Greatest latency of a broken ranging sensor, s.
+const LATENCY_S: f64 = 2.0;
+/// Narrowest field of view of a broken ranging sensor, rad.
+const FIELD_RAD: f64 = 0.5;
 /// Greatest offset of a faulty clock, s.
 const CLOCK_OFFSET_S: f64 = 1.0;
 
@@ -116,6 +121,9 @@ fn mislead(fault: &mut Fault, rng: &mut SplitMix64, by_m: f64) {
             fault.ranging_outlier_share = Some(rng.between(0.0, 0.3));
             fault.ranging_outlier_m = Some(rng.between(0.0, by_m));
             fault.ranging_dropout_share = Some(rng.between(0.0, 0.5));
+            fault.ranging_latency_s = Some(rng.between(0.0, LATENCY_S));
+            fault.ranging_field_rad = Some(rng.between(FIELD_RAD, TAU));
+            fault.ranging_occlusion = Some(rng.integer(0, 1) == 1);
         }
         FaultKind::Gnss => fault.position_bias_m = Some([0, 1].map(|_| rng.between(-0.5 * by_m, 0.5 * by_m))),
         FaultKind::Clock => fault.clock_offset_s = Some(rng.between(-CLOCK_OFFSET_S, CLOCK_OFFSET_S)),

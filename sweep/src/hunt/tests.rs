@@ -1,5 +1,7 @@
 use super::*;
 use crate::experiment::Experiment;
+use skein_scenario::{Fault, FaultKind};
+use std::f64::consts::TAU;
 use std::path::Path;
 
 /// Hunts in an experiment whose drones are all blind from the start: some fly into obstacles.
@@ -46,4 +48,22 @@ fn neighbours_are_valid_and_differ() {
     let near: Vec<Scenario> = (0..60).filter_map(|number| mutation::neighbour(&parent, 1, number)).collect();
     assert!(near.iter().any(|one| !one.fault_plan.is_empty()), "faults are added");
     assert!(near.len() >= 45 && near.iter().filter(|one| **one != parent).count() >= 36, "{}", near.len());
+}
+
+/// Ranging fails in every way: it is wrong, missing, late and narrow, and obstacles hide others from some of the drones.
+#[test]
+fn faults_of_ranging_are_drawn_with_all_their_keys() {
+    let experiment = Experiment::parse("scenario = \"wide\"\nseeds = 1", "test", Path::new("")).unwrap();
+    let parent = Grid::new(&experiment, &[]).scenario(0).unwrap();
+    let near = (0..600).filter_map(|number| mutation::neighbour(&parent, 1, number));
+    let faults: Vec<Fault> =
+        near.flat_map(|one| one.fault_plan).filter(|fault| fault.kind == FaultKind::Ranging).collect();
+    let every = |key: fn(&Fault) -> Option<f64>, below: f64| {
+        faults.iter().all(|fault| key(fault).is_some_and(|value| value > 0.0 && value < below))
+    };
+    assert!(every(|fault| fault.ranging_std_m, 100.0) && every(|fault| fault.ranging_dropout_share, 0.5));
+    assert!(every(|fault| fault.ranging_latency_s, 2.0) && every(|fault| fault.ranging_field_rad, TAU));
+    for hidden in [true, false] {
+        assert!(faults.iter().any(|fault| fault.ranging_occlusion == Some(hidden)), "{hidden} in {}", faults.len());
+    }
 }

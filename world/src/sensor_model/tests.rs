@@ -1,11 +1,10 @@
 use super::*;
+use crate::fault_plan::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime};
 use crate::sensor_errors::{ClockErrors, RangingErrors};
-use crate::testing::{bodies, rectangle};
-
-const DT_S: f64 = 0.02;
+use crate::testing::{bodies, params, rectangle};
 
 fn model(errors: SensorErrors, drones: usize) -> SensorModel {
-    SensorModel::new(SensorErrors { seed: 7, ..errors }, DT_S, drones)
+    SensorModel::new(&WorldParams { sensors: SensorErrors { seed: 7, ..errors }, ..params() }, drones)
 }
 
 fn ranging(ranging: RangingErrors) -> SensorModel {
@@ -147,4 +146,47 @@ fn a_fault_makes_ranging_worse_and_never_better() {
     let by_fault = ideal.range((0, 1), &noise, &pair, &[]);
     let better = RangingErrors { std_m: 0.1, ..RangingErrors::default() };
     assert_eq!(noisy.range((0, 1), &better, &pair, &[]), by_fault, "the greater deviation counts");
+}
+
+/// The world keeps where bodies were from the first tick on, for as long as the latest measurement of any fault is late.
+#[test]
+fn a_fault_makes_measurements_late_from_any_tick_on() {
+    let late = |latency_s: f64| RangingErrors { latency_s, ..RangingErrors::default() };
+    let fault = |latency_s: f64| Fault {
+        effect: FaultEffect::Ranging(late(latency_s)),
+        time: FaultTime::At(0.0),
+        targets: FaultTargets::All,
+        for_s: 1.0,
+    };
+    let faults = FaultPlan { seed: 1, faults: vec![fault(0.04), fault(0.1), fault(0.06)] };
+    let near = |tick: u64| bodies(&[[0.0, 0.0], [50.0 + tick as f64, 0.0]]);
+    for sensors_s in [0.0, 0.04] {
+        let sensors = SensorErrors { ranging: late(sensors_s), ..SensorErrors::default() };
+        let mut model = SensorModel::new(&WorldParams { sensors, faults: faults.clone(), ..params() }, 2);
+        for tick in 0..40 {
+            model.begin(tick, &near(tick));
+            for latency_s in [0.0, 0.04, 0.1] {
+                let (position, _) = model.range((0, 1), &late(latency_s), &near(tick), &[]).unwrap();
+                let age_ticks = (f64::max(latency_s, sensors_s) / 0.02).round() as u64;
+                assert_eq!(position.x, 50.0 + tick.saturating_sub(age_ticks) as f64, "{latency_s} s late, tick {tick}");
+            }
+        }
+        assert_eq!(model.past.len(), 6, "no older tick is kept");
+    }
+}
+
+#[test]
+fn a_fault_narrows_the_field_of_view_and_lets_obstacles_hide() {
+    let pair = bodies(&[[0.0, 0.0], [50.0, 30.0]]);
+    let wall = [Outline::new(&rectangle(25.0, 15.0, 2.0, 8.0))];
+    let field = |field_rad| RangingErrors { field_rad, ..RangingErrors::default() };
+    let ideal = RangingErrors::default();
+    // The neighbour is 0.54 rad to the left of +x.
+    let (all_round, ahead, narrow) = (ranging(ideal), ranging(field(1.2)), ranging(field(1.0)));
+    let sees = |model: &SensorModel, fault| model.range((0, 1), &fault, &pair, &wall).is_some();
+    assert!(sees(&all_round, ideal) && sees(&all_round, field(1.2)) && !sees(&all_round, field(1.0)));
+    assert!(sees(&ahead, ideal) && !sees(&ahead, field(1.0)) && !sees(&narrow, field(1.2)));
+    let hides = RangingErrors { occlusion: true, ..ideal };
+    assert!(!sees(&all_round, hides) && !sees(&ranging(hides), ideal) && !sees(&ahead, hides));
+    assert!(all_round.range((0, 1), &hides, &pair, &[]).is_some(), "in the open");
 }

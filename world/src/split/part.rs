@@ -107,7 +107,7 @@ impl WorldPart {
             bodies: Vec::new(),
             sweep: SensorSweep::new(outlines),
             sense_writer: SenseWriter::new(obstacles),
-            sensors: SensorModel::new(params.sensors, params.dt_s(), 0),
+            sensors: SensorModel::new(params, 0),
             uplink: Uplink::new(None),
             sensed: Downlink::default(),
             downlink: Downlink::default(),

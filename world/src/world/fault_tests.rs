@@ -2,11 +2,12 @@
 
 use crate::fault_plan::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime, FaultTrigger, ProcessCommand, Wind};
 use crate::params::{Failsafe, WorldParams};
+use crate::sensor_errors::RangingErrors;
 use crate::testing::{command, event_kinds, events, params, rectangle, starts};
 use crate::world::World;
 use skein_protocol::record::{EventKind, FaultKind, ROW_ALIVE, ROW_FROZEN, RunEvent};
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{DroneId, Vec2, Vec3};
 
 const ID: DroneId = DroneId(3);
 
@@ -150,6 +151,34 @@ fn wind_accelerates_its_targets_alone() {
     let velocity = |world: &World, drone: usize| world.record().rows[drone].velocity_mps;
     assert!((velocity(&world, 3)[1] - 1.0).abs() < 1e-9, "a second of 1 m/s²: {:?}", velocity(&world, 3));
     assert_eq!(velocity(&world, 2)[1], 0.0);
+}
+
+/// The faulty drone ranges a neighbour that flies away from it: late while the fault lasts, and by the true course of the flight.
+#[test]
+fn late_ranging_begins_and_ends_with_its_fault() {
+    let at = |x: f64, velocity: f64| (Vec3::new(x, 0.0, 50.0), Vec3::new(velocity, 0.0, 0.0));
+    let starts = [at(0.0, 0.0), at(40.0, 1.0)];
+    let late = RangingErrors { latency_s: 0.5, ..RangingErrors::default() };
+    let fault = Fault {
+        effect: FaultEffect::Ranging(late),
+        time: FaultTime::At(1.0),
+        targets: FaultTargets::Drones(vec![DroneId(0)]),
+        for_s: 1.0,
+    };
+    let faults = FaultPlan { seed: 1, faults: vec![fault] };
+    let mut world = World::new(WorldParams { faults, ..params() }, &starts, &[]).unwrap();
+    for tick in 0..150_u64 {
+        world.process_commands();
+        let view = world.downlink().view();
+        let ranged_m = |drone| view.senses(DroneId(drone)).unwrap().neighbours[0].position_m[0];
+        let age_ticks = if (50..100).contains(&tick) { 25 } else { 0 };
+        assert!((ranged_m(0) - (40.0 + 0.02 * (tick - age_ticks) as f64)).abs() < 1e-9, "tick {tick}: {}", ranged_m(0));
+        assert!((ranged_m(1) + 40.0 + 0.02 * tick as f64).abs() < 1e-9, "the other drone has no fault");
+        for id in 0..2 {
+            world.take_slot(DroneId(id), &Slot::default());
+        }
+        world.advance();
+    }
 }
 
 #[test]

@@ -260,14 +260,28 @@ fn positions_and_clocks_drift_from_the_beginning_of_their_faults() {
 
 #[test]
 fn of_several_faults_of_ranging_the_worst_counts() {
-    let first = RangingErrors { dropout_share: 0.5, std_m: 1.0, ..RangingErrors::default() };
-    let second = RangingErrors { dropout_share: 0.2, outlier_share: 0.1, outlier_m: 4.0, ..RangingErrors::default() };
+    let first = RangingErrors {
+        dropout_share: 0.5,
+        std_m: 1.0,
+        latency_s: 0.1,
+        field_rad: 2.0,
+        occlusion: true,
+        ..RangingErrors::default()
+    };
+    let second = RangingErrors {
+        dropout_share: 0.2,
+        outlier_share: 0.1,
+        outlier_m: 4.0,
+        latency_s: 0.3,
+        field_rad: 3.0,
+        ..RangingErrors::default()
+    };
     let mut schedule = schedule(vec![
         fault(FaultEffect::Ranging(first), FaultTime::At(0.0), one(0), 1.0),
         fault(FaultEffect::Ranging(second), FaultTime::At(0.0), FaultTargets::All, 2.0),
     ]);
     begun(&mut schedule, at(0.0), &Scene::new());
-    let both = RangingErrors { dropout_share: 0.5, std_m: 1.0, ..second };
+    let both = RangingErrors { dropout_share: 0.5, std_m: 1.0, field_rad: 2.0, occlusion: true, ..second };
     assert_eq!((schedule.standing(DroneId(0)).ranging, schedule.standing(DroneId(1)).ranging), (both, second));
     assert!(!schedule.standing(DroneId(0)).no_ranging, "the drone does not know of it");
     schedule.end(at(1.0));
