@@ -89,3 +89,4 @@ mod survey;
 mod task;
 pub mod tps;
 mod tuning;
+mod turns;

@@ -7,9 +7,10 @@ use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
+use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Bound;
 
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
@@ -74,14 +75,14 @@ pub(crate) struct RelayedFacts {
     room: usize,
     known: BTreeMap<Subject, Relayed>,
     /// The messages that will be looked at, by their turns.
-    turns: BTreeSet<(SimTime, Subject)>,
+    turns: Turns<Subject>,
 }
 
 impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
-        Self { me, repeat_s, room, known: BTreeMap::new(), turns: BTreeSet::new() }
+        Self { me, repeat_s, room, known: BTreeMap::new(), turns: Turns::default() }
     }
 
     /// Forgets all.
@@ -93,7 +94,7 @@ impl RelayedFacts {
     /// Forgets what was not heard for long.
     pub(crate) fn forget(&mut self, now: SimTime) {
         self.known.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
-        self.turns.retain(|(_, subject)| self.known.contains_key(subject));
+        self.turns.retain(|subject| self.known.contains_key(subject));
     }
 
     /// Notes a message of `source`. `near`: that drone is close to this one.
@@ -112,11 +113,11 @@ impl RelayedFacts {
         let old = self.known.get(&subject).map(|one| one.turn);
         let Some(fact) = fact(message).filter(|_| old.is_some() || self.known.len() < self.room) else { return };
         if let Some(turn) = old.flatten() {
-            self.turns.remove(&(turn, subject));
+            self.turns.remove(turn, subject);
         }
         let gossip = Gossip::varying(now, self.repeat_s, self.me);
         let turn = gossip.next_turn();
-        self.turns.insert((turn, subject));
+        self.turns.add(turn, subject);
         self.known.insert(subject, Relayed { fact, version, from: source, heard: now, gossip, turn: Some(turn) });
     }
 
@@ -128,7 +129,7 @@ impl RelayedFacts {
             let subject = Subject::Part(scope, drone);
             if let Some(one) = self.known.get_mut(&subject).filter(|one| one.turn.is_none()) {
                 one.turn = Some(turn);
-                self.turns.insert((turn, subject));
+                self.turns.add(turn, subject);
             }
             after = Bound::Excluded(Subject::Part(scope, DroneId(u32::MAX)));
         }
@@ -137,17 +138,17 @@ impl RelayedFacts {
     /// Says what is due, until `last` messages are said. This drone is at `position`, world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
         while say.len() < last
-            && let Some(&(turn, subject)) = self.turns.first()
-            && turn <= now
+            && let Some(subject) = self.turns.take_due(now)
         {
-            self.turns.pop_first();
             let Some(one) = self.known.get_mut(&subject) else { continue };
             let need = need(k, now, subject, one);
             if need == Need::Now && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
                 say.push(one.passed_on());
             }
             one.turn = one.next_look(now, need, self.repeat_s);
-            self.turns.extend(one.turn.map(|turn| (turn, subject)));
+            if let Some(turn) = one.turn {
+                self.turns.add(turn, subject);
+            }
         }
     }
 }
