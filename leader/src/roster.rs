@@ -2,6 +2,7 @@
 //! added to, and additions mostly come in the order of ids.
 
 use skein_protocol::DroneId;
+use std::cmp::Ordering;
 
 /// An entry that belongs to one drone.
 pub trait OfDrone {
@@ -25,16 +26,18 @@ impl<T: OfDrone> Roster<T> {
         Self(Vec::with_capacity(count))
     }
 
-    /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id; if all but one have,
-    /// it may be one less.
+    /// The index of a drone's entry, or where it belongs. The drones of a roster are mostly spread evenly over the ids, so that one look
+    /// finds it.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        let guess = |index: usize| self.0.get(index).is_some_and(|part| part.drone() == drone).then_some(index);
-        if let Some(index) = guess(drone.index()).or_else(|| guess(drone.index().checked_sub(1)?)) {
-            return Ok(index);
-        }
-        match self.0.last() {
-            Some(last) if last.drone() >= drone => self.0.binary_search_by_key(&drone, OfDrone::drone),
-            _ => Err(self.0.len()),
+        let Some(last) = self.0.last().filter(|last| last.drone() >= drone) else { return Err(self.0.len()) };
+        let all = last.drone().index() + 1 == self.0.len();
+        let guess = if all { drone.index() } else { drone.index() * self.0.len() / (last.drone().index() + 1) };
+        match self.0[guess].drone().cmp(&drone) {
+            Ordering::Equal => Ok(guess),
+            Ordering::Less if self.0[guess + 1].drone() > drone => Err(guess + 1),
+            Ordering::Less if self.0[guess + 1].drone() == drone => Ok(guess + 1),
+            Ordering::Greater if guess == 0 || self.0[guess - 1].drone() < drone => Err(guess),
+            _ => self.0.binary_search_by_key(&drone, OfDrone::drone),
         }
     }
 
@@ -128,5 +131,20 @@ mod tests {
         assert_eq!(roster.add(part(10, 8)).rank, 8);
         assert!(roster.contains(DroneId(9)) && !roster.contains(DroneId(4)) && roster.get(DroneId(11)).is_none());
         assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2), (10, 8)]);
+    }
+
+    #[test]
+    fn every_entry_is_found_however_the_drones_are_spread() {
+        let spreads: [fn(u32) -> bool; 6] =
+            [|_| true, |id| id != 7, |id| id % 2 == 1, |id| id % 3 == 0, |id| id < 4 || id > 36, |id| id == 39];
+        for is_in in spreads {
+            let drones: Vec<u32> = (0..40).filter(|id| is_in(*id)).collect();
+            let mut roster: Roster<Place> = drones.iter().map(|id| part(*id, *id as u16)).collect();
+            for id in 0..45 {
+                assert_eq!(roster.get(DroneId(id)).map(|entry| entry.drone.0), drones.contains(&id).then_some(id));
+            }
+            (0..45).rev().for_each(|id| _ = roster.add(part(id, 0)));
+            assert!(roster.iter().map(|entry| entry.drone.0).eq(0..45));
+        }
     }
 }
