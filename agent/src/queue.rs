@@ -54,8 +54,8 @@ struct Queued {
 pub(crate) struct QueuePacer {
     /// This drone's places when it looked last.
     mine: Vec<QueuePlace>,
-    /// The time stamp of the last beacon of each peer that was looked at, by id.
-    stamps: Vec<SimTime>,
+    /// Number of changes of the peers when it looked last; `None` if it has to look at all of them.
+    seen: Option<usize>,
     /// The places of peers before one of `mine`, by peer. All other places are of no interest, so they are not kept.
     before: Vec<Queued>,
     /// Memory for the queue that is looked at.
@@ -92,21 +92,20 @@ impl QueuePacer {
         if !places.clone().map(|place| key(&place)).eq(self.mine.iter().map(key)) {
             self.mine.clear();
             self.mine.extend(places);
-            self.stamps.clear();
+            self.seen = None;
         }
         if self.mine.is_empty() {
             return;
         }
-        if self.stamps.len() != peers.stamps().len() {
-            self.stamps.clear();
-            self.stamps.resize(peers.stamps().len(), SimTime::MAX);
-            self.before.clear();
+        let changes = peers.changes();
+        let changed = self.seen.and_then(|seen| changes.since(seen));
+        self.seen = Some(changes.count());
+        if let Some(changed) = changed {
+            changed.for_each(|index| self.note(index as u32, &peers.at(index).1));
+            return;
         }
-        for (index, &stamp) in peers.stamps().iter().enumerate() {
-            if std::mem::replace(&mut self.stamps[index], stamp) != stamp {
-                self.note(index as u32, &peers.at(index).1);
-            }
-        }
+        self.before.clear();
+        peers.all().zip(0..).for_each(|((_, pose), index)| self.note(index, &pose));
     }
 
     /// Notes the places of a peer that are before one of this drone's.

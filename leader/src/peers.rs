@@ -7,6 +7,7 @@ use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
+use std::hint::black_box;
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -63,6 +64,8 @@ pub struct Peers {
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
+    /// If the peers heard are the lowest ids but this one, as of the last look at all peers: then no search is needed.
+    all_but: Option<DroneId>,
     /// The last beacon of each of them, in the same order.
     beacons: Beacons,
     /// Of their time stamps.
@@ -86,6 +89,7 @@ impl Peers {
             quiet_until: SimTime::MAX,
             next_look: SimTime::ZERO,
             ids: Vec::new(),
+            all_but: None,
             beacons: Beacons::default(),
             changes: Changes::default(),
             last: Vec::new(),
@@ -124,9 +128,10 @@ impl Peers {
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
                 self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 self.ids.insert(place, source);
+                self.all_but = None;
                 self.beacons.insert(place, &pose);
                 self.last.insert(place, peer);
-                self.changes.note_from(place, self.ids.len());
+                self.changes.note_moved(self.ids.len());
             }
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
                 let prior = self.prior(now, false);
@@ -172,6 +177,7 @@ impl Peers {
         let mut near = std::mem::take(&mut self.near);
         near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
         self.near = near;
+        self.all_but = lowest_but_one(&self.ids);
         self.beacons.tidy();
     }
 
@@ -184,6 +190,15 @@ impl Peers {
     /// less one for the ids above this drone's own.
     #[inline]
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
+        match self.all_but {
+            Some(missing) if peer != missing && peer.index() <= self.ids.len() => {
+                Ok(peer.index() - usize::from(peer > missing))
+            }
+            _ => self.search(peer),
+        }
+    }
+
+    fn search(&self, peer: DroneId) -> Result<usize, usize> {
         let guess = |index: usize| (self.ids.get(index) == Some(&peer)).then_some(index);
         let found = guess(peer.index()).or_else(|| guess(peer.index().checked_sub(1)?));
         found.map_or_else(|| self.ids.binary_search(&peer), Ok)
@@ -191,6 +206,22 @@ impl Peers {
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
         self.place(peer).ok().map(|place| &self.last[place])
+    }
+
+    /// Reads the time stamp of a peer's last beacon, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm_stamp(&self, peer: DroneId) {
+        black_box(self.stamp_of(peer));
+    }
+
+    /// Reads all about a peer, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm(&self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.beacons.warm(place);
+            let Peer { timeout, direct } = &self.last[place];
+            black_box((timeout.last(), *direct));
+        }
     }
 
     /// Whether a peer's own beacon was heard just now.
@@ -229,9 +260,10 @@ impl Peers {
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.ids.remove(place);
+            self.all_but = None;
             self.beacons.remove(place);
             self.last.remove(place);
-            self.changes.note_from(place, self.ids.len());
+            self.changes.note_moved(self.ids.len());
             self.near.retain(|near| *near != peer);
         }
     }
@@ -329,6 +361,12 @@ impl Peers {
         let known = self.ids.iter().zip(&self.last).zip(self.beacons.iter());
         known.map(|((&id, peer), beacon)| (id, peer, beacon))
     }
+}
+
+/// The id that is missing among the lowest ids, if these ascending ids are all others; `None` if more are missing.
+fn lowest_but_one(ids: &[DroneId]) -> Option<DroneId> {
+    let missing = ids.iter().zip(0..).find(|&(id, place)| id.0 != place).map_or(ids.len() as u32, |(_, place)| place);
+    ids.last().is_none_or(|last| last.index() <= ids.len()).then_some(DroneId(missing))
 }
 
 /// A hash of a set of drones, whatever their order; never 0.
