@@ -58,6 +58,8 @@ pub(crate) struct QueuePacer {
     seen: Option<usize>,
     /// The places of peers before one of `mine`, by peer. All other places are of no interest, so they are not kept.
     before: Vec<Queued>,
+    /// The peers of `before`. Apart from it, so that a search touches little memory.
+    peers: Vec<u32>,
     /// Memory for the queue that is looked at.
     ahead: Vec<Ahead>,
 }
@@ -105,6 +107,7 @@ impl QueuePacer {
             return;
         }
         self.before.clear();
+        self.peers.clear();
         peers.all().zip(0..).for_each(|((_, pose), index)| self.note(index, &pose));
     }
 
@@ -112,11 +115,16 @@ impl QueuePacer {
     fn note(&mut self, peer: u32, pose: &Beacon<'_>) {
         let mine = &self.mine;
         let is_before = |place: &QueuePlace| mine.iter().any(|own| is_ahead(place, own));
-        let (stamp, speed_mps) = (pose.stamp(), pose.velocity().norm());
-        let news = pose.queue().filter(is_before).map(|place| Queued { peer, stamp, speed_mps, place });
-        let from = self.before.partition_point(|known| known.peer < peer);
-        let known = self.before[from..].iter().take_while(|known| known.peer == peer).count();
-        self.before.splice(from..from + known, news);
+        let places = pose.queue().filter(is_before);
+        let news = places.map(|place| Queued { peer, stamp: pose.stamp(), speed_mps: pose.velocity().norm(), place });
+        let from = self.peers.partition_point(|known| *known < peer);
+        let range = from..from + self.peers[from..].iter().take_while(|known| **known == peer).count();
+        if news.clone().count() == range.len() {
+            self.before[range].iter_mut().zip(news).for_each(|(known, new)| *known = new);
+        } else {
+            self.peers.splice(range.clone(), news.clone().map(|new| new.peer));
+            self.before.splice(range, news);
+        }
     }
 
     /// Collects the living peers with a place before `mine` on the same route of the same set, sorted by rank. The remaining

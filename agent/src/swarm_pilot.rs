@@ -580,7 +580,7 @@ impl Pilot for SwarmPilot {
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
-        ages.extend(self.leading.peers().ages_s(now));
+        self.leading.peers().ages_s(now, ages);
     }
 }
 

@@ -185,7 +185,7 @@ impl Beacon<'_> {
 
     /// The drone's places in queues, nearest set first.
     #[inline]
-    pub fn queue(&self) -> impl Iterator<Item = QueuePlace> {
+    pub fn queue(&self) -> impl Iterator<Item = QueuePlace> + Clone {
         (0..MAX_PLACES).map(|number| self.place(number))
     }
 

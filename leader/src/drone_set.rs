@@ -30,6 +30,11 @@ impl DroneSet {
         self.words.get(word).is_some_and(|bits| bits & bit != 0)
     }
 
+    /// Removes all drones.
+    pub(crate) fn clear(&mut self) {
+        self.words.clear();
+    }
+
     fn iter(&self) -> impl Iterator<Item = DroneId> {
         (0..self.words.len() as u32 * 64).map(DroneId).filter(|&drone| self.contains(drone))
     }

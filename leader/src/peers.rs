@@ -346,15 +346,14 @@ impl Peers {
         self.all_live(now) || self.last[index].lives(now, self.timeout_s)
     }
 
-    /// How old the last beacons of the living peers are, s, by id.
-    pub fn ages_s(&self, now: SimTime) -> impl Iterator<Item = f64> {
-        let all = self.all_live(now);
-        let living = self
-            .stamps()
-            .iter()
-            .enumerate()
-            .filter(move |(index, _)| all || self.last[*index].lives(now, self.timeout_s));
-        living.map(move |(_, stamp)| now.since(*stamp))
+    /// Adds how old the last beacons of the living peers are, s, by id.
+    pub fn ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
+        let age_s = |stamp: &SimTime| now.since(*stamp);
+        if self.all_live(now) {
+            return ages.extend(self.stamps().iter().map(age_s));
+        }
+        let living = self.stamps().iter().zip(&self.last).filter(|(_, peer)| peer.lives(now, self.timeout_s));
+        ages.extend(living.map(|(stamp, _)| age_s(stamp)));
     }
 
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer, Beacon<'_>)> + Clone {
@@ -428,7 +427,14 @@ mod tests {
             let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, 1.0));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
-            assert_eq!(peers.ages_s(now).collect::<Vec<_>>(), ages);
+            assert_eq!(
+                {
+                    let mut heard = Vec::new();
+                    peers.ages_s(now, &mut heard);
+                    heard
+                },
+                ages
+            );
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));

@@ -1,6 +1,7 @@
 //! One entry per drone, such as its place in a queue: one block of memory, sorted by drone. It is read far more often than
 //! added to, and additions mostly come in the order of ids.
 
+use crate::drone_set::DroneSet;
 use skein_protocol::DroneId;
 use std::cmp::Ordering;
 
@@ -11,82 +12,96 @@ pub trait OfDrone {
 }
 
 /// At most one entry per drone, by id.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Roster<T>(Vec<T>);
+#[derive(Clone, Debug)]
+pub struct Roster<T> {
+    entries: Vec<T>,
+    /// The drones that have entries: most questions are whether a drone is among them.
+    drones: DroneSet,
+}
 
 impl<T> Default for Roster<T> {
     fn default() -> Self {
-        Self(Vec::new())
+        Self { entries: Vec::new(), drones: DroneSet::default() }
+    }
+}
+
+impl<T: PartialEq> PartialEq for Roster<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.entries == other.entries
     }
 }
 
 impl<T: OfDrone> Roster<T> {
     /// No entry yet, and room for so many.
     pub(crate) fn with_capacity(count: usize) -> Self {
-        Self(Vec::with_capacity(count))
+        Self { entries: Vec::with_capacity(count), drones: DroneSet::default() }
     }
 
     /// The index of a drone's entry, or where it belongs. The drones of a roster are mostly spread evenly over the ids, so that one look
     /// finds it.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        let Some(last) = self.0.last().filter(|last| last.drone() >= drone) else { return Err(self.0.len()) };
-        let all = last.drone().index() + 1 == self.0.len();
-        let guess = if all { drone.index() } else { drone.index() * self.0.len() / (last.drone().index() + 1) };
-        match self.0[guess].drone().cmp(&drone) {
+        let Some(last) = self.entries.last().filter(|last| last.drone() >= drone) else {
+            return Err(self.entries.len());
+        };
+        let all = last.drone().index() + 1 == self.entries.len();
+        let guess = if all { drone.index() } else { drone.index() * self.entries.len() / (last.drone().index() + 1) };
+        match self.entries[guess].drone().cmp(&drone) {
             Ordering::Equal => Ok(guess),
-            Ordering::Less if self.0[guess + 1].drone() > drone => Err(guess + 1),
-            Ordering::Less if self.0[guess + 1].drone() == drone => Ok(guess + 1),
-            Ordering::Greater if guess == 0 || self.0[guess - 1].drone() < drone => Err(guess),
-            _ => self.0.binary_search_by_key(&drone, OfDrone::drone),
+            Ordering::Less if self.entries[guess + 1].drone() > drone => Err(guess + 1),
+            Ordering::Less if self.entries[guess + 1].drone() == drone => Ok(guess + 1),
+            Ordering::Greater if guess == 0 || self.entries[guess - 1].drone() < drone => Err(guess),
+            _ => self.entries.binary_search_by_key(&drone, OfDrone::drone),
         }
     }
 
     /// The entry of a drone.
     #[must_use]
     pub fn get(&self, drone: DroneId) -> Option<&T> {
-        self.place(drone).ok().map(|place| &self.0[place])
+        self.place(drone).ok().map(|place| &self.entries[place])
     }
 
     /// The entry of a drone, to be changed. Its drone must stay the same.
     pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut T> {
-        self.place(drone).ok().map(|place| &mut self.0[place])
+        self.place(drone).ok().map(|place| &mut self.entries[place])
     }
 
     /// Whether a drone has an entry.
     #[must_use]
     pub fn contains(&self, drone: DroneId) -> bool {
-        self.place(drone).is_ok()
+        self.drones.contains(drone)
     }
 
     /// Adds an entry, unless its drone has one already. Returns the one that the drone has then.
     pub fn add(&mut self, part: T) -> &mut T {
         let place = self.place(part.drone()).unwrap_or_else(|place| {
-            self.0.insert(place, part);
+            self.drones.insert(part.drone());
+            self.entries.insert(place, part);
             place
         });
-        &mut self.0[place]
+        &mut self.entries[place]
     }
 
     /// All entries, by drone.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &T> + Clone {
-        self.0.iter()
+        self.entries.iter()
     }
 
     /// Number of entries.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.entries.len()
     }
 
     /// Whether there is no entry.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.entries.is_empty()
     }
 
     /// Removes all entries.
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.entries.clear();
+        self.drones.clear();
     }
 }
 
