@@ -56,9 +56,9 @@ pub(crate) struct QueuePacer {
     mine: Vec<QueuePlace>,
     /// Number of changes of the peers when it looked last; `None` if it has to look at all of them.
     seen: Option<usize>,
-    /// The places of peers before one of `mine`, by peer. All other places are of no interest, so they are not kept.
+    /// The places of peers before one of `mine`, by rank. All other places are of no interest, so they are not kept.
     before: Vec<Queued>,
-    /// The peers of `before`. Apart from it, so that a search touches little memory.
+    /// The peers of `before`, in the same order. Apart from it, so that a search touches little memory.
     peers: Vec<u32>,
     /// Memory for the queue that is looked at.
     ahead: Vec<Ahead>,
@@ -117,13 +117,22 @@ impl QueuePacer {
         let is_before = |place: &QueuePlace| mine.iter().any(|own| is_ahead(place, own));
         let places = pose.queue().filter(is_before);
         let news = places.map(|place| Queued { peer, stamp: pose.stamp(), speed_mps: pose.velocity().norm(), place });
-        let from = self.peers.partition_point(|known| *known < peer);
-        let range = from..from + self.peers[from..].iter().take_while(|known| **known == peer).count();
-        if news.clone().count() == range.len() {
-            self.before[range].iter_mut().zip(news).for_each(|(known, new)| *known = new);
-        } else {
-            self.peers.splice(range.clone(), news.clone().map(|new| new.peer));
-            self.before.splice(range, news);
+        let known = self.peers.iter().filter(|known| **known == peer).count();
+        if let (1, 1, Some(new)) = (known, news.clone().count(), news.clone().next())
+            && let Some(at) = self.peers.iter().position(|known| *known == peer)
+            && self.before[at].place.rank == new.place.rank
+        {
+            self.before[at] = new;
+            return;
+        }
+        if known > 0 {
+            self.before.retain(|known| known.peer != peer);
+            self.peers.retain(|known| *known != peer);
+        }
+        for new in news {
+            let at = self.before.partition_point(|known| known.place.rank <= new.place.rank);
+            self.before.insert(at, new);
+            self.peers.insert(at, peer);
         }
     }
 

@@ -49,6 +49,7 @@ pub mod cost;
 mod draft;
 mod drone_set;
 pub mod election;
+mod fact_store;
 mod formation_planner;
 pub mod funnel;
 pub mod geometry;

@@ -412,6 +412,29 @@ mod tests {
     }
 
     #[test]
+    fn all_ids_but_one_are_known_without_a_search() {
+        let missing = |ids: &[u32]| lowest_but_one(&ids.iter().map(|id| DroneId(*id)).collect::<Vec<_>>());
+        let found = [&[][..], &[0, 1, 2], &[1, 2, 3], &[0, 1, 3], &[0, 2, 4], &[0, 1, 4]].map(missing);
+        assert_eq!(found, [Some(0), Some(3), Some(0), Some(2), None, None].map(|id| id.map(DroneId)));
+        let mut peers = Peers::new(6, 1.0);
+        let now = SimTime::from_secs(3.0);
+        for id in [0, 1, 3, 4, 5] {
+            peers.hear(now, DroneId(id), pose(2.5, f64::from(id)));
+        }
+        peers.look_for_silence(now);
+        assert_eq!(peers.all_but, Some(DroneId(2)));
+        let x = |peers: &Peers, id| peers.last(DroneId(id)).map(|beacon| beacon.position().x);
+        assert_eq!(
+            [0, 1, 2, 3, 5, 6, u32::MAX].map(|id| x(&peers, id)),
+            [Some(0.0), Some(1.0), None, Some(3.0), Some(5.0), None, None]
+        );
+        peers.forget(DroneId(3));
+        assert_eq!([1, 3, 4].map(|id| x(&peers, id)), [Some(1.0), None, Some(4.0)]);
+        peers.hear(now, DroneId(2), pose(2.5, 2.0));
+        assert_eq!([1, 2, 4].map(|id| x(&peers, id)), [Some(1.0), Some(2.0), Some(4.0)]);
+    }
+
+    #[test]
     fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
         let mut peers = Peers::new(9, 1.0);
         for tick in 0..600u32 {
@@ -427,14 +450,9 @@ mod tests {
             let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, 1.0));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
-            assert_eq!(
-                {
-                    let mut heard = Vec::new();
-                    peers.ages_s(now, &mut heard);
-                    heard
-                },
-                ages
-            );
+            let mut found = Vec::new();
+            peers.ages_s(now, &mut found);
+            assert_eq!(found, ages);
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));

@@ -3,6 +3,7 @@
 //! A large swarm has a thousand assignments, so a drone looks at those only whose turn has come.
 
 use crate::beacons::Beacon;
+use crate::fact_store::FactStore;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
@@ -10,12 +11,10 @@ use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
-use std::collections::BTreeMap;
-use std::ops::Bound;
 
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Subject {
+pub(crate) enum Subject {
     /// The plan for this group.
     Plan(GroupId),
     /// The assignment of this drone in a plan for this group.
@@ -73,7 +72,7 @@ pub(crate) struct RelayedFacts {
     me: DroneId,
     repeat_s: f64,
     room: usize,
-    known: BTreeMap<Subject, Relayed>,
+    known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
 }
@@ -82,7 +81,7 @@ impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
-        Self { me, repeat_s, room, known: BTreeMap::new(), turns: Turns::default() }
+        Self { me, repeat_s, room, known: FactStore::new(params.drones), turns: Turns::default() }
     }
 
     /// Forgets all.
@@ -93,8 +92,8 @@ impl RelayedFacts {
 
     /// Forgets what was not heard for long.
     pub(crate) fn forget(&mut self, now: SimTime) {
-        self.known.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
-        self.turns.retain(|subject| self.known.contains_key(subject));
+        self.known.retain(|one| now.since(one.heard) < RELAY_MEMORY_S);
+        self.turns.retain(|subject| self.known.contains(subject));
     }
 
     /// Notes a message of `source`. `near`: that drone is close to this one.
@@ -110,7 +109,7 @@ impl RelayedFacts {
             }
             return;
         }
-        let old = self.known.get(&subject).map(|one| one.turn);
+        let old = self.known.get_mut(&subject).map(|one| one.turn);
         let Some(fact) = fact(message).filter(|_| old.is_some() || self.known.len() < self.room) else { return };
         if let Some(turn) = old.flatten() {
             self.turns.remove(turn, subject);
@@ -124,14 +123,9 @@ impl RelayedFacts {
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
         let turn = Gossip::varying(now, self.repeat_s, self.me).next_turn();
-        let mut after = Bound::Included(Subject::Part(GroupId::ALL, DroneId(0)));
-        while let Some((&Subject::Part(scope, _), _)) = self.known.range((after, Bound::Unbounded)).next() {
-            let subject = Subject::Part(scope, drone);
-            if let Some(one) = self.known.get_mut(&subject).filter(|one| one.turn.is_none()) {
-                one.turn = Some(turn);
-                self.turns.add(turn, subject);
-            }
-            after = Bound::Excluded(Subject::Part(scope, DroneId(u32::MAX)));
+        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn.is_none()) {
+            one.turn = Some(turn);
+            self.turns.add(turn, Subject::Part(scope, drone));
         }
     }
 

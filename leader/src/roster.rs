@@ -3,7 +3,6 @@
 
 use crate::drone_set::DroneSet;
 use skein_protocol::DroneId;
-use std::cmp::Ordering;
 
 /// An entry that belongs to one drone.
 pub trait OfDrone {
@@ -15,7 +14,7 @@ pub trait OfDrone {
 #[derive(Clone, Debug)]
 pub struct Roster<T> {
     entries: Vec<T>,
-    /// The drones that have entries: most questions are whether a drone is among them.
+    /// The drones that have entries.
     drones: DroneSet,
 }
 
@@ -37,21 +36,10 @@ impl<T: OfDrone> Roster<T> {
         Self { entries: Vec::with_capacity(count), drones: DroneSet::default() }
     }
 
-    /// The index of a drone's entry, or where it belongs. The drones of a roster are mostly spread evenly over the ids, so that one look
-    /// finds it.
+    /// The index of a drone's entry, or where it belongs. Finds it without a look at any entry.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        let Some(last) = self.entries.last().filter(|last| last.drone() >= drone) else {
-            return Err(self.entries.len());
-        };
-        let all = last.drone().index() + 1 == self.entries.len();
-        let guess = if all { drone.index() } else { drone.index() * self.entries.len() / (last.drone().index() + 1) };
-        match self.entries[guess].drone().cmp(&drone) {
-            Ordering::Equal => Ok(guess),
-            Ordering::Less if self.entries[guess + 1].drone() > drone => Err(guess + 1),
-            Ordering::Less if self.entries[guess + 1].drone() == drone => Ok(guess + 1),
-            Ordering::Greater if guess == 0 || self.entries[guess - 1].drone() < drone => Err(guess),
-            _ => self.entries.binary_search_by_key(&drone, OfDrone::drone),
-        }
+        let place = self.drones.rank(drone);
+        if self.drones.contains(drone) { Ok(place) } else { Err(place) }
     }
 
     /// The entry of a drone.
@@ -151,7 +139,7 @@ mod tests {
     #[test]
     fn every_entry_is_found_however_the_drones_are_spread() {
         let spreads: [fn(u32) -> bool; 6] =
-            [|_| true, |id| id != 7, |id| id % 2 == 1, |id| id % 3 == 0, |id| id < 4 || id > 36, |id| id == 39];
+            [|_| true, |id| id != 7, |id| id % 2 == 1, |id| id % 3 == 0, |id| !(4..37).contains(&id), |id| id == 39];
         for is_in in spreads {
             let drones: Vec<u32> = (0..40).filter(|id| is_in(*id)).collect();
             let mut roster: Roster<Place> = drones.iter().map(|id| part(*id, *id as u16)).collect();
