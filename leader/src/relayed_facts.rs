@@ -12,6 +12,9 @@ use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 
+/// Of the messages whose turn has come, that many are read into the cache at once. Chosen by hand: few, because the rest may have to wait.
+const DUE_AT_ONCE: usize = 32;
+
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Subject {
@@ -131,6 +134,12 @@ impl RelayedFacts {
 
     /// Says what is due, until `last` messages are said. This drone is at `position`, world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
+        for subject in self.turns.due(now).take(DUE_AT_ONCE).filter(|_| say.len() < last) {
+            if let Subject::Part(_, drone) = subject {
+                self.known.warm(drone, |one| one.heard);
+                k.peers().warm(drone);
+            }
+        }
         while say.len() < last
             && let Some(subject) = self.turns.take_due(now)
         {

@@ -39,6 +39,12 @@ impl<S: Ord + Copy> Turns<S> {
         due.map(|(_, subject)| subject)
     }
 
+    /// The subjects whose turn has come, the first ones first.
+    pub(crate) fn due(&self, now: SimTime) -> impl Iterator<Item = S> {
+        let some = if now < self.first { 0 } else { self.turns.len() };
+        self.turns.iter().take(some).take_while(move |(turn, _)| *turn <= now).map(|(_, subject)| *subject)
+    }
+
     /// Removes the turns of all other subjects.
     pub(crate) fn retain(&mut self, stays: impl Fn(&S) -> bool) {
         self.turns.retain(|(_, subject)| stays(subject));
@@ -67,6 +73,8 @@ mod tests {
         }
         turns.remove(SimTime(1), 'y');
         turns.retain(|subject| *subject != 'x');
+        let coming = |now| turns.due(SimTime(now)).collect::<String>();
+        assert_eq!([coming(2), coming(3), coming(5)], ["", "ab", "abc"]);
         let mut due = |now| std::iter::from_fn(|| turns.take_due(SimTime(now))).collect::<String>();
         assert_eq!([due(2), due(3), due(4), due(8), due(100), due(100)], ["", "ab", "", "c", "d", ""]);
         turns.add(SimTime(4), 'z');
