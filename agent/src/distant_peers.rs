@@ -1,35 +1,39 @@
 //! Peers that are too far away to matter for a while. A drone hears all others, and looks only at those that may be near.
 
-use skein_leader::changes::{BLOCK, Changes};
+use skein_leader::changes::Changes;
 use skein_protocol::{SimTime, Vec2};
-use std::ops::Range;
 
 /// More than positions lose by rounding, m.
 const ROUNDING_M: f64 = 1e-6;
 
-/// When the last look at a peer is out of date: when it was heard again, or when it may have come into reach.
-#[derive(Clone, Copy, Debug)]
-struct Look {
-    stamp: SimTime,
-    /// The peer is out of reach while [`DistantPeers::travelled_m`] is below this, m.
-    until_m: f64,
+/// Number of neighbouring peers whose least distance is known.
+const BLOCK: usize = 8;
+
+/// [`DistantPeers::until_m`] of a peer that may be within reach.
+const NEAR: f64 = f64::NEG_INFINITY;
+
+/// A peer that is out of reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Distant {
+    /// By how much it is out of reach, m.
+    pub(crate) beyond_m: f64,
+    /// How fast it flies, m/s.
+    pub(crate) speed_mps: f64,
 }
 
-/// What is remembered of a block of peers.
-#[derive(Clone, Copy, Debug)]
-struct LookAtBlock {
-    /// The count of [`Changes`] at the last look.
-    changes: u32,
-    /// All peers of the block are out of reach while [`DistantPeers::travelled_m`] is below this, m.
-    until_m: f64,
-}
-
-/// For each peer ever heard, whether it is certainly out of reach. A peer is taken to fly on with the velocity of its last
-/// beacon.
+/// Which of the peers ever heard may be within reach. A peer is taken to fly on with the velocity of its last beacon.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DistantPeers {
-    looks: Vec<Look>,
-    blocks: Vec<LookAtBlock>,
+    /// Each peer is out of reach while [`Self::travelled_m`] is below this, m.
+    until_m: Vec<f64>,
+    /// The least of each [`BLOCK`] of peers, or less, without those that may be within reach, m.
+    blocks_m: Vec<f64>,
+    /// The least of all blocks, or less, m.
+    least_m: f64,
+    /// The indices of the peers that are within reach, ascending.
+    near: Vec<u32>,
+    /// Number of changes of the peers at the last look.
+    seen: usize,
     /// Greatest speed of a distant peer, m/s.
     speed_mps: f64,
     /// By how much a distance can have fallen since the start, m: what this drone flew, and what a peer flies at that speed.
@@ -46,55 +50,84 @@ impl DistantPeers {
         }
     }
 
-    /// Takes the time stamps of the peers' last beacons. Returns how many blocks of [`BLOCK`] peers there are.
-    pub(crate) fn follow(&mut self, stamps: &[SimTime]) -> usize {
-        if self.looks.len() != stamps.len() {
-            let near = f64::NEG_INFINITY;
-            self.looks.clear();
-            self.looks.extend(stamps.iter().map(|&stamp| Look { stamp, until_m: near }));
-            self.blocks.clear();
-            self.blocks.resize(stamps.len().div_ceil(BLOCK), LookAtBlock { changes: 0, until_m: near });
+    /// Finds the peers within reach. `count`: number of peers. `changes`: theirs. `distant`: whether the peer at an index is
+    /// out of reach.
+    pub(crate) fn look(&mut self, count: usize, changes: &Changes, distant: impl Fn(usize) -> Option<Distant>) {
+        self.suspect_changed(count, changes);
+        if self.travelled_m >= self.least_m {
+            self.suspect_near();
         }
-        self.blocks.len()
+        let mut near = std::mem::take(&mut self.near);
+        near.retain(|&index| match distant(index as usize) {
+            Some(distant) => {
+                self.note(index as usize, distant);
+                false
+            }
+            None => true,
+        });
+        near.sort_unstable();
+        self.near = near;
     }
 
-    /// The indices of a block of peers; `None` if all of them are certainly out of reach. `stamps` are those of
-    /// [`Self::follow`], and `changes` theirs. Call [`Self::close`] after the look.
-    pub(crate) fn open(&mut self, block: usize, stamps: &[SimTime], changes: &Changes) -> Option<Range<usize>> {
-        let first = block * BLOCK;
-        let range = first..(first + BLOCK).min(self.looks.len());
-        let look = self.blocks.get_mut(block)?;
-        let count = changes.counts().get(block).copied().unwrap_or_default();
-        if look.changes == count {
-            return (self.travelled_m >= look.until_m).then_some(range);
+    /// The indices of the peers within reach, ascending.
+    pub(crate) fn near(&self) -> impl Iterator<Item = usize> {
+        self.near.iter().map(|&index| index as usize)
+    }
+
+    /// The peers that have changed may be within reach.
+    fn suspect_changed(&mut self, count: usize, changes: &Changes) {
+        let changed = changes.since(self.seen).filter(|_| self.until_m.len() == count);
+        self.seen = changes.count();
+        if let Some(changed) = changed {
+            changed.for_each(|index| self.suspect(index));
+            return;
         }
-        look.changes = count;
-        for (look, &stamp) in self.looks[range.clone()].iter_mut().zip(&stamps[range.clone()]) {
-            if look.stamp != stamp {
-                *look = Look { stamp, until_m: f64::NEG_INFINITY };
+        self.until_m.clear();
+        self.until_m.resize(count, NEAR);
+        self.blocks_m.clear();
+        self.blocks_m.resize(count.div_ceil(BLOCK), f64::INFINITY);
+        self.least_m = f64::INFINITY;
+        self.near.clear();
+        self.near.extend(0..count as u32);
+    }
+
+    /// The peers that can have come into reach may be within reach.
+    fn suspect_near(&mut self) {
+        self.least_m = f64::INFINITY;
+        for block in 0..self.blocks_m.len() {
+            if self.travelled_m >= self.blocks_m[block] {
+                self.blocks_m[block] = self.suspect_near_of(block);
+            }
+            self.least_m = self.least_m.min(self.blocks_m[block]);
+        }
+    }
+
+    /// The same for one block. Returns the least of the others, m.
+    fn suspect_near_of(&mut self, block: usize) -> f64 {
+        let mut least_m = f64::INFINITY;
+        for index in block * BLOCK..(block * BLOCK + BLOCK).min(self.until_m.len()) {
+            if self.travelled_m < self.until_m[index] {
+                least_m = least_m.min(self.until_m[index]);
+            } else {
+                self.suspect(index);
             }
         }
-        Some(range)
+        least_m
     }
 
-    /// Ends the look at a block.
-    pub(crate) fn close(&mut self, block: usize) {
-        let first = block * BLOCK;
-        let looks = &self.looks[first..(first + BLOCK).min(self.looks.len())];
-        self.blocks[block].until_m = looks.iter().map(|look| look.until_m).fold(f64::INFINITY, f64::min);
-    }
-
-    /// Whether the peer at this index is certainly out of reach.
-    pub(crate) fn is_out_of_reach(&self, index: usize) -> bool {
-        self.looks.get(index).is_some_and(|look| self.travelled_m < look.until_m)
-    }
-
-    /// Notes that the peer at this index is out of reach by this much, m, and flies at this speed, m/s.
-    pub(crate) fn note(&mut self, index: usize, beyond_m: f64, speed_mps: f64) {
-        self.speed_mps = self.speed_mps.max(speed_mps);
-        if let Some(look) = self.looks.get_mut(index) {
-            look.until_m = self.travelled_m + beyond_m - ROUNDING_M;
+    fn suspect(&mut self, index: usize) {
+        if std::mem::replace(&mut self.until_m[index], NEAR) != NEAR {
+            self.near.push(index as u32);
         }
+    }
+
+    fn note(&mut self, index: usize, distant: Distant) {
+        self.speed_mps = self.speed_mps.max(distant.speed_mps);
+        let until_m = self.travelled_m + distant.beyond_m - ROUNDING_M;
+        self.until_m[index] = until_m;
+        let block_m = &mut self.blocks_m[index / BLOCK];
+        *block_m = block_m.min(until_m);
+        self.least_m = self.least_m.min(until_m);
     }
 }
 
@@ -102,59 +135,58 @@ impl DistantPeers {
 mod tests {
     use super::*;
 
+    const REACH_M: f64 = 50.0;
+
+    /// A peer at this distance and speed, m and m/s.
+    fn distant(away_m: f64, speed_mps: f64) -> Option<Distant> {
+        (away_m > REACH_M).then_some(Distant { beyond_m: away_m - REACH_M, speed_mps })
+    }
+
     /// Distances of peers that fly straight on, each heard again every tenth tick. They are in two blocks.
     #[test]
-    fn no_peer_comes_into_reach_unseen() {
-        let reach_m = 50.0;
+    fn the_peers_within_reach_are_found_with_few_looks() {
         let starts = [(400.0, -30.0), (90.0, 10.0), (60.0, 0.0), (-300.0, 25.0)];
         let starts: Vec<(f64, f64)> =
             starts.into_iter().chain((0..6).map(|i| (700.0 + 50.0 * f64::from(i), -9.0))).collect();
-        let mut distant = DistantPeers::default();
-        let mut stamps = [SimTime::ZERO; 10];
+        let mut peers = DistantPeers::default();
         let mut changes = Changes::default();
-        changes.note_from(0, 10);
-        let mut looked = 0;
+        changes.note_moved(10);
+        let looked = std::cell::Cell::new(0);
         for tick in 0..2000 {
             let now = SimTime::from_secs(0.02 * f64::from(tick));
             let mine = Vec2::new(5.0 * now.since(SimTime::ZERO), (f64::from(tick) * 0.01).sin() * 20.0);
-            distant.advance(now, mine);
-            for (index, stamp) in stamps.iter_mut().enumerate() {
-                if (tick as usize + index).is_multiple_of(10) {
-                    *stamp = now;
-                    changes.note(index);
-                }
-            }
-            assert_eq!(distant.follow(&stamps), 2);
-            for block in 0..2 {
-                let open = distant.open(block, &stamps, &changes);
-                let is_open = open.is_some();
-                for index in open.unwrap_or(block * BLOCK..(block * BLOCK + BLOCK).min(starts.len())) {
-                    let (x, v) = starts[index];
-                    let away_m = (Vec2::new(x + v * now.since(SimTime::ZERO), 0.0) - mine).norm();
-                    if !is_open || distant.is_out_of_reach(index) {
-                        assert!(away_m > reach_m, "peer {index} at {away_m} m in tick {tick}");
-                    } else {
-                        looked += 1;
-                        if away_m > reach_m {
-                            distant.note(index, away_m - reach_m, v.abs());
-                        }
-                    }
-                }
-                if is_open {
-                    distant.close(block);
-                }
-            }
+            let of = |index: usize| {
+                let (x, v) = starts[index];
+                distant((Vec2::new(x + v * now.since(SimTime::ZERO), 0.0) - mine).norm(), f64::abs(v))
+            };
+            peers.advance(now, mine);
+            (0..10).filter(|index| (tick as usize + index).is_multiple_of(10)).for_each(|index| changes.note(index));
+            peers.look(10, &changes, |index| {
+                looked.set(looked.get() + 1);
+                of(index)
+            });
+            let expected: Vec<usize> = (0..10).filter(|&index| of(index).is_none()).collect();
+            assert_eq!(peers.near().collect::<Vec<_>>(), expected, "tick {tick}");
         }
-        assert!(looked < 8000, "{looked} looks of 20 000");
+        assert!(looked.get() < 8000, "{} looks of 20 000", looked.get());
     }
 
     #[test]
-    fn peers_are_looked_at_anew_when_their_number_changes() {
-        let mut distant = DistantPeers::default();
-        distant.follow(&[SimTime::ZERO]);
-        distant.note(0, 100.0, 0.0);
-        assert!(distant.is_out_of_reach(0));
-        distant.follow(&[SimTime::ZERO; 2]);
-        assert!(!distant.is_out_of_reach(0) && !distant.is_out_of_reach(1));
+    fn a_peer_that_changed_is_looked_at_and_all_are_when_they_moved() {
+        let (mut peers, mut changes) = (DistantPeers::default(), Changes::default());
+        changes.note_moved(9);
+        peers.look(9, &changes, |_| distant(150.0, 0.0));
+        assert_eq!(peers.near().count(), 0);
+        let nobody = |_| -> Option<Distant> { panic!("nothing has changed") };
+        peers.look(9, &changes, nobody);
+        changes.note(8);
+        changes.note(3);
+        peers.look(9, &changes, |_| None);
+        assert_eq!(peers.near().collect::<Vec<_>>(), [3, 8]);
+        changes.note_moved(9);
+        peers.look(9, &changes, |_| None);
+        assert_eq!(peers.near().count(), 9);
+        peers.look(4, &changes, |_| None);
+        assert_eq!(peers.near().count(), 4);
     }
 }

@@ -1,13 +1,13 @@
 //! The neighbours that a drone keeps its distance from, and its share of each evasion.
 
-use crate::distant_peers::DistantPeers;
+use crate::distant_peers::{Distant, DistantPeers};
 use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
+use skein_leader::beacons::Beacon;
 use skein_leader::peers::Peers;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
-use std::ops::Range;
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,33 +67,19 @@ impl NeighbourTable {
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         self.distant.advance(senses.now, senses.position());
-        let stamps = view.peers.stamps();
-        for block in 0..self.distant.follow(stamps) {
-            if let Some(indices) = self.distant.open(block, stamps, view.peers.changes()) {
-                self.update_heard(view, indices, (reach_m, least_m));
-                self.distant.close(block);
-            }
-        }
-    }
-
-    /// Adds the neighbours that are known by beacon alone, of the peers at these indices of [`Peers::stamps`]. `reach_m` and
-    /// `least_m`: how far and how near they may be, m.
-    fn update_heard(&mut self, view: &NeighbourView<'_>, indices: Range<usize>, (reach_m, least_m): (f64, f64)) {
-        let senses = view.senses;
-        for index in indices {
-            if self.distant.is_out_of_reach(index) || !view.peers.is_living_at(index, view.now) {
-                continue;
-            }
+        let away_m = |pose: &Beacon<'_>| pose.extrapolated(senses.now) - senses.position();
+        self.distant.look(view.peers.stamps().len(), view.peers.changes(), |index| {
+            let pose = view.peers.at(index).1;
+            let position_m = away_m(&pose);
+            let far = position_m.norm_squared() > reach_m * reach_m;
+            far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: pose.velocity().norm() })
+        });
+        for index in self.distant.near().filter(|&index| view.peers.is_living_at(index, view.now)) {
             let (id, pose) = view.peers.at(index);
-            let position_m = pose.extrapolated(senses.now) - senses.position();
-            if position_m.norm_squared() > reach_m * reach_m {
-                self.distant.note(index, position_m.norm() - reach_m, pose.velocity().norm());
-                continue;
-            }
             if senses.neighbours.iter().any(|n| n.drone == id) {
                 continue;
             }
-            let velocity_mps = pose.velocity() - senses.velocity();
+            let (position_m, velocity_mps) = (away_m(&pose), pose.velocity() - senses.velocity());
             let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
             self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
         }

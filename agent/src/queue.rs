@@ -54,10 +54,12 @@ struct Queued {
 pub(crate) struct QueuePacer {
     /// This drone's places when it looked last.
     mine: Vec<QueuePlace>,
-    /// The time stamp of the last beacon of each peer that was looked at, by id.
-    stamps: Vec<SimTime>,
-    /// The places of peers before one of `mine`, by peer. All other places are of no interest, so they are not kept.
+    /// Number of changes of the peers when it looked last; `None` if it has to look at all of them.
+    seen: Option<usize>,
+    /// The places of peers before one of `mine`, by rank. All other places are of no interest, so they are not kept.
     before: Vec<Queued>,
+    /// The peers of `before`, in the same order. Apart from it, so that a search touches little memory.
+    peers: Vec<u32>,
     /// Memory for the queue that is looked at.
     ahead: Vec<Ahead>,
 }
@@ -92,32 +94,46 @@ impl QueuePacer {
         if !places.clone().map(|place| key(&place)).eq(self.mine.iter().map(key)) {
             self.mine.clear();
             self.mine.extend(places);
-            self.stamps.clear();
+            self.seen = None;
         }
         if self.mine.is_empty() {
             return;
         }
-        if self.stamps.len() != peers.stamps().len() {
-            self.stamps.clear();
-            self.stamps.resize(peers.stamps().len(), SimTime::MAX);
-            self.before.clear();
+        let changes = peers.changes();
+        let changed = self.seen.and_then(|seen| changes.since(seen));
+        self.seen = Some(changes.count());
+        if let Some(changed) = changed {
+            changed.for_each(|index| self.note(index as u32, &peers.at(index).1));
+            return;
         }
-        for (index, &stamp) in peers.stamps().iter().enumerate() {
-            if std::mem::replace(&mut self.stamps[index], stamp) != stamp {
-                self.note(index as u32, &peers.at(index).1);
-            }
-        }
+        self.before.clear();
+        self.peers.clear();
+        peers.all().zip(0..).for_each(|((_, pose), index)| self.note(index, &pose));
     }
 
     /// Notes the places of a peer that are before one of this drone's.
     fn note(&mut self, peer: u32, pose: &Beacon<'_>) {
         let mine = &self.mine;
         let is_before = |place: &QueuePlace| mine.iter().any(|own| is_ahead(place, own));
-        let (stamp, speed_mps) = (pose.stamp(), pose.velocity().norm());
-        let news = pose.queue().filter(is_before).map(|place| Queued { peer, stamp, speed_mps, place });
-        let from = self.before.partition_point(|known| known.peer < peer);
-        let known = self.before[from..].iter().take_while(|known| known.peer == peer).count();
-        self.before.splice(from..from + known, news);
+        let places = pose.queue().filter(is_before);
+        let news = places.map(|place| Queued { peer, stamp: pose.stamp(), speed_mps: pose.velocity().norm(), place });
+        let known = self.peers.iter().filter(|known| **known == peer).count();
+        if let (1, 1, Some(new)) = (known, news.clone().count(), news.clone().next())
+            && let Some(at) = self.peers.iter().position(|known| *known == peer)
+            && self.before[at].place.rank == new.place.rank
+        {
+            self.before[at] = new;
+            return;
+        }
+        if known > 0 {
+            self.before.retain(|known| known.peer != peer);
+            self.peers.retain(|known| *known != peer);
+        }
+        for new in news {
+            let at = self.before.partition_point(|known| known.place.rank <= new.place.rank);
+            self.before.insert(at, new);
+            self.peers.insert(at, peer);
+        }
     }
 
     /// Collects the living peers with a place before `mine` on the same route of the same set, sorted by rank. The remaining

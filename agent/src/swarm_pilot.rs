@@ -526,6 +526,7 @@ impl SwarmPilot {
         };
         self.open_words(senses, inbox);
         let path = self.separations.as_ref().map(|_| self.own_path(senses));
+        self.leading.expect(inbox.heard().iter().map(|heard| (heard.source, heard.message)));
         for &Heard { source, message } in inbox.heard() {
             let restamped = self.clocks.restamp(senses.now, source, message);
             let message = restamped.as_ref().map_or(message, Restamped::message);
@@ -579,7 +580,7 @@ impl Pilot for SwarmPilot {
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
-        ages.extend(self.leading.peers().ages_s(now));
+        self.leading.peers().ages_s(now, ages);
     }
 }
 

@@ -5,6 +5,7 @@ use crate::shared_values::SharedValues;
 use skein_protocol::payload::{MAX_PLACES, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
 use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, horizontal};
 use std::fmt;
+use std::hint::black_box;
 
 /// One beacon per index. Every value of every beacon is kept as it was heard.
 #[derive(Clone, Default)]
@@ -17,7 +18,8 @@ pub(crate) struct Beacons {
     allegiances: SharedValues<Allegiance>,
 }
 
-/// What differs from drone to drone.
+/// What differs from drone to drone. It fills one line of the cache: the states of a large swarm do not fit into it.
+#[repr(align(64))]
 #[derive(Clone, Copy, Debug)]
 struct State {
     position_m: [f64; 3],
@@ -25,6 +27,8 @@ struct State {
     /// Index of the drone's [`Allegiance`].
     allegiance: u32,
     hears: u32,
+    /// Whether the drone has a place in a queue.
+    queued: bool,
 }
 
 /// What most drones have in common.
@@ -48,8 +52,8 @@ impl From<&Pose> for Allegiance {
 impl State {
     #[inline]
     fn new(pose: &Pose, allegiance: u32) -> Self {
-        let &Pose { position_m, velocity_mps, hears, .. } = pose;
-        Self { position_m, velocity_mps, allegiance, hears }
+        let &Pose { position_m, velocity_mps, hears, queue, .. } = pose;
+        Self { position_m, velocity_mps, allegiance, hears, queued: queue != [QueuePlace::default(); MAX_PLACES] }
     }
 }
 
@@ -63,6 +67,12 @@ impl Beacons {
     #[inline]
     pub(crate) fn get(&self, index: usize) -> Beacon<'_> {
         Beacon { beacons: self, state: &self.states[index], index }
+    }
+
+    /// Reads a beacon, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm(&self, index: usize) {
+        black_box((self.stamps[index], self.states[index].hears));
     }
 
     /// All beacons, by index.
@@ -84,10 +94,13 @@ impl Beacons {
     /// Takes a later beacon of the same drone.
     #[inline]
     pub(crate) fn replace(&mut self, index: usize, pose: &Pose) {
-        let allegiance = self.allegiances.replace(self.states[index].allegiance, &pose.into());
+        let state = &mut self.states[index];
+        let was_queued = state.queued;
+        *state = State::new(pose, self.allegiances.replace(state.allegiance, &pose.into()));
         self.stamps[index] = pose.stamp;
-        self.states[index] = State::new(pose, allegiance);
-        self.set_queue(index, pose);
+        if was_queued || state.queued {
+            self.set_queue(index, pose);
+        }
     }
 
     #[inline]
@@ -172,12 +185,15 @@ impl Beacon<'_> {
 
     /// The drone's places in queues, nearest set first.
     #[inline]
-    pub fn queue(&self) -> impl Iterator<Item = QueuePlace> {
+    pub fn queue(&self) -> impl Iterator<Item = QueuePlace> + Clone {
         (0..MAX_PLACES).map(|number| self.place(number))
     }
 
     #[inline]
     fn place(&self, number: usize) -> QueuePlace {
+        if !self.state.queued {
+            return QueuePlace::default();
+        }
         self.beacons.queues[number].get(self.index).copied().unwrap_or_default()
     }
 

@@ -94,8 +94,9 @@ impl Broadcaster {
         say: &mut Vec<Message>,
     ) {
         if self.beacon_due(own.tick, k.me()) {
-            relays.look(k, now, own, self.beacon_s);
-            say.push(Message::Pose(pose(k, now, own, places)));
+            let hears = k.peers().hears(k.me(), now);
+            relays.look(k, now, own, self.beacon_s, hears);
+            say.push(Message::Pose(Pose { hears, ..pose(k, now, own, places) }));
         }
         if std::mem::replace(&mut self.term, k.election().obeyed()) != k.election().obeyed() {
             // The new leader may not know.
@@ -175,7 +176,7 @@ impl Broadcaster {
     }
 }
 
-/// The beacon of this drone.
+/// The beacon of this drone, without what it hears.
 fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_PLACES]) -> Pose {
     Pose {
         stamp: now,
@@ -187,7 +188,7 @@ fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_P
         term: k.election().obeyed(),
         incarnation: k.incarnation(),
         flags: flag(k.election().leads(), POSE_LEADS) | flag(k.is_impaired(), POSE_IMPAIRED),
-        hears: k.peers().hears(k.me(), now),
+        hears: 0,
     }
 }
 

@@ -30,6 +30,19 @@ impl DroneSet {
         self.words.get(word).is_some_and(|bits| bits & bit != 0)
     }
 
+    /// Number of drones in the set with lower ids than this one.
+    pub(crate) fn rank(&self, drone: DroneId) -> usize {
+        let (word, bit) = place(drone);
+        let ones = |bits: &u64| bits.count_ones() as usize;
+        let before: usize = self.words.iter().take(word).map(ones).sum();
+        before + self.words.get(word).map_or(0, |bits| ones(&(bits & (bit - 1))))
+    }
+
+    /// Removes all drones.
+    pub(crate) fn clear(&mut self) {
+        self.words.clear();
+    }
+
     fn iter(&self) -> impl Iterator<Item = DroneId> {
         (0..self.words.len() as u32 * 64).map(DroneId).filter(|&drone| self.contains(drone))
     }
@@ -53,5 +66,7 @@ mod tests {
         }
         assert_eq!(set.iter().map(|drone| drone.0).collect::<Vec<_>>(), [3, 63, 64, 900]);
         assert!(!set.contains(DroneId(4)) && !set.contains(DroneId(70_000)));
+        let rank = |id| set.rank(DroneId(id));
+        assert_eq!([0, 3, 4, 63, 64, 65, 900, 901, 70_000].map(rank), [0, 0, 1, 1, 2, 3, 3, 4, 4]);
     }
 }

@@ -26,6 +26,9 @@ use skein_protocol::payload::{Assignment, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
 
+/// From this number of drones on, what a drone knows of the others may not be in the cache. Chosen by hand.
+const LARGE: u32 = 64;
+
 /// The state machine of one drone. Its memory is bounded, whatever it hears.
 ///
 /// In each tick, call [`Self::hear`] for each message, [`Self::sense`] for each sensed obstacle, [`Self::elect`], then if
@@ -196,6 +199,34 @@ impl Leading {
         let places = living.flat_map(|(id, pose)| pose.pose().queue.into_iter().map(move |place| (id, place)));
         let flown: Vec<(DroneId, QueuePlace)> = places.filter(|(_, place)| place.set != 0).collect();
         self.ledger().united(self.first_term(), &flown)
+    }
+
+    /// Reads what these messages will be compared with: a large swarm does not fit into a cache, and reads that do not depend on each
+    /// other take as long as one. Without any other effect. Call before [`Self::hear`].
+    pub fn expect<'m>(&self, heard: impl Iterator<Item = (DroneId, MessageRef<'m>)> + Clone) {
+        if self.drones < LARGE {
+            return;
+        }
+        let peers = self.peers();
+        for (source, message) in heard.clone() {
+            peers.warm(source);
+            if let MessageRef::Presence(presence) = message {
+                presence.present().iter().for_each(|present| peers.warm_stamp(present.drone));
+            }
+        }
+        for (source, message) in heard {
+            let MessageRef::Presence(presence) = message else { continue };
+            let near = self.relays.is_near(&self.knowledge, source);
+            for present in presence.present() {
+                let is_new = peers.stamp_of(present.drone) < Some(present.stamp);
+                if near || is_new {
+                    self.relays.warm(present.drone);
+                }
+                if is_new {
+                    peers.warm(present.drone);
+                }
+            }
+        }
     }
 
     /// Hears a message of `source`. An answer that is due at once goes into `say`. A message of this drone, or of no drone

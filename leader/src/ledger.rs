@@ -209,7 +209,8 @@ impl Ledger {
     pub fn hear_place(&mut self, drone: DroneId, pose: &Pose) {
         for place in pose.queue.iter().filter(|place| place.rank != QueuePlace::NO_RANK) {
             let (route, rank) = (place.route, place.rank);
-            for set in self.sets.iter_mut().filter(|set| set.tag == place.set && pose.obeyed >= set.stamp) {
+            let waits = |set: &&mut PlannedSet| set.tag == place.set && pose.obeyed >= set.stamp;
+            for set in self.sets.iter_mut().filter(waits).filter(|set| !set.parts.contains(drone)) {
                 set.parts.add(SetPlace { drone, leader: DroneId::NONE, group: pose.group, route, rank });
             }
         }

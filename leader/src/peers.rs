@@ -7,6 +7,7 @@ use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
+use std::hint::black_box;
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -63,6 +64,8 @@ pub struct Peers {
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
+    /// If the peers heard are the lowest ids but this one, as of the last look at all peers: then no search is needed.
+    all_but: Option<DroneId>,
     /// The last beacon of each of them, in the same order.
     beacons: Beacons,
     /// Of their time stamps.
@@ -86,6 +89,7 @@ impl Peers {
             quiet_until: SimTime::MAX,
             next_look: SimTime::ZERO,
             ids: Vec::new(),
+            all_but: None,
             beacons: Beacons::default(),
             changes: Changes::default(),
             last: Vec::new(),
@@ -124,9 +128,10 @@ impl Peers {
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
                 self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
                 self.ids.insert(place, source);
+                self.all_but = None;
                 self.beacons.insert(place, &pose);
                 self.last.insert(place, peer);
-                self.changes.note_from(place, self.ids.len());
+                self.changes.note_moved(self.ids.len());
             }
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
                 let prior = self.prior(now, false);
@@ -172,6 +177,7 @@ impl Peers {
         let mut near = std::mem::take(&mut self.near);
         near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
         self.near = near;
+        self.all_but = lowest_but_one(&self.ids);
         self.beacons.tidy();
     }
 
@@ -184,6 +190,15 @@ impl Peers {
     /// less one for the ids above this drone's own.
     #[inline]
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
+        match self.all_but {
+            Some(missing) if peer != missing && peer.index() <= self.ids.len() => {
+                Ok(peer.index() - usize::from(peer > missing))
+            }
+            _ => self.search(peer),
+        }
+    }
+
+    fn search(&self, peer: DroneId) -> Result<usize, usize> {
         let guess = |index: usize| (self.ids.get(index) == Some(&peer)).then_some(index);
         let found = guess(peer.index()).or_else(|| guess(peer.index().checked_sub(1)?));
         found.map_or_else(|| self.ids.binary_search(&peer), Ok)
@@ -191,6 +206,22 @@ impl Peers {
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
         self.place(peer).ok().map(|place| &self.last[place])
+    }
+
+    /// Reads the time stamp of a peer's last beacon, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm_stamp(&self, peer: DroneId) {
+        black_box(self.stamp_of(peer));
+    }
+
+    /// Reads all about a peer, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm(&self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.beacons.warm(place);
+            let Peer { timeout, direct } = &self.last[place];
+            black_box((timeout.last(), *direct));
+        }
     }
 
     /// Whether a peer's own beacon was heard just now.
@@ -229,9 +260,10 @@ impl Peers {
     pub fn forget(&mut self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.ids.remove(place);
+            self.all_but = None;
             self.beacons.remove(place);
             self.last.remove(place);
-            self.changes.note_from(place, self.ids.len());
+            self.changes.note_moved(self.ids.len());
             self.near.retain(|near| *near != peer);
         }
     }
@@ -314,21 +346,26 @@ impl Peers {
         self.all_live(now) || self.last[index].lives(now, self.timeout_s)
     }
 
-    /// How old the last beacons of the living peers are, s, by id.
-    pub fn ages_s(&self, now: SimTime) -> impl Iterator<Item = f64> {
-        let all = self.all_live(now);
-        let living = self
-            .stamps()
-            .iter()
-            .enumerate()
-            .filter(move |(index, _)| all || self.last[*index].lives(now, self.timeout_s));
-        living.map(move |(_, stamp)| now.since(*stamp))
+    /// Adds how old the last beacons of the living peers are, s, by id.
+    pub fn ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
+        let age_s = |stamp: &SimTime| now.since(*stamp);
+        if self.all_live(now) {
+            return ages.extend(self.stamps().iter().map(age_s));
+        }
+        let living = self.stamps().iter().zip(&self.last).filter(|(_, peer)| peer.lives(now, self.timeout_s));
+        ages.extend(living.map(|(stamp, _)| age_s(stamp)));
     }
 
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer, Beacon<'_>)> + Clone {
         let known = self.ids.iter().zip(&self.last).zip(self.beacons.iter());
         known.map(|((&id, peer), beacon)| (id, peer, beacon))
     }
+}
+
+/// The id that is missing among the lowest ids, if these ascending ids are all others; `None` if more are missing.
+fn lowest_but_one(ids: &[DroneId]) -> Option<DroneId> {
+    let missing = ids.iter().zip(0..).find(|&(id, place)| id.0 != place).map_or(ids.len() as u32, |(_, place)| place);
+    ids.last().is_none_or(|last| last.index() <= ids.len()).then_some(DroneId(missing))
 }
 
 /// A hash of a set of drones, whatever their order; never 0.
@@ -375,6 +412,29 @@ mod tests {
     }
 
     #[test]
+    fn all_ids_but_one_are_known_without_a_search() {
+        let missing = |ids: &[u32]| lowest_but_one(&ids.iter().map(|id| DroneId(*id)).collect::<Vec<_>>());
+        let found = [&[][..], &[0, 1, 2], &[1, 2, 3], &[0, 1, 3], &[0, 2, 4], &[0, 1, 4]].map(missing);
+        assert_eq!(found, [Some(0), Some(3), Some(0), Some(2), None, None].map(|id| id.map(DroneId)));
+        let mut peers = Peers::new(6, 1.0);
+        let now = SimTime::from_secs(3.0);
+        for id in [0, 1, 3, 4, 5] {
+            peers.hear(now, DroneId(id), pose(2.5, f64::from(id)));
+        }
+        peers.look_for_silence(now);
+        assert_eq!(peers.all_but, Some(DroneId(2)));
+        let x = |peers: &Peers, id| peers.last(DroneId(id)).map(|beacon| beacon.position().x);
+        assert_eq!(
+            [0, 1, 2, 3, 5, 6, u32::MAX].map(|id| x(&peers, id)),
+            [Some(0.0), Some(1.0), None, Some(3.0), Some(5.0), None, None]
+        );
+        peers.forget(DroneId(3));
+        assert_eq!([1, 3, 4].map(|id| x(&peers, id)), [Some(1.0), None, Some(4.0)]);
+        peers.hear(now, DroneId(2), pose(2.5, 2.0));
+        assert_eq!([1, 2, 4].map(|id| x(&peers, id)), [Some(1.0), Some(2.0), Some(4.0)]);
+    }
+
+    #[test]
     fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
         let mut peers = Peers::new(9, 1.0);
         for tick in 0..600u32 {
@@ -390,7 +450,9 @@ mod tests {
             let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, 1.0));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
-            assert_eq!(peers.ages_s(now).collect::<Vec<_>>(), ages);
+            let mut found = Vec::new();
+            peers.ages_s(now, &mut found);
+            assert_eq!(found, ages);
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));

@@ -3,12 +3,12 @@
 use crate::knowledge::Knowledge;
 use crate::news::News;
 use crate::params::LeadingParams;
-use crate::roster::{OfDrone, Roster};
 use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS, STATES_PER_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
 use std::collections::BTreeMap;
+use std::hint::black_box;
 
 /// What the drones of one frame have in common.
 type Kind = (PlanStamp, GroupId, Ballot);
@@ -16,23 +16,24 @@ type Kind = (PlanStamp, GroupId, Ballot);
 /// What was said of one drone. Each drone keeps this for all drones of the swarm, so it is small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
-    drone: DroneId,
-    /// How often the news is said at once.
-    left: u32,
     /// When the neighbourhood last heard of it, as far as this drone knows.
     covered: SimTime,
+    /// How often the news is said at once.
+    left: u32,
+    /// Whether this drone has heard of it.
+    known: bool,
 }
 
 impl Told {
+    /// Nothing heard.
+    const NOTHING: Self = Self { covered: SimTime::ZERO, left: 0, known: false };
     /// News that was not said yet.
-    fn new(drone: DroneId) -> Self {
-        Self { drone, left: NEWS_TIMES, covered: SimTime::ZERO }
-    }
-}
+    const NEWS: Self = Self { covered: SimTime::ZERO, left: NEWS_TIMES, known: true };
 
-impl OfDrone for Told {
-    fn drone(&self) -> DroneId {
-        self.drone
+    /// Notes that the state was said.
+    fn cover(&mut self, now: SimTime) {
+        self.covered = now;
+        self.left = self.left.saturating_sub(1);
     }
 }
 
@@ -46,7 +47,8 @@ pub(crate) struct Presences {
     period_s: f64,
     /// Whether it passes states on. Otherwise it keeps none.
     open: bool,
-    told: Roster<Told>,
+    /// By drone; empty unless it passes states on.
+    told: Vec<Told>,
     /// Number of drones ever heard of.
     known: usize,
     /// When a drone was last heard of for the first time.
@@ -62,17 +64,7 @@ impl Presences {
         let repeat_s = params.repeat_period_s;
         let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
         let drones = params.drones.max(1);
-        Self {
-            me,
-            drones,
-            repeat_s,
-            period_s,
-            open: false,
-            told: Roster::default(),
-            known: 0,
-            last_new: start,
-            turn: start,
-        }
+        Self { me, drones, repeat_s, period_s, open: false, told: Vec::new(), known: 0, last_new: start, turn: start }
     }
 
     /// When a drone was last heard of for the first time.
@@ -83,8 +75,10 @@ impl Presences {
     /// Starts or stops to pass states on.
     pub(crate) fn set_open(&mut self, k: &Knowledge, open: bool) {
         if std::mem::replace(&mut self.open, open) != open {
-            let known = k.peers().all().filter(|_| open);
-            self.told = known.map(|(drone, _)| Told::new(drone)).collect();
+            self.told = vec![Told::NOTHING; if open { self.drones as usize } else { 0 }];
+            for (drone, _) in k.peers().all().filter(|_| open) {
+                self.told[drone.index()] = Told::NEWS;
+            }
         }
     }
 
@@ -99,25 +93,29 @@ impl Presences {
             return;
         }
         let Some(newest) = k.peers().last(drone) else { return };
-        let told = self.told.add(Told::new(drone));
-        if has_news {
-            *told = Told::new(drone);
+        let Some(told) = self.told.get_mut(drone.index()) else { return };
+        if has_news || !told.known {
+            *told = Told::NEWS;
         }
         if let Some(pose) = near
             && News::of(pose) == News::of_last(newest)
             && newest.stamp().since(pose.stamp) < self.period_s
         {
-            told.covered = now;
-            told.left = told.left.saturating_sub(1);
+            told.cover(now);
         }
     }
 
     /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
     pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
-        if let Some(told) = self.told.get_mut(drone) {
-            told.covered = now;
-            told.left = told.left.saturating_sub(1);
+        if let Some(told) = self.told.get_mut(drone.index()).filter(|told| told.known) {
+            told.cover(now);
         }
+    }
+
+    /// Reads what was said of a drone, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm(&self, drone: DroneId) {
+        black_box(self.told.get(drone.index()).map(|told| told.left));
     }
 
     /// Says the states that are due, if it is this drone's turn, in at most `frames`.
@@ -130,8 +128,7 @@ impl Presences {
         // Drones close to each other begin at different states, so that they do not all say the same at one time.
         let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
         let first = (draw % u64::from(self.drones)) as u32;
-        for told in self.told.iter() {
-            let id = told.drone;
+        for (told, id) in self.told.iter().zip((0..).map(DroneId)).filter(|(told, _)| told.known) {
             let stale = now.since(told.covered) >= period_s;
             if (told.left > 0 || stale)
                 && let Some(pose) = k.peers().last_of_living(id, now)
@@ -153,11 +150,12 @@ impl Presences {
             for chunk in drones.chunks(MAX_PRESENT).take(left) {
                 let mut presence = Presence { obeyed, group, term, ..Presence::default() };
                 for (entry, &(_, _, id)) in presence.drones.iter_mut().zip(chunk) {
-                    let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(id)) else { continue };
+                    let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(id.index())) else {
+                        continue;
+                    };
                     *entry = present(id, &pose.pose());
                     presence.count += 1;
-                    told.covered = now;
-                    told.left = told.left.saturating_sub(1);
+                    told.cover(now);
                 }
                 say.push(Message::Presence(presence));
                 left -= 1;

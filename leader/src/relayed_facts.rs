@@ -3,18 +3,21 @@
 //! A large swarm has a thousand assignments, so a drone looks at those only whose turn has come.
 
 use crate::beacons::Beacon;
+use crate::fact_store::FactStore;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
+use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Bound;
+
+/// Of the messages whose turn has come, that many are read into the cache at once. Chosen by hand: few, because the rest may have to wait.
+const DUE_AT_ONCE: usize = 32;
 
 /// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Subject {
+pub(crate) enum Subject {
     /// The plan for this group.
     Plan(GroupId),
     /// The assignment of this drone in a plan for this group.
@@ -72,16 +75,16 @@ pub(crate) struct RelayedFacts {
     me: DroneId,
     repeat_s: f64,
     room: usize,
-    known: BTreeMap<Subject, Relayed>,
+    known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
-    turns: BTreeSet<(SimTime, Subject)>,
+    turns: Turns<Subject>,
 }
 
 impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
-        Self { me, repeat_s, room, known: BTreeMap::new(), turns: BTreeSet::new() }
+        Self { me, repeat_s, room, known: FactStore::new(params.drones), turns: Turns::default() }
     }
 
     /// Forgets all.
@@ -92,8 +95,8 @@ impl RelayedFacts {
 
     /// Forgets what was not heard for long.
     pub(crate) fn forget(&mut self, now: SimTime) {
-        self.known.retain(|_, one| now.since(one.heard) < RELAY_MEMORY_S);
-        self.turns.retain(|(_, subject)| self.known.contains_key(subject));
+        self.known.retain(|one| now.since(one.heard) < RELAY_MEMORY_S);
+        self.turns.retain(|subject| self.known.contains(subject));
     }
 
     /// Notes a message of `source`. `near`: that drone is close to this one.
@@ -109,43 +112,42 @@ impl RelayedFacts {
             }
             return;
         }
-        let old = self.known.get(&subject).map(|one| one.turn);
+        let old = self.known.get_mut(&subject).map(|one| one.turn);
         let Some(fact) = fact(message).filter(|_| old.is_some() || self.known.len() < self.room) else { return };
         if let Some(turn) = old.flatten() {
-            self.turns.remove(&(turn, subject));
+            self.turns.remove(turn, subject);
         }
         let gossip = Gossip::varying(now, self.repeat_s, self.me);
         let turn = gossip.next_turn();
-        self.turns.insert((turn, subject));
+        self.turns.add(turn, subject);
         self.known.insert(subject, Relayed { fact, version, from: source, heard: now, gossip, turn: Some(turn) });
     }
 
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
         let turn = Gossip::varying(now, self.repeat_s, self.me).next_turn();
-        let mut after = Bound::Included(Subject::Part(GroupId::ALL, DroneId(0)));
-        while let Some((&Subject::Part(scope, _), _)) = self.known.range((after, Bound::Unbounded)).next() {
-            let subject = Subject::Part(scope, drone);
-            if let Some(one) = self.known.get_mut(&subject).filter(|one| one.turn.is_none()) {
-                one.turn = Some(turn);
-                self.turns.insert((turn, subject));
-            }
-            after = Bound::Excluded(Subject::Part(scope, DroneId(u32::MAX)));
+        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn.is_none()) {
+            one.turn = Some(turn);
+            self.turns.add(turn, Subject::Part(scope, drone));
         }
     }
 
     /// Says what is due, until `last` messages are said. Assignments of one group share messages. This drone is at `position`,
     /// world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
+        for subject in self.turns.due(now).take(DUE_AT_ONCE).filter(|_| say.len() < last) {
+            if let Subject::Part(_, drone) = subject {
+                self.known.warm(drone, |one| one.heard);
+                k.peers().warm(drone);
+            }
+        }
         let first = say.len();
-        while let Some(&(turn, subject)) = self.turns.first()
-            && turn <= now
-        {
-            let open = self.known.get(&subject).and_then(|one| open_list(&say[first..], &one.fact));
+        while let Some(subject) = self.turns.first_due(now) {
+            let open = self.known.get_mut(&subject).and_then(|one| open_list(&say[first..], &one.fact));
             if open.is_none() && say.len() >= last {
                 break;
             }
-            self.turns.pop_first();
+            self.turns.take_due(now);
             let Some(one) = self.known.get_mut(&subject) else { continue };
             let need = need(k, now, subject, one);
             if need == Need::Now && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
@@ -155,7 +157,9 @@ impl RelayedFacts {
                 }
             }
             one.turn = one.next_look(now, need, self.repeat_s);
-            self.turns.extend(one.turn.map(|turn| (turn, subject)));
+            if let Some(turn) = one.turn {
+                self.turns.add(turn, subject);
+            }
         }
     }
 }

@@ -116,13 +116,14 @@ impl Relays {
         self.differs.is_some() && !complete && news && now.since(self.start) < UNSETTLED_S
     }
 
-    /// Looks at its neighbours: does each of them hear the same drones as this one? Call with each beacon.
-    pub(crate) fn look(&mut self, k: &Knowledge, now: SimTime, own: &OwnState, beacon_s: f64) {
+    /// Looks at its neighbours: does each of them hear the same drones as this one? `mine`: a hash of those, [`Pose::hears`]. Call with
+    /// each beacon.
+    pub(crate) fn look(&mut self, k: &Knowledge, now: SimTime, own: &OwnState, beacon_s: f64, mine: u32) {
         if !self.used {
             return;
         }
         self.position = own.position;
-        let (mine, mut differs) = (k.peers().hears(self.me, now), false);
+        let mut differs = false;
         let (mut near_m, mut far_m) = (f64::INFINITY, 0.0_f64);
         let (term, scope) = (k.election().obeyed(), k.election().scope());
         self.lags = false;
@@ -183,6 +184,12 @@ impl Relays {
     /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
     pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
         self.presences.hear_newest(now, drone);
+    }
+
+    /// Reads what was said of a drone, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm(&self, drone: DroneId) {
+        self.presences.warm(drone);
     }
 
     /// Notes a message about leadership that `source` said. Returns whether it is to be obeyed: it comes from the leader

@@ -1,6 +1,7 @@
 //! One entry per drone, such as its place in a queue: one block of memory, sorted by drone. It is read far more often than
 //! added to, and additions mostly come in the order of ids.
 
+use crate::drone_set::DroneSet;
 use skein_protocol::DroneId;
 
 /// An entry that belongs to one drone.
@@ -10,80 +11,85 @@ pub trait OfDrone {
 }
 
 /// At most one entry per drone, by id.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Roster<T>(Vec<T>);
+#[derive(Clone, Debug)]
+pub struct Roster<T> {
+    entries: Vec<T>,
+    /// The drones that have entries.
+    drones: DroneSet,
+}
 
 impl<T> Default for Roster<T> {
     fn default() -> Self {
-        Self(Vec::new())
+        Self { entries: Vec::new(), drones: DroneSet::default() }
+    }
+}
+
+impl<T: PartialEq> PartialEq for Roster<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.entries == other.entries
     }
 }
 
 impl<T: OfDrone> Roster<T> {
     /// No entry yet, and room for so many.
     pub(crate) fn with_capacity(count: usize) -> Self {
-        Self(Vec::with_capacity(count))
+        Self { entries: Vec::with_capacity(count), drones: DroneSet::default() }
     }
 
-    /// The index of a drone's entry, or where it belongs. If all drones have entries, that is the drone's id; if all but one have,
-    /// it may be one less.
+    /// The index of a drone's entry, or where it belongs. Finds it without a look at any entry.
     fn place(&self, drone: DroneId) -> Result<usize, usize> {
-        let guess = |index: usize| self.0.get(index).is_some_and(|part| part.drone() == drone).then_some(index);
-        if let Some(index) = guess(drone.index()).or_else(|| guess(drone.index().checked_sub(1)?)) {
-            return Ok(index);
-        }
-        match self.0.last() {
-            Some(last) if last.drone() >= drone => self.0.binary_search_by_key(&drone, OfDrone::drone),
-            _ => Err(self.0.len()),
-        }
+        let place = self.drones.rank(drone);
+        if self.drones.contains(drone) { Ok(place) } else { Err(place) }
     }
 
     /// The entry of a drone.
     #[must_use]
     pub fn get(&self, drone: DroneId) -> Option<&T> {
-        self.place(drone).ok().map(|place| &self.0[place])
+        self.place(drone).ok().map(|place| &self.entries[place])
     }
 
     /// The entry of a drone, to be changed. Its drone must stay the same.
     pub fn get_mut(&mut self, drone: DroneId) -> Option<&mut T> {
-        self.place(drone).ok().map(|place| &mut self.0[place])
+        self.place(drone).ok().map(|place| &mut self.entries[place])
     }
 
     /// Whether a drone has an entry.
     #[must_use]
     pub fn contains(&self, drone: DroneId) -> bool {
-        self.place(drone).is_ok()
+        self.drones.contains(drone)
     }
 
     /// Adds an entry, unless its drone has one already. Returns the one that the drone has then.
     pub fn add(&mut self, part: T) -> &mut T {
         let place = self.place(part.drone()).unwrap_or_else(|place| {
-            self.0.insert(place, part);
+            self.drones.insert(part.drone());
+            self.entries.insert(place, part);
             place
         });
-        &mut self.0[place]
+        &mut self.entries[place]
     }
 
     /// All entries, by drone.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &T> + Clone {
-        self.0.iter()
+        self.entries.iter()
     }
 
     /// Number of entries.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.entries.len()
     }
 
     /// Whether there is no entry.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.entries.is_empty()
     }
 
     /// Removes all entries.
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.entries.clear();
+        self.drones.clear();
     }
 }
 
@@ -128,5 +134,20 @@ mod tests {
         assert_eq!(roster.add(part(10, 8)).rank, 8);
         assert!(roster.contains(DroneId(9)) && !roster.contains(DroneId(4)) && roster.get(DroneId(11)).is_none());
         assert_eq!(all(&roster), [(1, 1), (3, 4), (5, 0), (9, 2), (10, 8)]);
+    }
+
+    #[test]
+    fn every_entry_is_found_however_the_drones_are_spread() {
+        let spreads: [fn(u32) -> bool; 6] =
+            [|_| true, |id| id != 7, |id| id % 2 == 1, |id| id % 3 == 0, |id| !(4..37).contains(&id), |id| id == 39];
+        for is_in in spreads {
+            let drones: Vec<u32> = (0..40).filter(|id| is_in(*id)).collect();
+            let mut roster: Roster<Place> = drones.iter().map(|id| part(*id, *id as u16)).collect();
+            for id in 0..45 {
+                assert_eq!(roster.get(DroneId(id)).map(|entry| entry.drone.0), drones.contains(&id).then_some(id));
+            }
+            (0..45).rev().for_each(|id| _ = roster.add(part(id, 0)));
+            assert!(roster.iter().map(|entry| entry.drone.0).eq(0..45));
+        }
     }
 }

@@ -81,7 +81,15 @@ struct InlineSwarm<'s> {
     world: World,
     drones: Vec<InlineDrone>,
     /// One per thread.
-    scratch: Vec<StepScratch>,
+    workers: Vec<Worker>,
+}
+
+/// What a thread has for the drones that it steps.
+#[derive(Default)]
+struct Worker {
+    scratch: StepScratch,
+    /// What their radio receivers have counted. It is here and not with each drone, so that it stays in the cache.
+    stats: LinkStats,
 }
 
 impl<'s> InlineSwarm<'s> {
@@ -91,8 +99,8 @@ impl<'s> InlineSwarm<'s> {
         let world = mission::world(scenario)?;
         let new_drone = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO).map(InlineDrone::new);
         let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<_, _>>()?;
-        let scratch = (0..threads.get()).map(|_| StepScratch::default()).collect();
-        Ok(Self { factory, world, drones, scratch })
+        let workers = (0..threads.get()).map(|_| Worker::default()).collect();
+        Ok(Self { factory, world, drones, workers })
     }
 
     fn tick(&mut self) {
@@ -101,7 +109,7 @@ impl<'s> InlineSwarm<'s> {
             carry_out(command, &mut self.drones, &self.factory, start);
         }
         let down = self.world.downlink().view();
-        step_all(&mut self.drones, &down, &mut self.scratch);
+        step_all(&mut self.drones, &down, &mut self.workers);
         for (drone, id) in self.drones.iter().zip(0..).filter(|(drone, _)| drone.flies()) {
             self.world.take_slot(DroneId(id), &drone.slot);
             self.world.take_frames(DroneId(id), &drone.frames);
@@ -117,29 +125,29 @@ impl<'s> InlineSwarm<'s> {
     /// What all radio receivers have counted.
     fn stats(&self) -> LinkStats {
         let mut sum = LinkStats::default();
-        for drone in &self.drones {
-            sum.merge(&drone.stats);
+        for worker in &self.workers {
+            sum.merge(&worker.stats);
         }
         sum
     }
 }
 
-/// Steps all drones, in as many threads as there are scratches. No drone sees what another one does in the same tick.
-fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, scratch: &mut [StepScratch]) {
-    let Some((own, others)) = scratch.split_first_mut() else { return };
+/// Steps all drones, in as many threads as there are workers. No drone sees what another one does in the same tick.
+fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, workers: &mut [Worker]) {
+    let Some((own, others)) = workers.split_first_mut() else { return };
     let chunks = Mutex::new(drones.chunks_mut(CHUNK));
     let next = || chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let work = |scratch: &mut StepScratch| {
+    let work = |worker: &mut Worker| {
         while let Some(chunk) = next() {
-            chunk.iter_mut().for_each(|drone| drone.step(down, scratch));
+            chunk.iter_mut().for_each(|drone| drone.step(down, worker));
         }
     };
     if others.is_empty() {
         return work(own);
     }
     std::thread::scope(|scope| {
-        for scratch in others {
-            scope.spawn(|| work(scratch));
+        for worker in others {
+            scope.spawn(|| work(worker));
         }
         work(own);
     });
@@ -173,19 +181,11 @@ struct InlineDrone {
     unborn: Option<String>,
     slot: Slot,
     frames: Vec<Frame>,
-    stats: LinkStats,
 }
 
 impl InlineDrone {
     fn new(pilot_host: PilotHost) -> Self {
-        Self {
-            pilot_host: Some(pilot_host),
-            frozen: false,
-            unborn: None,
-            slot: Slot::default(),
-            frames: Vec::new(),
-            stats: LinkStats::default(),
-        }
+        Self { pilot_host: Some(pilot_host), frozen: false, unborn: None, slot: Slot::default(), frames: Vec::new() }
     }
 
     /// Whether its pilot is neither killed nor frozen.
@@ -193,9 +193,9 @@ impl InlineDrone {
         self.pilot_host.is_some() && !self.frozen
     }
 
-    fn step(&mut self, down: &DownlinkView<'_>, scratch: &mut StepScratch) {
+    fn step(&mut self, down: &DownlinkView<'_>, Worker { scratch, stats }: &mut Worker) {
         let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
-        let said = pilot_host.step(down, scratch, &mut self.slot, &mut self.stats);
+        let said = pilot_host.step(down, scratch, &mut self.slot, stats);
         self.frames.clear();
         self.frames.extend(said.frames());
     }
