@@ -3,6 +3,7 @@
 
 mod swarm;
 
+use skein_leader::channel_params::ChannelParams;
 use skein_leader::leading::Leading;
 use skein_leader::params::{Between, Destination};
 use skein_protocol::{DroneId, GroupId, Phase, SimTime, Vec2};
@@ -101,4 +102,30 @@ fn a_swarm_that_has_flown_as_far_as_its_destination_closes_up_at_once() {
     swarm.run(12.0);
     assert_eq!(swarm.disunion(0), None);
     assert!(groups(&swarm).iter().all(|(.., phase)| *phase == Phase::Reform));
+}
+
+/// A column that is longer than its radio reaches is split before a wall. Word of its assignments travels more slowly than that of the
+/// new leaders.
+#[test]
+fn a_long_chain_is_split_by_one_plan_and_each_part_has_one_leader() {
+    const LENGTH: u32 = 60;
+    let mut swarm = Swarm::new(DEFAULT, Air { seed: 5, loss: 0.05, ..Air::default() }, LENGTH as usize);
+    swarm.reach = 3;
+    let machine = |me| {
+        let mut params = params(&DEFAULT, LENGTH, me, 1, SimTime::ZERO);
+        params.channel =
+            ChannelParams { bandwidth_bytes_per_s: 100_000.0, carrier_sense_m: 300.0, drones: 2 * swarm.reach as u32 };
+        Some(Leading::new(&params))
+    };
+    swarm.drones = (0..LENGTH).map(machine).collect();
+    swarm.own.iter_mut().zip(0..).for_each(|(own, drone)| own.position.y = 7.0 * f64::from(drone % 3 - 1));
+    swarm.run(10.0);
+    swarm.scenery = vec![wall(1, swarm.own[0].position.x + 90.0)];
+    swarm.run(40.0);
+    let elections = swarm.watch.as_ref().unwrap().leaders.len();
+    let side = swarm.side(0);
+    let plans: BTreeSet<_> = side.iter().map(|(_, l)| l.obeyed().unwrap().plan.id).collect();
+    let parts: BTreeSet<_> = side.iter().map(|(_, l)| (l.group(), l.scope(), l.term())).collect();
+    assert_eq!((plans.len(), parts.len(), elections), (1, 2, 3), "{plans:?} {parts:?}");
+    assert!(parts.iter().all(|(group, scope, _)| group == scope && *group != GroupId::ALL), "{parts:?}");
 }

@@ -6,7 +6,7 @@ mod swarm;
 use bytemuck::Zeroable;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
-use skein_protocol::payload::{Assignment, Leadership, MAX_LISTED, MAX_PRESENT, Pose, Presence, Present};
+use skein_protocol::payload::{Assignment, Leadership, MAX_LISTED, MAX_PRESENT, Plan, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, PlanStamp, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
 use swarm::{DEFAULT, params, step};
@@ -150,4 +150,24 @@ fn a_drone_that_was_restarted_gets_its_assignment_again() {
     assert!(middle.passes_on(100).is_empty(), "all drones obey the plan");
     middle.hear_of_lives(500..501, PlanStamp::default(), 2);
     assert_eq!(middle.passes_on(50), BTreeSet::from([500]));
+}
+
+/// The heartbeats of a part's leader travel faster than the assignments that make the part.
+#[test]
+fn a_drone_that_learns_its_part_obeys_the_leader_that_it_has_heard_of() {
+    let mut middle = Middle::new();
+    for _ in 0..60 {
+        middle.step();
+    }
+    let (part, ballot) = (GroupId::ALL.child(1), Ballot { round: 2, incarnation: 1, claimant: DroneId(5) });
+    let (kind, stamp) = (LeadershipKind::Heartbeat as u16, middle.now());
+    middle.hear(2, Message::Leadership(Leadership { stamp, ballot, kind, hops: 3, group: part, ..Zeroable::zeroed() }));
+    middle.step();
+    assert_eq!(middle.leading.term(), TERM, "it does not know yet that it belongs to that part");
+    let (id, leader) = (PlanStamp { ballot: TERM, epoch: 2 }, DroneId(5));
+    middle.hear(0, Message::Plan(Plan { id, stamp, members: DRONES, ..Zeroable::zeroed() }));
+    let drone = DroneId(1);
+    middle.hear(0, Message::Assignment(Assignment { id, group: part, drone, leader, ..Zeroable::zeroed() }));
+    middle.step();
+    assert_eq!((middle.leading.group(), middle.leading.term()), (part, ballot));
 }
