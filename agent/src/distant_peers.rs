@@ -30,8 +30,10 @@ pub(crate) struct DistantPeers {
     blocks_m: Vec<f64>,
     /// The least of all blocks, or less, m.
     least_m: f64,
-    /// The indices of the peers that are within reach, ascending.
+    /// The indices of the peers that were within reach, ascending.
     near: Vec<u32>,
+    /// The indices of further peers that may be within reach.
+    suspects: Vec<u32>,
     /// Number of changes of the peers at the last look.
     seen: usize,
     /// Greatest speed of a distant peer, m/s.
@@ -50,28 +52,35 @@ impl DistantPeers {
         }
     }
 
-    /// Finds the peers within reach. `count`: number of peers. `changes`: theirs. `distant`: whether the peer at an index is
-    /// out of reach.
+    /// Finds the peers that have come within reach. `count`: number of peers. `changes`: theirs. `distant`: whether the peer at
+    /// an index is out of reach.
     pub(crate) fn look(&mut self, count: usize, changes: &Changes, distant: impl Fn(usize) -> Option<Distant>) {
         self.suspect_changed(count, changes);
         if self.travelled_m >= self.least_m {
             self.suspect_near();
         }
-        let mut near = std::mem::take(&mut self.near);
-        near.retain(|&index| match distant(index as usize) {
-            Some(distant) => {
-                self.note(index as usize, distant);
-                false
+        while let Some(index) = self.suspects.pop() {
+            match distant(index as usize) {
+                Some(distant) => self.note(index as usize, distant),
+                None => {
+                    let place = self.near.partition_point(|near| *near < index);
+                    self.near.insert(place, index);
+                }
             }
-            None => true,
-        });
-        near.sort_unstable();
-        self.near = near;
+        }
     }
 
-    /// The indices of the peers within reach, ascending.
-    pub(crate) fn near(&self) -> impl Iterator<Item = usize> {
-        self.near.iter().map(|&index| index as usize)
+    /// Visits the peers within reach, by index. `visit` returns how far away one is that has left it.
+    pub(crate) fn visit(&mut self, mut visit: impl FnMut(usize) -> Option<Distant>) {
+        let mut near = std::mem::take(&mut self.near);
+        near.retain(|&index| {
+            let distant = visit(index as usize);
+            if let Some(distant) = distant {
+                self.note(index as usize, distant);
+            }
+            distant.is_none()
+        });
+        self.near = near;
     }
 
     /// The peers that have changed may be within reach.
@@ -87,6 +96,7 @@ impl DistantPeers {
         self.blocks_m.clear();
         self.blocks_m.resize(count.div_ceil(BLOCK), f64::INFINITY);
         self.least_m = f64::INFINITY;
+        self.suspects.clear();
         self.near.clear();
         self.near.extend(0..count as u32);
     }
@@ -117,7 +127,7 @@ impl DistantPeers {
 
     fn suspect(&mut self, index: usize) {
         if std::mem::replace(&mut self.until_m[index], NEAR) != NEAR {
-            self.near.push(index as u32);
+            self.suspects.push(index as u32);
         }
     }
 
@@ -161,12 +171,20 @@ mod tests {
             };
             peers.advance(now, mine);
             (0..10).filter(|index| (tick as usize + index).is_multiple_of(10)).for_each(|index| changes.note(index));
-            peers.look(10, &changes, |index| {
+            let look = |index| {
                 looked.set(looked.get() + 1);
                 of(index)
+            };
+            peers.look(10, &changes, look);
+            let mut near = Vec::new();
+            peers.visit(|index| {
+                look(index).or_else(|| {
+                    near.push(index);
+                    None
+                })
             });
             let expected: Vec<usize> = (0..10).filter(|&index| of(index).is_none()).collect();
-            assert_eq!(peers.near().collect::<Vec<_>>(), expected, "tick {tick}");
+            assert_eq!(near, expected, "tick {tick}");
         }
         assert!(looked.get() < 8000, "{} looks of 20 000", looked.get());
     }
@@ -174,19 +192,28 @@ mod tests {
     #[test]
     fn a_peer_that_changed_is_looked_at_and_all_are_when_they_moved() {
         let (mut peers, mut changes) = (DistantPeers::default(), Changes::default());
+        let near = |peers: &mut DistantPeers, away_m: f64| {
+            let mut near = Vec::new();
+            peers.visit(|index| {
+                near.push(index);
+                distant(away_m, 0.0)
+            });
+            near
+        };
         changes.note_moved(9);
-        peers.look(9, &changes, |_| distant(150.0, 0.0));
-        assert_eq!(peers.near().count(), 0);
+        peers.look(9, &changes, |_| panic!("all are visited"));
+        assert_eq!(near(&mut peers, 150.0).len(), 9);
         let nobody = |_| -> Option<Distant> { panic!("nothing has changed") };
         peers.look(9, &changes, nobody);
+        assert!(near(&mut peers, 0.0).is_empty());
         changes.note(8);
         changes.note(3);
         peers.look(9, &changes, |_| None);
-        assert_eq!(peers.near().collect::<Vec<_>>(), [3, 8]);
+        assert_eq!(near(&mut peers, 0.0), [3, 8]);
         changes.note_moved(9);
-        peers.look(9, &changes, |_| None);
-        assert_eq!(peers.near().count(), 9);
-        peers.look(4, &changes, |_| None);
-        assert_eq!(peers.near().count(), 4);
+        peers.look(9, &changes, nobody);
+        assert_eq!(near(&mut peers, 0.0).len(), 9);
+        peers.look(4, &changes, nobody);
+        assert_eq!(near(&mut peers, 0.0).len(), 4);
     }
 }

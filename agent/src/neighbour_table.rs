@@ -7,7 +7,7 @@ use skein_leader::beacons::Beacon;
 use skein_leader::peers::Peers;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
-use skein_protocol::{DroneId, PlanStamp, SimTime};
+use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,21 +68,30 @@ impl NeighbourTable {
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         self.distant.advance(senses.now, senses.position());
         let away_m = |pose: &Beacon<'_>| pose.extrapolated(senses.now) - senses.position();
-        self.distant.look(view.peers.stamps().len(), view.peers.changes(), |index| {
-            let pose = view.peers.at(index).1;
-            let position_m = away_m(&pose);
+        let distant = |pose: &Beacon<'_>, position_m: Vec2| {
             let far = position_m.norm_squared() > reach_m * reach_m;
             far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: pose.velocity().norm() })
+        };
+        let mut peers = std::mem::take(&mut self.distant);
+        peers.look(view.peers.stamps().len(), view.peers.changes(), |index| {
+            let pose = view.peers.at(index).1;
+            distant(&pose, away_m(&pose))
         });
-        for index in self.distant.near().filter(|&index| view.peers.is_living_at(index, view.now)) {
-            let (id, pose) = view.peers.at(index);
-            if senses.neighbours.iter().any(|n| n.drone == id) {
-                continue;
+        peers.visit(|index| {
+            if !view.peers.is_living_at(index, view.now) {
+                return None;
             }
-            let (position_m, velocity_mps) = (away_m(&pose), pose.velocity() - senses.velocity());
-            let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
-            self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
-        }
+            let (id, pose) = view.peers.at(index);
+            let position_m = away_m(&pose);
+            let far = distant(&pose, position_m);
+            if far.is_none() && !senses.neighbours.iter().any(|n| n.drone == id) {
+                let velocity_mps = pose.velocity() - senses.velocity();
+                let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
+                self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
+            }
+            far
+        });
+        self.distant = peers;
     }
 
     /// The neighbours that were found.
