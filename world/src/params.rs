@@ -189,7 +189,7 @@ mod tests {
     fn an_invalid_parameter_is_named() {
         assert_eq!(params().check(), Ok(()));
         assert_eq!(WorldParams { dt_ns: 0, ..params() }.check(), Err(WorldError::Tick(0)));
-        let channel = Some(SharedChannel { seed: 1, rate_bps: 0.0, limit_s: 1.0 });
+        let channel = Some(SharedChannel { seed: 1, rate_bps: 0.0, limit_s: 1.0, carrier_sense_m: f64::INFINITY });
         assert_eq!(WorldParams { channel, ..params() }.check(), Err(WorldError::Rate(0.0)));
         let error = WorldParams { clearance_m: -1.0, ..params() }.check().unwrap_err();
         assert_eq!(error.to_string(), "clearance_m is -1, expected a number of at least 0");
