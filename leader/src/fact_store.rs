@@ -1,6 +1,6 @@
 //! Where a drone keeps what it may pass on. A large swarm has a thousand assignments: each is found by its drone, without a search.
 
-use crate::relayed_facts::Subject;
+use crate::subject::Subject;
 use skein_protocol::{DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
 use std::hint::black_box;

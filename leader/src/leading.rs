@@ -307,7 +307,7 @@ impl Leading {
             let known = self.knowledge.peers().stamp_of(drone);
             if known == Some(present.stamp) {
                 if near {
-                    self.relays.hear_newest(now, drone);
+                    self.relays.hear_newest(now, drone, present.stamp);
                 }
                 continue;
             }

@@ -87,6 +87,7 @@ mod shared_values;
 mod situation;
 pub mod slots;
 pub mod split;
+mod subject;
 mod survey;
 mod task;
 pub mod tps;

@@ -3,7 +3,7 @@
 use crate::adaptive_timeout::AdaptiveTimeout;
 use crate::beacons::{Beacon, Beacons};
 use crate::changes::Changes;
-use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS};
+use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS, RELAYED_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{DroneId, PlanStamp, SimTime};
@@ -37,8 +37,15 @@ impl Peer {
         self.timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
     }
 
+    /// The longest time without word of it after which it still counts as living, s. Where others pass its state on, it comes once per
+    /// some time-outs at best, and at times not at all.
+    fn absence_s(&self, base_s: f64) -> f64 {
+        let relayed = self.timeout.last() > self.direct;
+        self.silence_s(base_s).max(if relayed { RELAYED_TIMEOUTS * base_s } else { 0.0 })
+    }
+
     fn lives(&self, now: SimTime, base_s: f64) -> bool {
-        now.since(self.timeout.last()) <= self.silence_s(base_s)
+        now.since(self.timeout.last()) <= self.absence_s(base_s)
     }
 
     fn is_direct(&self, now: SimTime, base_s: f64) -> bool {
@@ -47,7 +54,7 @@ impl Peer {
 
     /// A moment until which it certainly lives.
     fn lives_until(&self, base_s: f64) -> SimTime {
-        self.timeout.last() + ((self.silence_s(base_s) - ROUNDING_S) * 1e9) as i64
+        self.timeout.last() + ((self.absence_s(base_s) - ROUNDING_S) * 1e9) as i64
     }
 }
 
@@ -136,7 +143,7 @@ impl Peers {
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
                 let prior = self.prior(now, false);
                 let peer = &mut self.last[place];
-                let longest_s = peer.silence_s(self.timeout_s);
+                let longest_s = peer.absence_s(self.timeout_s);
                 if direct.is_none() && peer.timeout.last() <= peer.direct {
                     peer.timeout = prior;
                 }

@@ -3,7 +3,7 @@
 use crate::knowledge::Knowledge;
 use crate::news::News;
 use crate::params::LeadingParams;
-use crate::tuning::{NEWS_TIMES, PRESENCE_REPEATS, STATES_PER_S};
+use crate::tuning::{NEWS_TIMES, PRESENCE_OVERDUE, PRESENCE_REPEATS, STATES_PER_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
@@ -16,6 +16,8 @@ type Kind = (PlanStamp, GroupId, Ballot);
 /// What was said of one drone. Each drone keeps this for all drones of the swarm, so it is small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
+    /// Time stamp of the newest state of it that the neighbourhood heard, as far as this drone knows.
+    said: SimTime,
     /// When the neighbourhood last heard of it, as far as this drone knows.
     covered: SimTime,
     /// How often the news is said at once.
@@ -26,12 +28,13 @@ struct Told {
 
 impl Told {
     /// Nothing heard.
-    const NOTHING: Self = Self { covered: SimTime::ZERO, left: 0, known: false };
+    const NOTHING: Self = Self { said: SimTime::ZERO, covered: SimTime::ZERO, left: 0, known: false };
     /// News that was not said yet.
-    const NEWS: Self = Self { covered: SimTime::ZERO, left: NEWS_TIMES, known: true };
+    const NEWS: Self = Self { said: SimTime::ZERO, covered: SimTime::ZERO, left: NEWS_TIMES, known: true };
 
-    /// Notes that the state was said.
-    fn cover(&mut self, now: SimTime) {
+    /// Notes that the state with this time stamp was said `now`.
+    fn cover(&mut self, now: SimTime, stamp: SimTime) {
+        self.said = self.said.max(stamp);
         self.covered = now;
         self.left = self.left.saturating_sub(1);
     }
@@ -43,7 +46,8 @@ pub(crate) struct Presences {
     me: DroneId,
     drones: u32,
     repeat_s: f64,
-    /// A state without news is passed on again after this long, s.
+    /// A state without news is passed on if it is newer by this than the one that was passed on before, s. So each drone's state comes
+    /// once in this time, and travels on at once. What was not heard for longer, because frames were lost, is repeated.
     period_s: f64,
     /// Whether it passes states on. Otherwise it keeps none.
     open: bool,
@@ -97,18 +101,19 @@ impl Presences {
         if has_news || !told.known {
             *told = Told::NEWS;
         }
+        // The message that brings a state covers nobody: this drone may be the only way on.
         if let Some(pose) = near
             && News::of(pose) == News::of_last(newest)
-            && newest.stamp().since(pose.stamp) < self.period_s
+            && pose.stamp < newest.stamp()
         {
-            told.cover(now);
+            told.cover(now, pose.stamp);
         }
     }
 
-    /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
-    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
+    /// Notes that a drone close to this one said the newest state of `drone`, which has this time stamp and which this drone knows.
+    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId, stamp: SimTime) {
         if let Some(told) = self.told.get_mut(drone.index()).filter(|told| told.known) {
-            told.cover(now);
+            told.cover(now, stamp);
         }
     }
 
@@ -129,9 +134,9 @@ impl Presences {
         let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
         let first = (draw % u64::from(self.drones)) as u32;
         for (told, id) in self.told.iter().zip((0..).map(DroneId)).filter(|(told, _)| told.known) {
-            let stale = now.since(told.covered) >= period_s;
-            if (told.left > 0 || stale)
-                && let Some(pose) = k.peers().last_of_living(id, now)
+            let overdue = told.left > 0 || now.since(told.covered) >= PRESENCE_OVERDUE * period_s;
+            if let Some(pose) = k.peers().last_of_living(id, now)
+                && (overdue || pose.stamp().since(told.said) >= period_s)
             {
                 due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push((
                     NEWS_TIMES - told.left.min(NEWS_TIMES),
@@ -155,7 +160,7 @@ impl Presences {
                     };
                     *entry = present(id, &pose.pose());
                     presence.count += 1;
-                    told.cover(now);
+                    told.cover(now, entry.stamp);
                 }
                 say.push(Message::Presence(presence));
                 left -= 1;

@@ -7,6 +7,7 @@ use crate::fact_store::FactStore;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
+use crate::subject::Subject;
 use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, Passed, Plan};
@@ -14,19 +15,6 @@ use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec
 
 /// Of the messages whose turn has come, that many are read into the cache at once. Chosen by hand: few, because the rest may have to wait.
 const DUE_AT_ONCE: usize = 32;
-
-/// What a message is about. Of the messages about the same, only the newest is passed on. In the order of urgency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Subject {
-    /// The plan for this group.
-    Plan(GroupId),
-    /// The assignment of this drone in a plan for this group.
-    Part(GroupId, DroneId),
-    /// The arrivals of this drone, of this kind.
-    Arrivals(u32, DroneId),
-    /// What this drone has passed.
-    Passed(DroneId),
-}
 
 /// Which of two messages about the same subject is newer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

@@ -182,8 +182,8 @@ impl Relays {
     }
 
     /// Notes that a drone close to this one said the newest state of `drone`, which this drone knows.
-    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId) {
-        self.presences.hear_newest(now, drone);
+    pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId, stamp: SimTime) {
+        self.presences.hear_newest(now, drone, stamp);
     }
 
     /// Reads what was said of a drone, so that it is in the cache.

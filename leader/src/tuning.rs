@@ -133,6 +133,12 @@ pub(crate) const NEWS_TIMES: u32 = 2;
 /// Drones without news are passed on once per this many repeat periods. No unit. 8: with the default period every 1.6 s. By
 /// hand.
 pub(crate) const PRESENCE_REPEATS: f64 = 8.0;
+/// A state is repeated if nothing newer came for this part of that period. No unit. 1.5. By hand: more than the waits of two drones,
+/// so that nothing is repeated while nothing is lost.
+pub(crate) const PRESENCE_OVERDUE: f64 = 1.5;
+/// A drone whose state is passed on counts as living for at least this many time-outs without word of it. No unit. 4: with the default
+/// periods 6 s, in which its state comes three times. By hand.
+pub(crate) const RELAYED_TIMEOUTS: f64 = 4.0;
 /// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 320: swarms of
 /// more than 512 drones repeat states less often, so that what a drone hears does not grow with the swarm. By hand.
 pub(crate) const STATES_PER_S: f64 = 320.0;
