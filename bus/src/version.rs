@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// Raised with every change of the control segment's layout, of `Slot` or of `LinkStats`.
-const LAYOUT: u16 = 7;
+const LAYOUT: u16 = 8;
 
 /// What the programs of one run must have in common: the version of Skein that they are built with, and the versions of what they
 /// share. A patch release changes none of it.

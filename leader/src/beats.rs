@@ -12,7 +12,7 @@ use crate::params::LeadingParams;
 use crate::tuning::{BEAT_OVERDUE, BEAT_REPEAT, FOREIGN_BEATS, HOP_S, NEAR_REDUNDANCY, RELAY_MEMORY_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Leadership;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, SimTime};
+use skein_protocol::{DroneId, GroupId, Message, SimTime};
 use std::collections::BTreeMap;
 
 /// The newest message of a term.
@@ -62,15 +62,10 @@ impl Beats {
         true
     }
 
-    /// Whether news of this term came within the last `within_s`.
-    pub(crate) fn knows(&self, now: SimTime, ballot: Ballot, within_s: f64) -> bool {
-        self.beats.values().any(|beat| beat.message.ballot == ballot && now.since(beat.since) <= within_s)
-    }
-
-    /// The newest message of a leader of this group, if it was news within the last `within_s`.
-    pub(crate) fn newest(&self, now: SimTime, group: GroupId, within_s: f64) -> Option<Leadership> {
-        let beat = self.beats.get(&group)?;
-        (now.since(beat.since) <= within_s).then_some(beat.message)
+    /// The newest message of each group's leader that was news within the last `within_s`.
+    pub(crate) fn newest(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = &Leadership> {
+        let recent = self.beats.values().filter(move |beat| now.since(beat.since) <= within_s);
+        recent.map(|beat| &beat.message)
     }
 
     /// Forgets what was news long ago.

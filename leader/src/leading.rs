@@ -22,7 +22,7 @@ use crate::planner::Planner;
 use crate::relays::Relays;
 use crate::roles::Roles;
 use crate::situation::Situation;
-use skein_protocol::payload::{Assignment, MAX_PLACES, Presence, QueuePlace};
+use skein_protocol::payload::{Assignment, Leadership, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
 
@@ -287,7 +287,7 @@ impl Leading {
     }
 
     fn hear_assignment(&mut self, now: SimTime, source: DroneId, part: &Assignment) {
-        let goes_on = self.relays.knows_term(now, part.id.ballot, self.leader_timeout_s);
+        let goes_on = self.relays.newest(now, self.leader_timeout_s).any(|l| l.ballot == part.id.ballot);
         self.knowledge.hear_assignment(now, source, part, goes_on);
     }
 
@@ -347,11 +347,15 @@ impl Leading {
     }
 
     /// Obeys the leader of this drone's part of a split group, if that leader was heard before this drone knew which part it is in.
+    /// What was passed on counts only if this drone does not hear that leader itself.
     fn follow_part(&mut self, now: SimTime) {
         let (scope, group) = (self.knowledge.election().scope(), self.knowledge.election().group());
-        if scope != group
-            && let Some(message) = self.relays.newest_of(now, group, self.leader_timeout_s)
-        {
+        if scope == group {
+            return;
+        }
+        let own_word = |l: &Leadership| l.hops == 0 || !self.peers().is_heard_now(l.ballot.claimant, now);
+        let mut newest = self.relays.newest(now, self.leader_timeout_s);
+        if let Some(message) = newest.find(|l| l.group == group).copied().filter(own_word) {
             self.knowledge.elect(now, Input::Heard(message));
         }
     }

@@ -24,7 +24,7 @@ use crate::tuning::{
     CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, SETTLED_S, UNSETTLED_S, WIDE_S,
 };
 use skein_protocol::payload::{Leadership, Pose};
-use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
+use skein_protocol::{DroneId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
 
 /// What one drone passes on. Memory is bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
@@ -214,14 +214,9 @@ impl Relays {
         self.hear_beat(k, now, source, message) && !k.peers().is_heard_now(claimant, now)
     }
 
-    /// Whether this drone had news of this term's leader, from itself or passed on, within the last `within_s`.
-    pub(crate) fn knows_term(&self, now: SimTime, ballot: Ballot, within_s: f64) -> bool {
-        self.beats.knows(now, ballot, within_s)
-    }
-
-    /// The newest message of a leader of this group, if it was news within the last `within_s`.
-    pub(crate) fn newest_of(&self, now: SimTime, group: GroupId, within_s: f64) -> Option<Leadership> {
-        self.beats.newest(now, group, within_s)
+    /// The newest message of each group's leader, from itself or passed on, that was news within the last `within_s`.
+    pub(crate) fn newest(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = &Leadership> {
+        self.beats.newest(now, within_s)
     }
 
     /// Notes a message of a term. Returns whether it is news.

@@ -185,8 +185,8 @@ fn has_ahead(k: &Knowledge, drones: impl Iterator<Item = Member> + Clone) -> boo
 /// Whether this drone has an obstacle ahead, or is to lead a part with a member that has.
 fn part_has_ahead(k: &Knowledge, now: SimTime, me: &Member) -> bool {
     let named = k.ledger().part().is_some_and(|part| part.leader == k.me());
-    let mates = k.living_peers(now).filter(|m| me.group.contains(m.group)).filter(|_| named);
-    has_ahead(k, mates.chain([*me]))
+    let mates = named.then(|| k.living_peers(now).filter(|m| me.group.contains(m.group)));
+    has_ahead(k, mates.into_iter().flatten().chain([*me]))
 }
 
 /// Whether any living drone has an obstacle ahead.

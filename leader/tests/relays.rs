@@ -152,14 +152,13 @@ fn a_drone_that_was_restarted_gets_its_assignment_again() {
     assert_eq!(middle.passes_on(50), BTreeSet::from([500]));
 }
 
-/// The heartbeats of a part's leader travel faster than the assignments that make the part.
-#[test]
-fn a_drone_that_learns_its_part_obeys_the_leader_that_it_has_heard_of() {
+/// Drone 1, which heard from drone 2 that `claimant` leads the first part of a split, and then learnt that it is in that part.
+fn told_of_a_part_led_by(claimant: u32) -> Middle {
     let mut middle = Middle::new();
     for _ in 0..60 {
         middle.step();
     }
-    let (part, ballot) = (GroupId::ALL.child(1), Ballot { round: 2, incarnation: 1, claimant: DroneId(5) });
+    let (part, ballot) = (GroupId::ALL.child(1), Ballot { round: 2, incarnation: 1, claimant: DroneId(claimant) });
     let (kind, stamp) = (LeadershipKind::Heartbeat as u16, middle.now());
     middle.hear(2, Message::Leadership(Leadership { stamp, ballot, kind, hops: 3, group: part, ..Zeroable::zeroed() }));
     middle.step();
@@ -169,5 +168,47 @@ fn a_drone_that_learns_its_part_obeys_the_leader_that_it_has_heard_of() {
     let drone = DroneId(1);
     middle.hear(0, Message::Assignment(Assignment { id, group: part, drone, leader, ..Zeroable::zeroed() }));
     middle.step();
-    assert_eq!((middle.leading.group(), middle.leading.term()), (part, ballot));
+    assert_eq!(middle.leading.group(), part);
+    middle
+}
+
+/// The heartbeats of a part's leader travel faster than the assignments that make the part.
+#[test]
+fn a_drone_that_learns_its_part_obeys_the_leader_that_it_has_heard_of() {
+    assert_eq!(told_of_a_part_led_by(5).leading.term().claimant, DroneId(5));
+}
+
+/// What others say about a drone that this drone hears itself does not count.
+#[test]
+fn a_drone_that_learns_its_part_does_not_believe_others_about_a_leader_that_it_hears() {
+    assert_eq!(told_of_a_part_led_by(0).leading.term(), TERM);
+}
+
+/// A state that is newer by a period than the last one that was said goes on at once, not at the end of a period. What others said in
+/// between is not repeated.
+#[test]
+fn states_travel_on_at_once() {
+    let mut middle = Middle::new();
+    for _ in 0..60 {
+        middle.step();
+    }
+    let mut delays = Vec::new();
+    for _ in 0..20 {
+        middle.hear_of(500..501, PLAN);
+        let heard = middle.now();
+        let mut said = None;
+        for _ in 0..100 {
+            let is_said = middle.step().iter().any(|message| match message {
+                Message::Presence(presence) => {
+                    presence.present().iter().any(|p| p.drone == DroneId(500) && p.stamp == heard)
+                }
+                _ => false,
+            });
+            said = said.or(is_said.then(|| middle.now().since(heard)));
+        }
+        delays.extend(said);
+    }
+    assert!(delays.len() >= 18, "{delays:?}");
+    let most_s = delays.iter().copied().fold(0.0, f64::max);
+    assert!(most_s < 0.4, "{delays:?}");
 }

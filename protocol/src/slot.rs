@@ -109,10 +109,10 @@ pub struct LinkStats {
     /// Greatest age of a peer's last known pose, ticks.
     pub age_max: u64,
     /// Histogram of the delay of heard messages, one bin per tick.
-    pub delay_bins: [u32; STAT_BINS],
+    pub delay_bins: [u64; STAT_BINS],
     /// Histogram of the age of each known peer's last pose, one bin per tick. It is sampled each time this drone sends its
     /// own beacon.
-    pub age_bins: [u32; STAT_BINS],
+    pub age_bins: [u64; STAT_BINS],
     /// Always 0.
     pub reserved: [u64; 4],
 }

@@ -56,7 +56,7 @@ impl Pacer {
 #[derive(Clone, Debug)]
 struct Lateness {
     /// The last bin also counts everything that is longer.
-    bins: Vec<u32>,
+    bins: Vec<u64>,
     max_us: u64,
 }
 

@@ -3,7 +3,7 @@
 use super::burst::Burst;
 use super::key::KeyedRng;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{LOG10_2, SQRT_2};
 
 /// How a frame is delayed, lost and duplicated on its way to a receiver. The default is an ideal channel: no loss and no
 /// delay.
@@ -95,5 +95,74 @@ impl Range {
         }
         let missing_db = 5.0 * self.exponent * libm::log10(square_m2 / square);
         0.5 * libm::erfc(missing_db / (self.shadowing_db * SQRT_2))
+    }
+
+    /// Whether a frame is heard at the distance √`square_m2`: whether a random number, uniform in [0, 1), is below [`Self::heard`]. Most
+    /// receivers are so far away or so near that this needs neither logarithm nor error function. `draw` is called only if the range
+    /// is no hard limit.
+    pub(super) fn hears(&self, square_m2: f64, draw: impl FnOnce() -> f64) -> bool {
+        if self.shadowing_db <= 0.0 {
+            return self.heard(square_m2) > 0.0;
+        }
+        let draw = draw();
+        let log2 = log2_bounds(square_m2 / (self.half_m * self.half_m));
+        let deviations = |log2: f64| 5.0 * LOG10_2 * self.exponent * log2 / self.shadowing_db;
+        match log2.map(|(least, greatest)| (deviations(least), deviations(greatest))) {
+            Some((least, _)) if least >= SURE && draw >= UNSURE => false,
+            Some((_, greatest)) if greatest <= -SURE && draw < 1.0 - UNSURE => true,
+            _ => draw < self.heard(square_m2),
+        }
+    }
+}
+
+/// From this many standard deviations on, at most [`UNSURE`] of all frames differ from the rest: Q(3.72) = 0.9961·10⁻⁴.
+const SURE: f64 = 3.72;
+/// See [`SURE`].
+const UNSURE: f64 = 1e-4;
+
+/// A lower and an upper bound of log2 of a positive normal number. Between two powers of two, the logarithm lies above the chord by at
+/// most 0.0861.
+fn log2_bounds(number: f64) -> Option<(f64, f64)> {
+    if !(number.is_normal() && number > 0.0) {
+        return None;
+    }
+    let bits = number.to_bits();
+    let fraction = f64::from_bits((bits & ((1 << 52) - 1)) | (1023 << 52)) - 1.0;
+    let chord = (bits >> 52) as f64 - 1023.0 + fraction;
+    Some((chord, chord + 0.0861))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.max(5000), ..ProptestConfig::default() })]
+
+        #[test]
+        fn a_frame_is_heard_if_the_number_is_below_the_share(
+            half_m in 1.0..1e5f64, shadowing_db in 0.01..30.0f64, exponent in 0.5..8.0f64, deviations in -6.0..6.0f64,
+            draw in 0.0..1.0f64,
+        ) {
+            let range = Range { half_m, shadowing_db, exponent };
+            let square_m2 = (half_m * libm::pow(10.0, deviations * shadowing_db / (10.0 * exponent))).powi(2);
+            let heard = range.heard(square_m2);
+            for draw in [draw, heard * (1.0 - 1e-9), heard * (1.0 + 1e-9)] {
+                prop_assert_eq!(range.hears(square_m2, || draw), draw < heard);
+            }
+        }
+    }
+
+    #[test]
+    fn odd_distances_are_answered_as_the_share_says() {
+        for shadowing_db in [0.0, 4.0] {
+            let range = Range { half_m: 300.0, shadowing_db, exponent: 3.0 };
+            for square_m2 in [0.0, f64::MIN_POSITIVE / 4.0, f64::MAX, f64::INFINITY, f64::NAN] {
+                for draw in [0.0, 0.5, 0.999_999] {
+                    assert_eq!(range.hears(square_m2, || draw), draw < range.heard(square_m2), "{square_m2} {draw}");
+                }
+            }
+        }
     }
 }

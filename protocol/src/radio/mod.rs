@@ -80,11 +80,10 @@ impl Radio {
             false => KeyedRng::of_frame(self.seed, link, purpose),
         };
         let draw = |purpose| keyed(purpose).unit();
-        if let Some(range) = channel.range {
-            let heard = range.heard(path.norm_squared());
-            if heard < 1.0 && draw(b"rnge") >= heard {
-                return Delivery::Drop(DropReason::Range);
-            }
+        if let Some(range) = channel.range
+            && !range.hears(path.norm_squared(), || draw(b"rnge"))
+        {
+            return Delivery::Drop(DropReason::Range);
         }
         if let Some(burst) = channel.burst
             && burst.is_active(self.seed, link, aired)
