@@ -1,6 +1,7 @@
 //! Which drone takes which slot of the formation (paper, Algorithm 5).
 
 use crate::draft::draft;
+use crate::formation_pace::FormationPace;
 use crate::geometry::nearest;
 use crate::member::{Member, group_leaders};
 use crate::params::Destination;
@@ -26,6 +27,7 @@ pub(crate) struct FormationPlanner {
     open: bool,
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
+    pace: FormationPace,
 }
 
 /// A member that already stands in a slot. Both are indices.
@@ -51,15 +53,16 @@ impl FormationPlanner {
             return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| {
                 let pinned = s.members.iter().any(|m| is_alone(m, s));
                 let open = !pinned && !self.open;
-                *self = Self { open, pinned, ..Self::default() };
+                *self = Self { open, pinned, pace: self.pace, ..Self::default() };
                 self.assign(s, bundle.plan.phase())
             });
         }
         let changed = *self.changed.get_or_insert(s.now);
-        if !passed && obeyed.is_some() && s.now.since(changed) < s.params.debounce_s {
+        if !passed && obeyed.is_some() && (s.now.since(changed) < s.params.debounce_s || !self.pace.allows(s)) {
             return None;
         }
-        *self = Self::default();
+        self.pace.note(s);
+        *self = Self { pace: self.pace, ..Self::default() };
         // A part of the swarm cruises only between obstacle sets.
         let parted = |plan: &Plan| plan.group != GroupId::ALL;
         let avoided = s.ledger.obeyed().is_some_and(|b| b.plan.phase() != Phase::Cruise || parted(&b.plan));

@@ -70,7 +70,7 @@ impl Leading {
         Self { knowledge, relays: Relays::unused(params), ..Self::new(params) }
     }
 
-    /// Distance to the farthest drone that this drone hears without a relay, m; `None` while, as far as it knows, all living drones hear each
+    /// Distance within which this drone hears others without a relay, m; `None` while, as far as it knows, all living drones hear each
     /// other.
     #[must_use]
     pub fn reach_m(&self) -> Option<f64> {

@@ -51,6 +51,7 @@ mod draft;
 mod drone_set;
 pub mod election;
 mod fact_store;
+mod formation_pace;
 mod formation_planner;
 pub mod funnel;
 pub mod geometry;

@@ -248,6 +248,13 @@ impl Peers {
         direct.map(|(id, place)| (id, self.beacons.get(place)))
     }
 
+    /// The peers whose own beacon was heard within the last `within_s`, by id.
+    pub(crate) fn heard_within(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
+        let near = self.near.iter().filter_map(|&id| Some((id, self.place(id).ok()?)));
+        let heard = near.filter(move |&(_, place)| now.since(self.last[place].direct) <= within_s);
+        heard.map(|(id, place)| (id, self.beacons.get(place)))
+    }
+
     /// What drone `me` says in [`Pose::hears`].
     pub(crate) fn hears(&self, me: DroneId, now: SimTime) -> u32 {
         let heard = self.direct(now).count();

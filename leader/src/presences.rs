@@ -3,10 +3,13 @@
 use crate::knowledge::Knowledge;
 use crate::news::News;
 use crate::params::LeadingParams;
-use crate::tuning::{NEWS_TIMES, PRESENCE_OVERDUE, PRESENCE_REPEATS, STATES_PER_S};
+use crate::tuning::{
+    BACKLOG, MAX_THINNING, NEWS_TIMES, PRESENCE_OVERDUE, PRESENCE_REPEATS, STATES_PER_S, THICKEN, THIN,
+};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 
@@ -49,6 +52,8 @@ pub(crate) struct Presences {
     /// A state without news is passed on if it is newer by this than the one that was passed on before, s. So each drone's state comes
     /// once in this time, and travels on at once. What was not heard for longer, because frames were lost, is repeated.
     period_s: f64,
+    /// By how much that time is longer now, because more is due than may be said. No unit.
+    thinning: f64,
     /// Whether it passes states on. Otherwise it keeps none.
     open: bool,
     /// By drone; empty unless it passes states on.
@@ -68,7 +73,18 @@ impl Presences {
         let repeat_s = params.repeat_period_s;
         let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
         let drones = params.drones.max(1);
-        Self { me, drones, repeat_s, period_s, open: false, told: Vec::new(), known: 0, last_new: start, turn: start }
+        Self {
+            me,
+            drones,
+            repeat_s,
+            period_s,
+            thinning: 1.0,
+            open: false,
+            told: Vec::new(),
+            known: 0,
+            last_new: start,
+            turn: start,
+        }
     }
 
     /// When a drone was last heard of for the first time.
@@ -128,45 +144,62 @@ impl Presences {
         if now < self.turn || frames == 0 {
             return;
         }
-        let period_s = self.period_s;
-        let mut due: BTreeMap<Kind, Vec<(u32, u32, DroneId)>> = BTreeMap::new();
-        // Drones close to each other begin at different states, so that they do not all say the same at one time.
         let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
-        let first = (draw % u64::from(self.drones)) as u32;
+        let due = self.due(k, now, (draw % u64::from(self.drones)) as u32);
+        let chunks = due.iter().flat_map(|(kind, drones)| drones.chunks(MAX_PRESENT).map(move |chunk| (kind, chunk)));
+        let mut chunks: Vec<(&Kind, &[Due])> = chunks.collect();
+        // Word that has to wait at each hop is old when it comes; less of it comes sooner.
+        let change = if chunks.len() > BACKLOG { THIN } else { THICKEN };
+        self.thinning = (self.thinning * change).clamp(1.0, MAX_THINNING);
+        if chunks.len() <= frames {
+            self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
+        }
+        // No kind has to wait until all others are said.
+        chunks.sort_unstable_by_key(|(_, chunk)| chunk.first().copied());
+        for (&(obeyed, group, term), chunk) in chunks.into_iter().take(frames) {
+            let mut presence = Presence { obeyed, group, term, ..Presence::default() };
+            for (entry, due) in presence.drones.iter_mut().zip(chunk) {
+                let (Some(pose), Some(told)) = (k.peers().last(due.drone), self.told.get_mut(due.drone.index())) else {
+                    continue;
+                };
+                *entry = present(due.drone, &pose.pose());
+                presence.count += 1;
+                told.cover(now, entry.stamp);
+            }
+            say.push(Message::Presence(presence));
+        }
+    }
+
+    /// The states that are due, by what their drones have in common, the most urgent first. `first`: the drone that comes first of those
+    /// that are equally urgent. Drones close to each other begin at different ones, so that they do not all say the same at one time.
+    fn due(&self, k: &Knowledge, now: SimTime, first: u32) -> BTreeMap<Kind, Vec<Due>> {
+        let period_s = self.period_s * self.thinning;
+        let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();
         for (told, id) in self.told.iter().zip((0..).map(DroneId)).filter(|(told, _)| told.known) {
-            let overdue = told.left > 0 || now.since(told.covered) >= PRESENCE_OVERDUE * period_s;
+            let silent_s = now.since(told.covered);
+            let overdue = told.left > 0 || silent_s >= PRESENCE_OVERDUE * period_s;
             if let Some(pose) = k.peers().last_of_living(id, now)
                 && (overdue || pose.stamp().since(told.said) >= period_s)
             {
-                due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push((
-                    NEWS_TIMES - told.left.min(NEWS_TIMES),
-                    (id.0 + self.drones - first) % self.drones,
-                    id,
-                ));
+                let waits = Reverse((silent_s / period_s) as u32);
+                let turn = (id.0 + self.drones - first) % self.drones;
+                let one = Due { waits, turn, drone: id };
+                due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push(one);
             }
         }
-        let needed: usize = due.values().map(|drones| drones.len().div_ceil(MAX_PRESENT)).sum();
-        if needed <= frames {
-            self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
-        }
-        let mut left = frames;
-        for ((obeyed, group, term), mut drones) in due {
-            drones.sort_unstable();
-            for chunk in drones.chunks(MAX_PRESENT).take(left) {
-                let mut presence = Presence { obeyed, group, term, ..Presence::default() };
-                for (entry, &(_, _, id)) in presence.drones.iter_mut().zip(chunk) {
-                    let (Some(pose), Some(told)) = (k.peers().last(id), self.told.get_mut(id.index())) else {
-                        continue;
-                    };
-                    *entry = present(id, &pose.pose());
-                    presence.count += 1;
-                    told.cover(now, entry.stamp);
-                }
-                say.push(Message::Presence(presence));
-                left -= 1;
-            }
-        }
+        due.values_mut().for_each(|drones| drones.sort_unstable());
+        due
     }
+}
+
+/// A state that is due, in the order of urgency.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Due {
+    /// For how long the neighbourhood has not heard of the drone, in periods. News that was never said waits since the start.
+    waits: Reverse<u32>,
+    /// Its place among those that wait as long.
+    turn: u32,
+    drone: DroneId,
 }
 
 /// A beacon as it is passed on.

@@ -12,6 +12,7 @@
 //!   that are due together share a frame.
 //! - The states of drones are collected, so that a frame holds several.
 
+use crate::beacons::Beacon;
 use crate::beats::Beats;
 use crate::knowledge::Knowledge;
 use crate::news::News;
@@ -21,7 +22,7 @@ use crate::presences::Presences;
 use crate::relay_pace::RelayPace;
 use crate::relayed_facts::RelayedFacts;
 use crate::tuning::{
-    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, SETTLED_S, UNSETTLED_S, WIDE_S,
+    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, REACHED, SETTLED_S, UNSETTLED_S, WIDE_S,
 };
 use skein_protocol::payload::{Leadership, Pose};
 use skein_protocol::{DroneId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
@@ -37,8 +38,10 @@ pub(crate) struct Relays {
     repeat_s: f64,
     /// Where this drone is, world frame, m.
     position: Vec2,
-    /// A drone within this distance is heard by much the same drones as this one, m.
-    near_m: f64,
+    /// Distance within which it hears most beacons, m.
+    reach_m: f64,
+    /// Distances of the drones that were heard last, m: kept for their memory only.
+    distances_m: Vec<f64>,
     /// Since when some neighbour hears other drones than this one.
     differs: Option<SimTime>,
     /// Whether this drone passes messages on.
@@ -72,7 +75,8 @@ impl Relays {
             start: params.start,
             repeat_s: params.repeat_period_s,
             position: Vec2::zeros(),
-            near_m: 0.0,
+            reach_m: 0.0,
+            distances_m: Vec::new(),
             differs: None,
             wide: false,
             crowded: false,
@@ -99,14 +103,14 @@ impl Relays {
         self.wide
     }
 
-    /// Distance to the farthest drone that this drone hears without a relay, m; `None` if all living drones hear each other.
+    /// Distance within which this drone hears others without a relay, m; `None` if all living drones hear each other.
     pub(crate) fn reach_m(&self) -> Option<f64> {
-        self.wide.then_some(self.near_m / NEAR)
+        self.wide.then_some(self.reach_m)
     }
 
     /// Whether a drone hears much the same drones as this one: it is close.
     pub(crate) fn is_near(&self, k: &Knowledge, other: DroneId) -> bool {
-        k.peers().last(other).is_some_and(|pose| (pose.position() - self.position).norm() <= self.near_m)
+        k.peers().last(other).is_some_and(|pose| (pose.position() - self.position).norm() <= self.near_m())
     }
 
     /// Whether further drones may still become known, so that it is too early for a first claim.
@@ -124,18 +128,14 @@ impl Relays {
         }
         self.position = own.position;
         let mut differs = false;
-        let (mut near_m, mut far_m) = (f64::INFINITY, 0.0_f64);
         let (term, scope) = (k.election().obeyed(), k.election().scope());
         self.lags = false;
         for (_, pose) in k.peers().direct(now) {
-            let away_m = (pose.position() - own.position).norm();
-            (near_m, far_m) = (near_m.min(away_m), far_m.max(away_m));
             // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
             differs |= pose.hears() != 0 && pose.hears() != mine;
             self.lags |= pose.term() < term && scope.contains(pose.group());
         }
-        self.near_m = NEAR * far_m;
-        self.crowded = near_m <= self.near_m;
+        self.measure_reach(k, now, beacon_s);
         self.differs = differs.then(|| self.differs.unwrap_or(now));
         let patience_s = WIDE_S.max(3.0 * beacon_s) + 2.0 * k.peers().delay_s();
         let first = !k.election().obeyed().is_some();
@@ -152,6 +152,24 @@ impl Relays {
             self.facts.forget(now);
             self.forgets = now.after(FORGET_S);
         }
+    }
+
+    /// Measures how far this drone hears: most of the drones whose last beacon it heard are not farther away. Now and then a beacon is
+    /// heard from a drone that is several times as far away.
+    fn measure_reach(&mut self, k: &Knowledge, now: SimTime, beacon_s: f64) {
+        let away_m = |pose: Beacon<'_>| (pose.position() - self.position).norm();
+        self.distances_m.clear();
+        self.distances_m.extend(k.peers().heard_within(now, beacon_s).map(|(_, pose)| away_m(pose)));
+        let last = (REACHED * self.distances_m.len() as f64).ceil() as usize;
+        let Some(last) = last.checked_sub(1) else { return };
+        let (_, reach_m, _) = self.distances_m.select_nth_unstable_by(last, f64::total_cmp);
+        self.reach_m = *reach_m;
+        self.crowded = self.distances_m.iter().any(|away_m| *away_m <= self.near_m());
+    }
+
+    /// A drone within this distance is heard by much the same drones as this one, m.
+    fn near_m(&self) -> f64 {
+        NEAR * self.reach_m
     }
 
     /// Counts the drones that share the bandwidth with this one, and sets its part accordingly.

@@ -86,8 +86,12 @@ pub(crate) const NEAR_REDUNDANCY: u32 = 2;
 /// A drone that was silent in this many turns because drones close to it had said the message says it in the next one: it may be
 /// heard by drones that do not hear those. No unit. 8. By hand.
 pub(crate) const MAX_SILENT_TURNS: u32 = 8;
-/// A drone is close if it is nearer than this part of the distance of the farthest neighbour. No unit. 0.5. By hand.
-pub(crate) const NEAR: f64 = 0.5;
+/// The nearest of the drones whose last beacon was heard, up to this share, are within the range of a radio. No unit. 0.75. By hand: a
+/// beacon that is heard by chance from far away does not count.
+pub(crate) const REACHED: f64 = 0.75;
+/// A drone is close if it is nearer than this part of that range. No unit. 0.6. By hand: of a radio with a hard limit, that is half of the
+/// limit, because some drones that are heard are beyond the range as it is measured.
+pub(crate) const NEAR: f64 = 0.6;
 /// A drone passes messages on once a neighbour has heard other drones than it does for this long, s. At least three beacons,
 /// and twice the message delay is added. 0.5. By hand: longer than a crash is noticed by some and not by others.
 pub(crate) const WIDE_S: f64 = 0.5;
@@ -118,8 +122,8 @@ pub(crate) const OLDEST_S: f64 = 300.0;
 /// Most frames that a drone passes on in one tick. 4. By hand.
 pub(crate) const MAX_RELAYED_PER_TICK: usize = 4;
 /// Greatest share of a limited bandwidth that the states, plans, assignments and rows of arrivals take that drones pass on. No unit.
-/// 0.25. Beacons take another quarter. By hand.
-pub(crate) const RELAY_SHARE: f64 = 0.25;
+/// 0.5. Beacons take another quarter at most. By hand.
+pub(crate) const RELAY_SHARE: f64 = 0.5;
 /// Greatest share of a limited bandwidth that the messages of leaders take that drones pass on. No unit. 0.15. By hand.
 pub(crate) const BEAT_SHARE: f64 = 0.15;
 /// Greatest share of a limited bandwidth that one leader's assignments take, and that its rows of arrivals take. No unit. 0.05. By hand.
@@ -142,6 +146,15 @@ pub(crate) const RELAYED_TIMEOUTS: f64 = 4.0;
 /// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 320: swarms of
 /// more than 512 drones repeat states less often, so that what a drone hears does not grow with the swarm. By hand.
 pub(crate) const STATES_PER_S: f64 = 320.0;
+/// While more frames of states than this are due, a drone passes states on less often. 4. Chosen, with the next two, from the first 45 s of
+/// `scenarios/hard/wider-than-radio.toml` with 300 drones: how old the states of others are.
+pub(crate) const BACKLOG: usize = 4;
+/// Factor by which the time between two states of a drone grows with each turn in which more are due. No unit. 1.05. See [`BACKLOG`].
+pub(crate) const THIN: f64 = 1.05;
+/// Factor by which it falls with each turn in which no more are due. No unit. 0.95. See [`BACKLOG`].
+pub(crate) const THICKEN: f64 = 0.95;
+/// Greatest product of these factors. No unit. 8: with the default period 13 s. By hand.
+pub(crate) const MAX_THINNING: f64 = 8.0;
 /// A drone heard directly within this time needs no relay, s. 1. By hand: several beacons.
 pub(crate) const DIRECT_S: f64 = 1.0;
 /// No first claim is made while further drones became known within this time, s. 0.6. By hand: three hops.

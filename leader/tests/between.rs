@@ -104,21 +104,26 @@ fn a_swarm_that_has_flown_as_far_as_its_destination_closes_up_at_once() {
     assert!(groups(&swarm).iter().all(|(.., phase)| *phase == Phase::Reform));
 }
 
-/// A column that is longer than its radio reaches is split before a wall. Word of its assignments travels more slowly than that of the
-/// new leaders.
-#[test]
-fn a_long_chain_is_split_by_one_plan_and_each_part_has_one_leader() {
-    const LENGTH: u32 = 60;
-    let mut swarm = Swarm::new(DEFAULT, Air { seed: 5, loss: 0.05, ..Air::default() }, LENGTH as usize);
+/// A column of this many drones, which hear three others to each side, over a channel of this bandwidth in bytes/s. Its drones do not all
+/// fly on one line.
+fn long_chain(length: u32, seed: u64, bandwidth_bytes_per_s: f64) -> Swarm {
+    let mut swarm = Swarm::new(DEFAULT, Air { seed, loss: 0.05, ..Air::default() }, length as usize);
     swarm.reach = 3;
     let machine = |me| {
-        let mut params = params(&DEFAULT, LENGTH, me, 1, SimTime::ZERO);
+        let mut params = params(&DEFAULT, length, me, 1, SimTime::ZERO);
         params.channel =
-            ChannelParams { bandwidth_bytes_per_s: 100_000.0, carrier_sense_m: 300.0, drones: 2 * swarm.reach as u32 };
+            ChannelParams { bandwidth_bytes_per_s, carrier_sense_m: 300.0, drones: 2 * swarm.reach as u32 };
         Some(Leading::new(&params))
     };
-    swarm.drones = (0..LENGTH).map(machine).collect();
+    swarm.drones = (0..length).map(machine).collect();
     swarm.own.iter_mut().zip(0..).for_each(|(own, drone)| own.position.y = 7.0 * f64::from(drone % 3 - 1));
+    swarm
+}
+
+/// Word of its assignments travels more slowly along the column than that of the new leaders.
+#[test]
+fn a_long_chain_is_split_by_one_plan_and_each_part_has_one_leader() {
+    let mut swarm = long_chain(60, 5, 100_000.0);
     swarm.run(10.0);
     swarm.scenery = vec![wall(1, swarm.own[0].position.x + 90.0)];
     swarm.run(40.0);
@@ -128,4 +133,21 @@ fn a_long_chain_is_split_by_one_plan_and_each_part_has_one_leader() {
     let parts: BTreeSet<_> = side.iter().map(|(_, l)| (l.group(), l.scope(), l.term())).collect();
     assert_eq!((plans.len(), parts.len(), elections), (1, 2, 3), "{plans:?} {parts:?}");
     assert!(parts.iter().all(|(group, scope, _)| group == scope && *group != GroupId::ALL), "{parts:?}");
+}
+
+/// A narrow channel has no room for all states that are due. No drone is forgotten for that reason, whichever plan it obeys.
+#[test]
+fn all_drones_are_heard_of_where_bandwidth_is_short() {
+    for (bandwidth_bytes_per_s, settle_s, limit_s) in [(100_000.0, 20.0, 8.0), (30_000.0, 60.0, 12.0)] {
+        let mut swarm = long_chain(60, 6, bandwidth_bytes_per_s);
+        swarm.run(settle_s);
+        for _ in 0..40 {
+            swarm.run(1.0);
+            let mut ages_s = Vec::new();
+            swarm.drones[0].as_ref().unwrap().peers().ages_s(swarm.now(), &mut ages_s);
+            let oldest_s = ages_s.iter().copied().fold(0.0, f64::max);
+            assert!(ages_s.len() == 59 && oldest_s < limit_s, "{bandwidth_bytes_per_s} bytes/s: {ages_s:?}");
+        }
+        assert_eq!(swarm.disunion(0), None);
+    }
 }

@@ -4,8 +4,10 @@
 mod swarm;
 
 use bytemuck::Zeroable;
+use skein_leader::channel_params::ChannelParams;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
+use skein_leader::params::LeadingParams;
 use skein_protocol::payload::{Assignment, Leadership, MAX_LISTED, MAX_PRESENT, Plan, Pose, Presence, Present};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, PlanStamp, SimTime, Vec2};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +25,12 @@ struct Middle {
 
 impl Middle {
     fn new() -> Self {
-        Self { leading: Leading::new(&params(&DEFAULT, DRONES, 1, 1, SimTime::ZERO)), tick: 0 }
+        Self::over(ChannelParams::default())
+    }
+
+    fn over(channel: ChannelParams) -> Self {
+        let params = LeadingParams { channel, ..params(&DEFAULT, DRONES, 1, 1, SimTime::ZERO) };
+        Self { leading: Leading::new(&params), tick: 0 }
     }
 
     fn now(&self) -> SimTime {
@@ -211,4 +218,43 @@ fn states_travel_on_at_once() {
     assert!(delays.len() >= 18, "{delays:?}");
     let most_s = delays.iter().copied().fold(0.0, f64::max);
     assert!(most_s < 0.4, "{delays:?}");
+}
+
+/// Drones that obey the newest plan do not wait for word of all that still obey an older one.
+#[test]
+fn word_of_a_new_plan_does_not_wait_for_all_others() {
+    // Some five frames per second, for 598 states.
+    let mut middle = Middle::over(ChannelParams { bandwidth_bytes_per_s: 3_000.0, ..ChannelParams::default() });
+    for _ in 0..60 {
+        middle.step();
+    }
+    for _ in 0..30 {
+        middle.hear_of(3..DRONES, PlanStamp::default());
+        (0..50).for_each(|_| drop(middle.step()));
+    }
+    middle.hear_of(500..501, PLAN);
+    let is_news = |message: &Message| match message {
+        Message::Presence(presence) => presence.obeyed == PLAN && presence.present()[0].drone == DroneId(500),
+        _ => false,
+    };
+    let ticks = (0..500).position(|_| middle.step().iter().any(is_news));
+    assert!(ticks.is_some_and(|ticks| ticks < 100), "{ticks:?} ticks");
+}
+
+/// A beacon that comes from far away by chance does not make the drones on the way there close ones.
+#[test]
+fn a_drone_that_is_heard_by_chance_does_not_count_for_the_range() {
+    let mut middle = Middle::new();
+    for tick in 0..400 {
+        middle.step();
+        let stamp = middle.now();
+        let heard = (3..11).map(|drone| (drone, -40.0 - 30.0 * (f64::from(drone) - 7.0)));
+        let by_chance = (tick % 5 == 0).then_some((11 + tick % 40, -1500.0));
+        for (source, x) in heard.chain(by_chance) {
+            let common = Pose { stamp, position_m: [x, 0.0, 50.0], group: GroupId::ALL, term: TERM, ..Pose::zeroed() };
+            middle.hear(source, Message::Pose(Pose { hears: source, incarnation: 1, obeyed: PLAN, ..common }));
+        }
+    }
+    let reach_m = middle.leading.reach_m().unwrap();
+    assert!((60.0..=120.0).contains(&reach_m), "{reach_m}");
 }

@@ -237,3 +237,30 @@ fn repetitions_of_its_heartbeats_do_not_keep_a_dead_leader_alive() {
         }
     }
 }
+
+/// A drone that falls silent again and again leaves the formation and joins it each time, but less and less often.
+#[test]
+fn members_that_come_and_go_do_not_make_a_leader_plan_all_the_time() {
+    let mut swarm = Swarm::new(DEFAULT, Air { seed: 9, ..Air::default() }, 8);
+    swarm.run(3.0);
+    let epoch = |s: &Swarm| s.drones[0].as_ref().unwrap().stamp().epoch;
+    let before = epoch(&swarm);
+    let mut planned_s = Vec::new();
+    for tick in 0..3000 {
+        // Each of them is heard for half a second and silent for two, one after the other.
+        (4..8).for_each(|drone| swarm.frozen[drone] = (tick / 25 + drone) % 5 != 0);
+        let last = epoch(&swarm);
+        swarm.step().unwrap();
+        if epoch(&swarm) > last {
+            planned_s.push((swarm.now().secs() * 100.0).round() / 100.0);
+        }
+    }
+    assert!(
+        planned_s.first().is_some_and(|first_s| *first_s < 6.0),
+        "the first change is planned for at once: {planned_s:?}"
+    );
+    assert!(epoch(&swarm) - before <= 14, "{planned_s:?}");
+    (4..8).for_each(|drone| swarm.frozen[drone] = false);
+    swarm.run(12.0);
+    assert_eq!(swarm.disunion(0), None);
+}
