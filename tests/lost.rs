@@ -258,10 +258,11 @@ fn a_run_that_does_not_fit_into_shared_memory_is_refused_with_both_numbers() {
 /// A run that has started does not need another page.
 #[test]
 fn a_full_shared_memory_does_not_end_a_run_that_has_started() {
-    for clock in ["realtime:20", "lockstep"] {
+    // In lockstep the run must last until all is filled and the observer has looked.
+    for (clock, dt_s) in [("realtime:20", 0.005), ("lockstep", 0.001)] {
         let place = Place::new();
         let script = format!(
-            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s=0.005 & \
+            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} & \
              while [ ! -e out/processes.json ]; do sleep 0.01; done; sleep 0.5; \
              dd if=/dev/zero of=/dev/shm/others bs=4k 2>dd.txt; cp dd.txt filled.txt; \
              \"$1\" topic echo senses --count 1 >observer.txt 2>&1; wait $!"

@@ -151,3 +151,30 @@ fn all_drones_are_heard_of_where_bandwidth_is_short() {
         assert_eq!(swarm.disunion(0), None);
     }
 }
+
+/// Where a chain was cut in two and heals, word of the drones that obey a later term comes before that term's claim does. The leader of
+/// the earlier term waits for it.
+#[test]
+fn a_leader_does_not_outbid_a_claim_that_is_under_way() {
+    let mut swarm = long_chain(40, 7, 100_000.0);
+    swarm.run(10.0);
+    swarm.scenery = vec![wall(1, swarm.own[0].position.x + 90.0)];
+    let closes = |s: &Swarm| {
+        let formed =
+            |l: &Leading| l.obeyed().is_some_and(|b| b.plan.phase() == Phase::Reform && b.plan.group == GroupId::ALL);
+        s.disunion(0).or_else(|| (!s.side(0).iter().all(|(_, l)| formed(l))).then(|| "not closed".to_owned()))
+    };
+    swarm.until(400.0, closes).unwrap();
+    swarm.run(5.0);
+    for cut in [12, 20, 28] {
+        swarm.sides = (0..40).map(|drone| u8::from(drone >= cut)).collect();
+        swarm.run(20.0);
+        let elections = |s: &Swarm| s.watch.as_ref().unwrap().leaders.len();
+        let (healed, before) = (swarm.now().secs(), elections(&swarm));
+        swarm.sides = vec![0; 40];
+        swarm.until(30.0, |s| s.disunion(0)).unwrap();
+        swarm.run(20.0);
+        println!("cut at {cut}: healed {healed}, {} elections", elections(&swarm) - before);
+        assert!(elections(&swarm) <= before + 1, "cut at {cut}: {:?}", swarm.watch.as_ref().unwrap().leaders);
+    }
+}
