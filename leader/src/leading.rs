@@ -341,7 +341,7 @@ impl Leading {
         self.follow_part(now);
         let (closer, delay_s) = (self.knowledge.closer(now, own), self.peers().delay_s());
         say.extend(self.knowledge.elect(now, Input::Tick { closer, delay_s }).map(Message::Leadership));
-        if let Some(input) = self.roles.decide(&self.knowledge, now, own) {
+        if let Some(input) = self.roles.decide(&self.knowledge, &self.relays, now, own) {
             say.extend(self.knowledge.elect(now, input).map(Message::Leadership));
         }
     }

@@ -22,10 +22,11 @@ use crate::presences::Presences;
 use crate::relay_pace::RelayPace;
 use crate::relayed_facts::RelayedFacts;
 use crate::tuning::{
-    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, REACHED, SETTLED_S, UNSETTLED_S, WIDE_S,
+    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, REACHED, RELAY_MEMORY_S, SETTLED_S, UNSETTLED_S,
+    WIDE_S,
 };
 use skein_protocol::payload::{Leadership, Pose};
-use skein_protocol::{DroneId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
 
 /// What one drone passes on. Memory is bounded by the size of the swarm.
 #[derive(Clone, Debug, PartialEq)]
@@ -235,6 +236,11 @@ impl Relays {
     /// The newest message of each group's leader, from itself or passed on, that was news within the last `within_s`.
     pub(crate) fn newest(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = &Leadership> {
         self.beats.newest(now, within_s)
+    }
+
+    /// Whether this drone has heard of late that this term is for a part of the swarm.
+    pub(crate) fn is_of_part(&self, now: SimTime, term: Ballot) -> bool {
+        self.newest(now, RELAY_MEMORY_S).any(|l| l.ballot == term && l.group != GroupId::ALL)
     }
 
     /// Notes a message of a term. Returns whether it is news.

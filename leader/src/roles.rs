@@ -6,6 +6,7 @@ use crate::member::Member;
 use crate::onward;
 use crate::own_state::OwnState;
 use crate::params::Between;
+use crate::relays::Relays;
 use crate::tuning::{BEHIND_S, LEFT_OUT_S};
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
 
@@ -41,18 +42,19 @@ impl Roles {
     }
 
     /// The claim or the transfer of leadership that is due now. Call once per tick.
-    pub(crate) fn decide(&mut self, k: &Knowledge, now: SimTime, own: &OwnState) -> Option<Input> {
+    pub(crate) fn decide(&mut self, k: &Knowledge, relays: &Relays, now: SimTime, own: &OwnState) -> Option<Input> {
         if std::mem::take(&mut self.plan_conflict_seen) && k.election().leads() {
             return Some(Input::Claim(k.election().scope()));
         }
-        let claim = self.claimable(k, now, own).or_else(|| self.scope_of_deaf_leader(k, now, own)).map(Input::Claim);
+        let claim =
+            self.claimable(k, relays, now, own).or_else(|| self.scope_of_deaf_leader(k, now, own)).map(Input::Claim);
         claim.or_else(|| self.heir(k, now, own).map(Input::Transfer))
     }
 
     /// The group that this drone is to lead now although another leader may be healthy: its part of a split group, with an
     /// obstacle ahead; or the whole swarm, if it leads a part, no drone has an obstacle ahead any more, and groups do not go on
     /// by themselves.
-    fn claimable(&mut self, k: &Knowledge, now: SimTime, own: &OwnState) -> Option<GroupId> {
+    fn claimable(&mut self, k: &Knowledge, relays: &Relays, now: SimTime, own: &OwnState) -> Option<GroupId> {
         let (scope, group) = (k.election().scope(), k.election().group());
         let me = k.myself(own);
         let part = scope != group && scope.contains(group) && part_has_ahead(k, now, &me);
@@ -66,18 +68,22 @@ impl Roles {
         // Plans and claims of the drones with a lower rank must have time to arrive.
         let wait_s = k.election().wait_s().max(2.0 * k.peers().delay_s()) * rank as f64;
         let claim_part = held(&mut self.part, part, now, wait_s);
-        let claim_whole = held(&mut self.whole, whole && !part, now, wait_s) || self.claims_torn(k, now);
+        let claim_whole = held(&mut self.whole, whole && !part, now, wait_s) || self.claims_torn(k, relays, now);
         if claim_part { Some(group) } else { claim_whole.then_some(GroupId::ALL) }
     }
 
     /// Whether this leader of the whole swarm is to claim it anew: some drones left its formation for an obstacle that they learnt of
     /// only then, and are past it. They obey later terms, so they do not hear of this leader's plans any more. And they may wait for
-    /// drones that stand in slots before that obstacle. Leaders of parts that can claim the swarm do so before.
-    fn claims_torn(&mut self, k: &Knowledge, now: SimTime) -> bool {
+    /// drones that stand in slots before that obstacle. Leaders of parts that can claim the swarm do so before. In a swarm that is wider
+    /// than its radio's range, word of the drones that obey a term may come before that term's own messages: then it may be a claim of the
+    /// whole swarm that is under way to this leader.
+    fn claims_torn(&mut self, k: &Knowledge, relays: &Relays, now: SimTime) -> bool {
         let (election, forms) =
             (k.election(), k.ledger().obeyed().is_some_and(|bundle| is_formation_of_all(&bundle.plan)));
         let torn = election.leads() && election.scope() == GroupId::ALL && forms && {
-            let gone = k.living_peers(now).filter(|m| k.term_of(m.id) > election.obeyed());
+            let is_of_part = |term| !relays.is_wide() || relays.is_of_part(now, term);
+            let gone = k.living_peers(now).map(|m| (k.term_of(m.id), m)).filter(|(term, _)| *term > election.obeyed());
+            let gone = gone.filter(|(term, _)| is_of_part(*term)).map(|(_, m)| m);
             gone.clone().next().is_some() && !has_ahead(k, gone)
         };
         let leaders = || k.peers().living(now).filter(|(_, pose)| pose.leads()).count();
