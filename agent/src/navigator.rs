@@ -28,7 +28,8 @@ const MOVED_M: f64 = 10.0;
 /// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
 /// rounding errors.
 const TIGHT_M: f64 = 0.02;
-/// A path with the planning distance that is longer than the path with the least distance by this factor is a long detour.
+/// A path with the planning distance that is longer than the path with the least distance by this factor is a long detour. So is a path
+/// with the least distance that is longer than a straight flight by this factor.
 const DETOUR_FACTOR: f64 = 1.25;
 /// A search that found no path is repeated after this many ticks.
 const RETRY_TICKS: u64 = 50;
@@ -107,6 +108,12 @@ impl Navigator {
     #[must_use]
     pub fn is_clear(&self, from: Vec2, to: Vec2) -> bool {
         self.wide.is_free(from, to)
+    }
+
+    /// Whether a path that keeps the clearance from all known obstacles is not much longer than a straight flight. World frame, m.
+    #[must_use]
+    pub fn is_short_way(&self, from: Vec2, to: Vec2) -> bool {
+        self.tight.path(from, to).is_some_and(|(_, length_m)| length_m <= DETOUR_FACTOR * (to - from).norm())
     }
 
     /// Length that is left of the path that the drone flies, m; `None` if it flies none.
@@ -233,6 +240,17 @@ mod tests {
         let mut navigator = Navigator::new(1.26, 1.26);
         navigator.learn(1, [&wall].into_iter());
         assert!(flown_m(&mut navigator, Vec2::new(200.0, 50.0), Vec2::new(386.9, 0.0)) < 210.0);
+    }
+
+    #[test]
+    fn the_way_along_a_wall_is_short_and_the_way_round_it_is_not() {
+        let wall = ConvexShape::rectangle(Vec2::new(144.0, -115.0), Vec2::new(5.0, 80.0), 0.0).unwrap();
+        let mut navigator = Navigator::new(15.0, 20.0);
+        navigator.learn(1, [&wall].into_iter());
+        let beside = Vec2::new(123.95, -156.0);
+        assert!(!navigator.is_free(beside, Vec2::new(127.0, -229.0)));
+        assert!(navigator.is_short_way(beside, Vec2::new(127.0, -229.0)));
+        assert!(!navigator.is_short_way(beside, Vec2::new(164.0, -156.0)));
     }
 
     #[test]

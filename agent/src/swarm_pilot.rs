@@ -57,6 +57,8 @@ pub struct SwarmPilot {
     altitude: Altitude,
     navigator: Navigator,
     detour: Detour,
+    /// Where the route first turns, if a drone that detours flies there. World frame, m.
+    turn: Option<Vec2>,
     reaction: ReactionDelay,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
@@ -96,6 +98,7 @@ impl SwarmPilot {
                 params.planner.routes.planning_distance_m,
             ),
             detour: Detour::default(),
+            turn: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             stepped: None,
             predictor: StatePredictor::default(),
@@ -282,9 +285,10 @@ impl SwarmPilot {
         }
     }
 
-    /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route. `route_m`: length
-    /// of the planned route that is left. A detour that was begun is kept while it is shorter than that and
-    /// the route does not keep the planning distance.
+    /// The direction of the shortest path to the end of the planned route, if a known obstacle blocks the route. If only the way to where
+    /// the route first turns is blocked, and the way round is short, the direction of that way: a drone beside a wall flies along it to
+    /// its own route, and not round the wall's other end. `route_m`: length of the planned route that is left. A detour that was begun is
+    /// kept while it is shorter than that and the route does not keep the planning distance.
     fn detour(&mut self, senses: &Senses<'_>, route_m: f64) -> Option<Vec2> {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
@@ -294,8 +298,11 @@ impl SwarmPilot {
             let shorter = || navigator.left_m(position).is_some_and(|left_m| left_m < route_m);
             let near = || route.end_if_blocked(position, |a, b| navigator.is_clear(a, b)).is_some();
             self.detour.look(view, self.params.safety.clearance_m, || shorter() && near());
+            let turn = route.turn_if_blocked(position, |a, b| navigator.is_free(a, b));
+            self.turn = turn.filter(|turn| navigator.is_short_way(position, *turn));
         }
-        let target = self.detour.to()?;
+        let end = self.detour.to()?;
+        let target = self.turn.unwrap_or(end);
         let next = match self.navigator.head(senses.tick, senses.position(), target) {
             Heading::Straight => target,
             Heading::Via(corner) => corner,
