@@ -214,12 +214,15 @@ impl RouteFollower {
         self.corridor.as_ref().map(Corridor::target)
     }
 
-    /// Where the first leg of the route ends (world frame, m), if that leg is not free; `None` if it is, or nothing lies ahead.
+    /// Where the first leg of the route ends (world frame, m), if that leg alone is not free; otherwise `None`.
     #[must_use]
     pub fn turn_if_blocked(&self, position: Vec2, is_free: impl Fn(Vec2, Vec2) -> bool) -> Option<Vec2> {
-        let mut first = None;
-        self.corridor.as_ref()?.visit_legs(position, |from, to| first = first.or(Some((from, to))));
-        first.filter(|&(from, to)| !is_free(from, to)).map(|(_, to)| to)
+        let (mut turn, mut free) = (None, true);
+        self.corridor.as_ref()?.visit_legs(position, |from, to| match turn {
+            None => turn = Some((to, is_free(from, to))),
+            Some(_) => free = free && is_free(from, to),
+        });
+        turn.filter(|(_, first_free)| !first_free && free).map(|(to, _)| to)
     }
 
     /// Where the route ends (world frame, m), if a leg of it is not free; `None` if all are, or nothing lies ahead.

@@ -293,16 +293,15 @@ impl SwarmPilot {
         let period = ((ROUTE_CHECK_S / self.params.dt_s) as u64).max(1);
         if self.update_map() || senses.tick.is_multiple_of(period) {
             let (route, navigator, position) = (&self.route, &self.navigator, senses.position());
+            let turn = route.turn_if_blocked(position, |a, b| navigator.is_free(a, b));
+            self.turn = turn.filter(|turn| navigator.is_short_way(position, *turn));
             let blocked = route.end_if_blocked(position, |a, b| navigator.is_free(a, b)).is_some();
-            let view = route.end().map(|end| RouteView { end, route_m, blocked });
+            let view = route.end().map(|end| RouteView { end, route_m, blocked: blocked && self.turn.is_none() });
             let shorter = || navigator.left_m(position).is_some_and(|left_m| left_m < route_m);
             let near = || route.end_if_blocked(position, |a, b| navigator.is_clear(a, b)).is_some();
             self.detour.look(view, self.params.safety.clearance_m, || shorter() && near());
-            let turn = route.turn_if_blocked(position, |a, b| navigator.is_free(a, b));
-            self.turn = turn.filter(|turn| navigator.is_short_way(position, *turn));
         }
-        let end = self.detour.to()?;
-        let target = self.turn.unwrap_or(end);
+        let target = self.detour.to().or(self.turn)?;
         let next = match self.navigator.head(senses.tick, senses.position(), target) {
             Heading::Straight => target,
             Heading::Via(corner) => corner,
