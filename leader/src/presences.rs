@@ -5,6 +5,7 @@ use crate::news::News;
 use crate::params::LeadingParams;
 use crate::tuning::{
     BACKLOG, MAX_THINNING, NEWS_TIMES, PRESENCE_OVERDUE, PRESENCE_REPEATS, STATES_PER_S, THICKEN, THIN,
+    WAITS_PER_PERIOD,
 };
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
@@ -181,7 +182,7 @@ impl Presences {
             if let Some(pose) = k.peers().last_of_living(id, now)
                 && (overdue || pose.stamp().since(told.said) >= period_s)
             {
-                let waits = Reverse((silent_s / period_s) as u32);
+                let waits = Reverse((silent_s * WAITS_PER_PERIOD / self.period_s) as u32);
                 let turn = (id.0 + self.drones - first) % self.drones;
                 let one = Due { waits, turn, drone: id };
                 due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push(one);
@@ -195,7 +196,7 @@ impl Presences {
 /// A state that is due, in the order of urgency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Due {
-    /// For how long the neighbourhood has not heard of the drone, in periods. News that was never said waits since the start.
+    /// For how long the neighbourhood has not heard of the drone, in parts of a period. News that was never said waits since the start.
     waits: Reverse<u32>,
     /// Its place among those that wait as long.
     turn: u32,

@@ -146,6 +146,9 @@ pub(crate) const RELAYED_TIMEOUTS: f64 = 4.0;
 /// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 320: swarms of
 /// more than 512 drones repeat states less often, so that what a drone hears does not grow with the swarm. By hand.
 pub(crate) const STATES_PER_S: f64 = 320.0;
+/// Of the states that are due, those come first of which the neighbourhood has not heard for longest; differences of less than the period
+/// divided by this do not count, so that close drones do not all say the same. No unit. 8. By hand.
+pub(crate) const WAITS_PER_PERIOD: f64 = 8.0;
 /// While more frames of states than this are due, a drone passes states on less often. 4. Chosen, with the next two, from the first 45 s of
 /// `scenarios/hard/wider-than-radio.toml` with 300 drones: how old the states of others are.
 pub(crate) const BACKLOG: usize = 4;
