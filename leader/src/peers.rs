@@ -243,16 +243,19 @@ impl Peers {
 
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
-        let near = self.near.iter().filter_map(|&id| Some((id, self.place(id).ok()?)));
-        let direct = near.filter(move |&(_, place)| self.last[place].is_direct(now, self.timeout_s));
-        direct.map(|(id, place)| (id, self.beacons.get(place)))
+        self.near(move |peer| peer.is_direct(now, self.timeout_s))
     }
 
     /// The peers whose own beacon was heard within the last `within_s`, by id.
     pub(crate) fn heard_within(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
+        self.near(move |peer| now.since(peer.direct) <= within_s)
+    }
+
+    /// Those of the peers that may count as heard without a relay which do, by id.
+    fn near(&self, counts: impl Fn(&Peer) -> bool + Clone) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let near = self.near.iter().filter_map(|&id| Some((id, self.place(id).ok()?)));
-        let heard = near.filter(move |&(_, place)| now.since(self.last[place].direct) <= within_s);
-        heard.map(|(id, place)| (id, self.beacons.get(place)))
+        let near = near.filter(move |&(_, place)| counts(&self.last[place]));
+        near.map(|(id, place)| (id, self.beacons.get(place)))
     }
 
     /// What drone `me` says in [`Pose::hears`].
