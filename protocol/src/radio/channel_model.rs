@@ -138,7 +138,9 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.max(5000), ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig {
+            cases: ProptestConfig::default().cases.max(5000), failure_persistence: None, ..ProptestConfig::default()
+        })]
 
         #[test]
         fn a_frame_is_heard_if_the_number_is_below_the_share(
