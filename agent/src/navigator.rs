@@ -26,8 +26,9 @@ use skein_protocol::shape::ConvexShape;
 /// If the target moves by more than this, a new path is searched, m.
 const MOVED_M: f64 = 10.0;
 /// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
-/// rounding errors.
-const TIGHT_M: f64 = 0.02;
+/// rounding errors. Routes lead through gaps that leave more ([`skein_leader::routes::RouteParams::half_gap_m`]), so that a drone that is not
+/// exactly on its route does not take it for blocked.
+const TIGHT_M: f64 = 0.002;
 /// A path with the planning distance that is longer than the path with the least distance by this factor is a long detour. So is a path
 /// with the least distance that is longer than a straight flight by this factor.
 const DETOUR_FACTOR: f64 = 1.25;
@@ -240,6 +241,17 @@ mod tests {
         let mut navigator = Navigator::new(1.26, 1.26);
         navigator.learn(1, [&wall].into_iter());
         assert!(flown_m(&mut navigator, Vec2::new(200.0, 50.0), Vec2::new(386.9, 0.0)) < 210.0);
+    }
+
+    #[test]
+    fn a_route_through_the_narrowest_gap_is_free_beside_its_middle() {
+        let wall = |y: f64| ConvexShape::rectangle(Vec2::new(100.0, y), Vec2::new(10.0, 60.0), 0.0).unwrap();
+        let mut navigator = Navigator::new(15.0, 20.0);
+        navigator.learn(1, [&wall(75.0041), &wall(-75.0041)].into_iter());
+        for y_m in [-0.002, 0.0, 0.002] {
+            let (before, behind) = (Vec2::new(50.0, y_m), Vec2::new(200.0, y_m));
+            assert_eq!(navigator.head(0, before, behind), Heading::Straight, "{y_m} m beside the middle");
+        }
     }
 
     #[test]

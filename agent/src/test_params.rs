@@ -12,7 +12,7 @@ pub(crate) fn planner() -> PlannerParams {
         strategy: Strategy::PaperRule,
         speed_mps: 10.0,
         headway_s: 4.0,
-        routes: RouteParams { clearance_m: 15.0, planning_distance_m: 40.0 },
+        routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 40.0 },
         shape: Shape::Line,
         spacing_m: 40.0,
         reformation: Reformation::Identity,

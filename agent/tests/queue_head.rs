@@ -34,7 +34,8 @@ fn first_place(route: &RouteFollower) -> (u16, u16) {
 
 #[test]
 fn a_place_that_was_given_up_comes_back_with_the_next_plan_alone() {
-    let mut ledger = Ledger::new(DroneId(1), 4, RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 });
+    let mut ledger =
+        Ledger::new(DroneId(1), 4, RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 });
     let mut route = RouteFollower::new(DroneId(1), 0.0);
     route.give_up_place();
     hear_plan(&mut ledger, 1);

@@ -71,7 +71,7 @@ mod tests {
             strategy: Strategy::PaperRule,
             speed_mps: 10.0,
             headway_s: 4.0,
-            routes: RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 },
+            routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 },
             between: Between::CloseUp,
             shape: Shape::V,
             spacing_m: 40.0,

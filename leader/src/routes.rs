@@ -11,9 +11,11 @@ use skein_protocol::{ObstacleId, Vec2};
 /// Clearances of routes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RouteParams {
-    /// r_obs: least distance of a drone's centre from an obstacle, m. A gap wider than twice this is passable.
+    /// r_obs: least distance of a drone's centre from an obstacle, m.
     pub clearance_m: f64,
-    /// r_plan: distance at which paths are planned, m; at least `clearance_m`.
+    /// Least distance of a route from an obstacle, m: half the width of the narrowest passable gap, at least `clearance_m`.
+    pub half_gap_m: f64,
+    /// r_plan: distance at which paths are planned, m; at least `half_gap_m`.
     pub planning_distance_m: f64,
 }
 
@@ -273,7 +275,7 @@ fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<
     };
     let mut envelopes: Vec<Envelope> = valid.map(envelope).collect();
     envelopes.sort_by_key(|envelope| envelope.id);
-    let least_m = 2.0 * params.clearance_m;
+    let least_m = 2.0 * params.half_gap_m;
     let closed = |a: &Envelope, b: &Envelope| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
     let pair = |envelopes: &[Envelope]| {
         (0..envelopes.len())
@@ -324,13 +326,13 @@ fn ranks(keys: &[f64], before: impl Fn(usize, usize) -> bool) -> Vec<usize> {
 
 /// The envelopes beside a route, inflated by r_plan. Where the gap across the route is less than twice that, they are
 /// inflated by half of the gap, reduced by what the corners of the inflation stick out, so that walls never overlap. The
-/// least inflation is r_obs.
+/// least inflation is half the narrowest passable gap.
 fn walls(envelopes: &[Envelope], route: usize, params: &RouteParams) -> Vec<Wall> {
     let (right, left) = envelopes.split_at(route);
     let wall = |envelope: &Envelope, across: &[Envelope], side: Side| {
         let half_gap_m = across.iter().map(|other| envelope.gap(other).1 / 2.0).fold(f64::INFINITY, f64::min);
         let inscribed_m = (envelope.radius_m + half_gap_m) * inscribed() - envelope.radius_m;
-        let reach_m = params.planning_distance_m.min(inscribed_m.max(params.clearance_m));
+        let reach_m = params.planning_distance_m.min(inscribed_m.max(params.half_gap_m));
         Wall { side, outline: inflate(&envelope.core, envelope.radius_m + reach_m) }
     };
     let right_walls = right.iter().map(|envelope| wall(envelope, left, Side::Above));

@@ -9,7 +9,7 @@ use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 use std::fmt::Write;
 
-const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, planning_distance_m: 20.0 };
+const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 };
 
 fn rectangle(x: f64, y: f64, half_x: f64, half_y: f64) -> ConvexShape {
     ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(half_x, half_y), 0.0).unwrap()
@@ -78,6 +78,19 @@ fn a_gap_of_twice_the_clearance_is_closed() {
         route 0, 17 points: Below (70.0 -70.0)..(140.0 50.0)\n\
         route 1, 17 points: Above (70.0 -70.0)..(140.0 50.0)\n";
     assert_eq!(table(&[rectangle(110.0, 10.0, 10.0, 20.0), rectangle(100.0, -45.0, 10.0, 5.0)]), wanted);
+}
+
+#[test]
+fn a_gap_is_a_route_if_it_is_wider_than_the_narrowest_passable_one() {
+    let params = RouteParams { half_gap_m: 15.5, ..PARAMS };
+    let routes = |gap_m: f64| {
+        let shapes =
+            [rectangle(100.0, 20.0 + gap_m / 2.0, 10.0, 20.0), rectangle(100.0, -20.0 - gap_m / 2.0, 10.0, 20.0)];
+        Routes::new(&shapes.map(|shape| (ObstacleId(0), shape)), &params)
+    };
+    assert_eq!([routes(30.9).count(), routes(31.1).count()], [2, 3]);
+    // Beside the wall, on the side of another route, the gap is not open to a drone that keeps the clearance.
+    assert!(!routes(31.1).is_open(1, Vec2::new(100.0, 70.6)) && routes(31.1).is_open(1, Vec2::new(100.0, 70.5)));
 }
 
 #[test]

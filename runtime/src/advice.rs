@@ -49,7 +49,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
         slots_too_close(scenario),
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),
-        enclosed(&no_way),
+        enclosed(&no_way, 2.0 * scenario.half_gap_m()),
         beyond_the_margin(
             "the position that a drone reads of itself",
             (scenario.position_error_possible_m(), scenario.position_error_max_m()),
@@ -160,11 +160,11 @@ fn beyond_the_margin(what: &str, (possible, allowed): (f64, f64), (key, unit): (
     })
 }
 
-fn enclosed(drones: &[u32]) -> Option<String> {
+fn enclosed(drones: &[u32], gap_m: f64) -> Option<String> {
     let ids: Vec<String> = drones.iter().map(u32::to_string).collect();
     (!ids.is_empty()).then(|| {
         format!(
-            "obstacles with gaps of less than two avoidance.clearance_m enclose drone {} or the goal: the mission ends as stuck",
+            "obstacles whose gaps are narrower than {gap_m:.3} m, which a drone needs, enclose drone {} or the goal: the mission ends as stuck",
             ids.join(", ")
         )
     })
@@ -244,6 +244,6 @@ mod tests {
             })
             .concat();
         let caught = warned(&format!("[formation]\ndrones = 1\n{ring}"));
-        assert!(caught.contains("enclose drone 0"), "{caught}");
+        assert!(caught.contains("narrower than 30.008 m") && caught.contains("enclose drone 0"), "{caught}");
     }
 }

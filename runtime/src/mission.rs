@@ -232,7 +232,9 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         headway_s: avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps,
         routes: RouteParams {
             clearance_m: avoidance.clearance_m + scenario.sensors.obstacle_error_max_m,
-            planning_distance_m: avoidance.planning_distance_m + scenario.sensors.obstacle_error_max_m,
+            half_gap_m: scenario.half_gap_m(),
+            planning_distance_m: (avoidance.planning_distance_m + scenario.sensors.obstacle_error_max_m)
+                .max(scenario.half_gap_m()),
         },
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,

@@ -51,8 +51,22 @@ fn the_papers_rule_reaches_every_hard_scene() {
 /// Drones once turned to and fro before an obstacle, or two parts of a swarm waited for each other, until the time was over.
 #[test]
 fn no_drone_waits_or_turns_for_ever() {
-    for name in ["along-the-wall", "close-corners", "to-and-fro", "torn-formation"] {
+    for name in ["along-the-wall", "close-corners", "hardly-wide-enough", "to-and-fro", "torn-formation"] {
         assert_reached(name, "congestion-aware-paper");
+    }
+}
+
+/// The narrowest passable gap is 8 mm wider than twice the clearance. Drones fly round one that is narrower by a fifth of a millimetre, and
+/// through a wider one.
+#[test]
+fn a_gap_is_either_open_or_closed() {
+    for half_m in [15.002, 15.0039, 15.0041, 15.005, 15.01, 15.02, 15.03, 15.05] {
+        let centre_m = |side: f64| format!("[200, {}]", side * (60.0 + half_m));
+        let sets = [("obstacle.0.centre_m", &*centre_m(1.0)), ("obstacle.1.centre_m", &*centre_m(-1.0))];
+        let scenario = scenario("narrow/gap", &sets);
+        let world = fly_to_the_end(&scenario, None);
+        assert_eq!(world.ended(), Some(Outcome::Reached), "{half_m} m on either side");
+        assert_eq!(world.violations(), 0, "{half_m} m on either side");
     }
 }
 

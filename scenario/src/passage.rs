@@ -22,17 +22,17 @@ struct Link {
 }
 
 impl Barrier {
-    /// Links the obstacles that a drone with this clearance (m) does not fit between.
-    pub(crate) fn new(shapes: &[ConvexShape], clearance_m: f64) -> Self {
+    /// Links the obstacles between which a gap is narrower than twice `half_gap_m`.
+    pub(crate) fn new(shapes: &[ConvexShape], half_gap_m: f64) -> Self {
         let inside =
             shapes.iter().map(|shape| shape.vertices().sum::<Vec2>() / f64::from(shape.count.max(1))).collect();
         let mut links = Vec::new();
         for (j, b) in shapes.iter().enumerate() {
             for (i, a) in shapes[..j].iter().enumerate() {
-                let reach_m = a.radius_m + b.radius_m + 2.0 * clearance_m;
+                let reach_m = a.radius_m + b.radius_m + 2.0 * half_gap_m;
                 let ((low_a, high_a), (low_b, high_b)) = (a.bounds(), b.bounds());
                 let apart = (low_a - high_b).max().max((low_b - high_a).max());
-                if apart >= 2.0 * clearance_m {
+                if apart >= 2.0 * half_gap_m {
                     continue;
                 }
                 let nearest = nearest_points(a, b);

@@ -18,6 +18,9 @@ use skein_protocol::shape::{ConvexShape, ShapeError};
 /// Gravity as in the paper, m/s².
 const GRAVITY_MPS2: f64 = 9.81;
 
+/// What a passable gap leaves on either side, beyond the distance that drones keep from obstacles, m. The safety rule keeps 1 mm of it for
+/// rounding errors, and a drone that flies through the middle deviates by less than the rest.
+const GAP_ROOM_M: f64 = 0.004;
 /// Default of `time.timeout_s` for a small swarm, s.
 const TIMEOUT_S: f64 = 180.0;
 /// The default of `time.timeout_s` is at least this many times the duration of a smooth flight.
@@ -328,6 +331,13 @@ impl Scenario {
         radio::channel(self.seed, &self.radio)
     }
 
+    /// Half the width of the narrowest gap that is passable, m: leaders plan routes through wider ones only, and a mission whose drones are
+    /// enclosed by narrower ones is stuck. The paths and the safety rule of a drone need less, so that a route is never blocked for it.
+    #[must_use]
+    pub fn half_gap_m(&self) -> f64 {
+        self.avoidance.clearance_m + self.sensors.obstacle_error_max_m + GAP_ROOM_M
+    }
+
     /// The drones that have no way to their destination: obstacles that no drone fits between enclose the drone, or the goal.
     /// Ids in ascending order. A mission without a goal leads out of every enclosure.
     ///
@@ -335,7 +345,7 @@ impl Scenario {
     /// [`ShapeError`], as for [`Self::shapes`].
     pub fn drones_without_a_way(&self) -> Result<Vec<u32>, ShapeError> {
         let shapes: Vec<ConvexShape> = self.shapes_in_the_way()?.into_iter().map(|(_, shape)| shape).collect();
-        let barrier = Barrier::new(&shapes, self.avoidance.clearance_m);
+        let barrier = Barrier::new(&shapes, self.half_gap_m());
         let far_m = shapes.iter().map(|shape| shape.bounds().1.x).fold(0.0, f64::max) + 1e6;
         let goal = self.mission.goal_m.filter(|_| self.mission.end == End::Goal);
         let to = goal.map_or(Vec2::new(far_m, self.formation.start_m[1]), Vec2::from);

@@ -200,3 +200,19 @@ fn obstacles_above_and_below_are_not_in_the_way() {
     assert_eq!(in_the_way, [0, 2]);
     assert_eq!(parse("[formation]\n[avoidance]\nclearance_m = 80\nplanning_distance_m = 90", &[]).altitude_m(), 80.0);
 }
+
+#[test]
+fn a_ring_of_obstacles_is_closed_by_gaps_of_twice_the_distance_to_keep() {
+    let closed = |gap_m: f64, sets: &[(&str, &str)]| {
+        let wall = |x: f64, y: f64, half_x: f64, half_y: f64| {
+            format!("[[obstacle]]\nshape = \"rectangle\"\ncentre_m = [{x}, {y}]\nhalf_size_m = [{half_x}, {half_y}]\n")
+        };
+        let door = [1.0, -1.0].map(|side| wall(100.0, side * (50.0 + gap_m / 2.0), 5.0, 50.0));
+        let others = wall(0.0, 110.0, 105.0, 10.0) + &wall(0.0, -110.0, 105.0, 10.0) + &wall(-100.0, 0.0, 5.0, 105.0);
+        let scenario = parse(&format!("[formation]\ndrones = 1\n{}{others}", door.concat()), sets);
+        !scenario.drones_without_a_way().unwrap().is_empty()
+    };
+    assert_eq!([30.007, 30.009].map(|gap_m| closed(gap_m, &[])), [true, false]);
+    let error = [("sensors.obstacle_error_max_m", "0.5")];
+    assert_eq!([31.007, 31.009].map(|gap_m| closed(gap_m, &error)), [true, false]);
+}
