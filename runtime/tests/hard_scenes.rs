@@ -67,6 +67,8 @@ fn a_gap_is_either_open_or_closed() {
         let world = fly_to_the_end(&scenario, None);
         assert_eq!(world.ended(), Some(Outcome::Reached), "{half_m} m on either side");
         assert_eq!(world.violations(), 0, "{half_m} m on either side");
+        let through = world.min_clearance_m() <= half_m;
+        assert_eq!(through, half_m > 15.004, "{half_m} m on either side: {} m to an obstacle", world.min_clearance_m());
     }
 }
 
