@@ -1,6 +1,7 @@
 //! Escape of a stuck drone. A drone is stuck if it wants to move and cannot. It first backs off and then tries the sides.
 
 use crate::tuning::STILL_MPS;
+use skein_protocol::scale::Scale;
 use skein_protocol::{SimTime, Vec2};
 
 /// A still drone counts as stuck if it wants to fly faster than this, m/s, or than [`EAGER_SHARE`] of the speed at which it would escape. A
@@ -43,14 +44,23 @@ impl Escape {
 
     /// Returns the velocity to fly, world frame, m/s. This is `wanted` unless the drone has been stuck for `patience_s`. Then
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `velocity` and `wanted`: world frame, m/s.
-    pub fn steer(&mut self, now: SimTime, velocity: Vec2, wanted: Vec2, patience_s: f64, speed_mps: f64) -> Vec2 {
+    /// `scale`: how small the swarm is.
+    pub fn steer(
+        &mut self,
+        now: SimTime,
+        velocity: Vec2,
+        wanted: Vec2,
+        patience_s: f64,
+        speed_mps: f64,
+        scale: Scale,
+    ) -> Vec2 {
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        if velocity.norm() >= STILL_MPS || wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
+        if velocity.norm() >= scale.of_full(STILL_MPS) || wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
             self.still_since = None;
             return wanted;
         }
@@ -78,8 +88,8 @@ mod tests {
         let mut escape = Escape::default();
         for second in 0..100 {
             let now = SimTime::from_secs(f64::from(second));
-            assert_eq!(escape.steer(now, WANTED, WANTED, 3.0, 5.0), WANTED);
-            assert_eq!(escape.steer(now, Vec2::zeros(), Vec2::zeros(), 3.0, 5.0), Vec2::zeros());
+            assert_eq!(escape.steer(now, WANTED, WANTED, 3.0, 5.0, Scale::FULL), WANTED);
+            assert_eq!(escape.steer(now, Vec2::zeros(), Vec2::zeros(), 3.0, 5.0, Scale::FULL), Vec2::zeros());
         }
     }
 
@@ -87,7 +97,8 @@ mod tests {
     fn a_slow_drone_gets_stuck_as_well() {
         let (mut escape, wanted) = (Escape::default(), Vec2::new(2.4, 0.0));
         let at = |second: u32| SimTime::from_secs(f64::from(second));
-        let flown: Vec<Vec2> = (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7)).collect();
+        let flown: Vec<Vec2> =
+            (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7, Scale::FULL)).collect();
         assert_eq!(flown[2], wanted);
         assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
     }
@@ -96,7 +107,8 @@ mod tests {
     fn a_slow_drone_in_a_queue_gets_stuck_as_well() {
         let (mut escape, wanted) = (Escape::default(), Vec2::new(1.7, 0.0));
         let at = |second: u32| SimTime::from_secs(f64::from(second));
-        let flown: Vec<Vec2> = (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7)).collect();
+        let flown: Vec<Vec2> =
+            (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7, Scale::FULL)).collect();
         assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
     }
 
@@ -104,7 +116,9 @@ mod tests {
     fn a_stuck_drone_backs_off_and_then_tries_the_sides() {
         let mut escape = Escape::default();
         let tried: Vec<Vec2> = (0..60)
-            .map(|second| escape.steer(SimTime::from_secs(f64::from(second)), Vec2::zeros(), WANTED, 3.0, 5.0))
+            .map(|second| {
+                escape.steer(SimTime::from_secs(f64::from(second)), Vec2::zeros(), WANTED, 3.0, 5.0, Scale::FULL)
+            })
             .collect();
         assert_eq!(tried[2], WANTED);
         assert!((tried[3] - Vec2::new(-5.0, 0.0)).norm() < 1e-9 && (tried[8] - tried[3]).norm() < 1e-9);

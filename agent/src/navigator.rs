@@ -25,6 +25,8 @@ use skein_protocol::shape::ConvexShape;
 
 /// If the target moves by more than this, a new path is searched, m.
 const MOVED_M: f64 = 10.0;
+/// The same as a part of the planning distance. The less of the two counts. No unit.
+const MOVED: f64 = 0.5;
 /// Added to the clearance for paths through gaps that are hardly wide enough, m. It covers the braking filter's margin for
 /// rounding errors. Routes lead through gaps that leave more ([`skein_leader::routes::RouteParams::half_gap_m`]), so that a drone that is not
 /// exactly on its route does not take it for blocked.
@@ -61,6 +63,8 @@ pub struct Navigator {
     wide: VisibilityMap,
     /// Map with the least distance that the braking filter keeps.
     tight: VisibilityMap,
+    /// By how much the target may move until a new path is searched, m.
+    moved_m: f64,
     path: Option<Path>,
     /// After a search without a result: the tick from which the next search is allowed.
     retry_at: u64,
@@ -76,6 +80,7 @@ impl Navigator {
         Self {
             wide: VisibilityMap::new(planning_m.max(clearance_m + TIGHT_M)),
             tight: VisibilityMap::new(clearance_m + TIGHT_M),
+            moved_m: MOVED_M.min(MOVED * planning_m),
             changes: 0,
             path: None,
             retry_at: 0,
@@ -163,7 +168,7 @@ impl Navigator {
     /// the next corner is blocked.
     fn follow(&mut self, from: Vec2, to: Vec2) -> Option<Vec2> {
         let path = self.path.as_mut()?;
-        if (path.target - to).norm() > MOVED_M {
+        if (path.target - to).norm() > self.moved_m {
             return None;
         }
         if let Some(end) = path.corners.first_mut() {

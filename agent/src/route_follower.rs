@@ -1,9 +1,9 @@
 //! Follows a drone's routes past the obstacle sets ahead: the shortest path through them, and the places in their queues.
 
 use crate::emergency_route::EmergencyRoute;
-use crate::tuning::REDRAW_DRIFT_M;
+use crate::tuning::{REDRAW_DRIFT, REDRAW_DRIFT_M};
 use skein_leader::cost::{Flight, shortest, trips};
-use skein_leader::funnel::{Corridor, RUN_OUT_M, Steering};
+use skein_leader::funnel::{Corridor, Steering};
 use skein_leader::ledger::Ledger;
 use skein_leader::planned_set::PlannedSet;
 use skein_leader::routes::{Body, Routes};
@@ -108,8 +108,8 @@ impl RouteFollower {
         }) {
             self.emergency = None;
         }
-        let moved = self.bodies.len() != bodies.len()
-            || self.bodies.iter().zip(bodies).any(|(old, new)| (old.centre_m - new.centre_m).norm() > REDRAW_DRIFT_M);
+        let moved =
+            self.bodies.len() != bodies.len() || self.bodies.iter().zip(bodies).any(|(old, new)| has_drifted(old, new));
         let key = self.drawing_key(ledger, position);
         if self.drawn_for.is_none_or(|drawn| drawn.stamp != key.stamp) {
             self.detours.clear();
@@ -131,22 +131,29 @@ impl RouteFollower {
 
     /// The route that the drone flies past a set, and its place in the queue.
     fn place(&self, set: &PlannedSet) -> Option<QueuePlace> {
-        let part = set.parts.get(self.me).filter(|part| usize::from(part.route) < set.routes.count())?;
+        let part = set.parts.get(self.me)?;
         let place = QueuePlace { remaining_m: 0.0, set: set.tag, route: part.route, rank: part.rank };
-        Some(match self.detours.iter().find(|detour| detour.set == set.tag) {
+        let place = match self.detours.iter().find(|detour| detour.set == set.tag) {
             Some(detour) => QueuePlace { route: detour.route as u16, rank: QueuePlace::NO_RANK, ..place },
             None => place,
-        })
+        };
+        Some(place).filter(|place| usize::from(place.route) < set.routes.count())
     }
 
-    /// Finds another route wherever the drone was driven to the wrong side of an obstacle, or a body blocks its route.
-    /// Returns whether a route has changed.
+    /// Finds another route wherever the drone was driven to the wrong side of an obstacle, or a body blocks its route, or the route is
+    /// gone because outlines have grown. Returns whether a route has changed.
     fn find_detours(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) -> bool {
         let (mut detoured, course_y_m) = (false, self.course_y_m);
         self.blocked = false;
         for set in ledger.sets().iter().filter(|set| position.x < set.routes.exit_x_m()) {
-            let Some(route) = self.place(set).map(|place| usize::from(place.route)) else { continue };
-            match route_state(&set.routes, route, course_y_m, position, bodies) {
+            if set.parts.get(self.me).is_none() {
+                continue;
+            }
+            let state = match self.place(set) {
+                Some(place) => route_state(&set.routes, usize::from(place.route), course_y_m, position, bodies),
+                None => RouteState::Detour(open_route(&set.routes, course_y_m, position, bodies)),
+            };
+            match state {
                 RouteState::Clear => {}
                 RouteState::Blocked => self.blocked = true,
                 RouteState::Detour(open) => {
@@ -198,8 +205,9 @@ impl RouteFollower {
             .map(|&(place, routes)| (routes, usize::from(place.route)))
             .collect();
         let last_exit_x_m = open.iter().map(|(routes, _)| routes.exit_x_m()).reduce(f64::max);
+        let run_out_m = open.first().map_or(0.0, |(routes, _)| routes.run_out_m());
         self.corridor = last_exit_x_m
-            .map(|exit_x_m| Corridor::new(&open, &self.bodies, Vec2::new(exit_x_m + RUN_OUT_M, self.course_y_m)));
+            .map(|exit_x_m| Corridor::new(&open, &self.bodies, Vec2::new(exit_x_m + run_out_m, self.course_y_m)));
     }
 
     /// Direction and remaining length of the path from `position` (world frame, m); `None` if nothing lies ahead.
@@ -283,15 +291,25 @@ fn route_state(routes: &Routes, route: usize, course_y_m: f64, position: Vec2, b
     if free(route) {
         return RouteState::Clear;
     }
-    let mut others = trips(&[], routes, position, &Flight { speed_mps: 1.0, course_y_m });
-    for (other, trip) in others.iter_mut().enumerate() {
-        if !free(other) {
+    match open_route(routes, course_y_m, position, bodies) {
+        other if free(other) => RouteState::Detour(other),
+        _ if barred(route) && (0..routes.count()).any(|other| !barred(other)) => RouteState::Blocked,
+        _ => RouteState::Clear,
+    }
+}
+
+/// The shortest of the routes that are open to a drone and that no body blocks, or the rightmost one if there is none.
+fn open_route(routes: &Routes, course_y_m: f64, position: Vec2, bodies: &[Body]) -> usize {
+    let mut trips = trips(&[], routes, position, &Flight { speed_mps: 1.0, course_y_m });
+    for (route, trip) in trips.iter_mut().enumerate() {
+        if !routes.is_open(route, position) || routes.is_barred(route, position, bodies) {
             trip.total_s = f64::INFINITY;
         }
     }
-    match shortest(&others) {
-        other if free(other) => RouteState::Detour(other),
-        _ if barred(route) && (0..others.len()).any(|other| !barred(other)) => RouteState::Blocked,
-        _ => RouteState::Clear,
-    }
+    shortest(&trips)
+}
+
+/// Whether a silent drone has drifted so far that the corridor has to be drawn again.
+fn has_drifted(old: &Body, new: &Body) -> bool {
+    (old.centre_m - new.centre_m).norm() > REDRAW_DRIFT_M.min(REDRAW_DRIFT * new.radius_m)
 }

@@ -7,11 +7,12 @@
 
 use crate::program::{HalfPlane, Program};
 use skein_leader::geometry::nearest;
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, Vec2};
 use std::collections::VecDeque;
 
-/// Constants of the filter.
+/// Constants of the filter. The lengths and speeds in this file are those at full [`Scale`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SafetyParams {
     /// Least distance between two drones, m.
@@ -24,12 +25,14 @@ pub struct SafetyParams {
     pub braking_mps2: f64,
     /// γ: largest rate at which a barrier may fall, 1/s.
     pub gain_per_s: f64,
-    /// Margin on the safe distance, as a share of it; at least [`MIN_MARGIN_M`].
+    /// Margin on the safe distance, as a share of it; at least [`MIN_MARGIN_M`], of a small swarm less.
     pub margin: f64,
     /// Reaction time t_c, s.
     pub reaction_time_s: f64,
     /// Time between two calls of the filter, s.
     pub dt_s: f64,
+    /// How small the swarm is.
+    pub scale: Scale,
 }
 
 /// Obstacles farther away than the clearance plus this distance are ignored, m.
@@ -220,7 +223,7 @@ impl Safety {
         let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
         let intruded_m = params.keep_m(0.0) - INTRUSION * params.margin_m();
         let first = (neighbour.share >= 1.0 && !chased)
-            || (neighbour.share > 0.5 && missing > NON_COOPERATIVE_MPS2)
+            || (neighbour.share > 0.5 && missing > params.scale.of_full(NON_COOPERATIVE_MPS2))
             || (neighbour.sensed && neighbour.position_m.norm() < intruded_m);
         Assessed { neighbour, barrier, braking, missing, first }
     }
@@ -264,7 +267,7 @@ struct Barrier {
 impl SafetyParams {
     /// Margin on the safe distance, m.
     fn margin_m(&self) -> f64 {
-        (self.safe_distance_m * self.margin).max(MIN_MARGIN_M)
+        (self.safe_distance_m * self.margin).max(self.scale.of_full(MIN_MARGIN_M))
     }
 
     /// Distance to keep from a drone whose state is known with a delay of `late_s`, m.
@@ -277,7 +280,7 @@ impl SafetyParams {
         let normal = obstacle.normal();
         let alpha = OBSTACLE_BRAKING * self.braking_mps2;
         let beyond_m = obstacle.distance_m - self.clearance_m - self.obstacle_margin_m(obstacle, all);
-        let (root, slope) = root(alpha, beyond_m);
+        let (root, slope) = self.root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
         HalfPlane { normal, bound: -(self.gain_per_s * (root + speed) + slope * speed) }
     }
@@ -287,7 +290,7 @@ impl SafetyParams {
     fn obstacle_margin_m(&self, obstacle: &NearObstacle, all: &[NearObstacle]) -> f64 {
         let opposite = all.iter().filter(|other| other.normal().dot(&obstacle.normal()) < OPPOSITE);
         let narrowest_m = opposite.map(|other| obstacle.distance_m + other.distance_m).fold(f64::INFINITY, f64::min);
-        OBSTACLE_MARGIN_M.min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
+        self.scale.of_full(OBSTACLE_MARGIN_M).min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
     }
 
     fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
@@ -299,7 +302,7 @@ impl SafetyParams {
         let alpha = self.braking_mps2;
         let unsensed_m = neighbour.least_m - self.keep_m(self.reaction_time_s);
         let beyond_m = (distance - self.keep_m(late_s)).max(unsensed_m);
-        let (root, slope) = root(alpha, beyond_m);
+        let (root, slope) = self.root(alpha, beyond_m);
         let speed = normal.dot(&velocity);
         let turning = (velocity.norm_squared() - speed * speed) / distance;
         let slack = self.gain_per_s * (root + speed) + turning + slope * speed;
@@ -318,25 +321,26 @@ impl SafetyParams {
             return None;
         }
         let stop = self.braking_mps2;
-        let limit =
-            (other_speed * other_speed + 2.0 * stop * barrier.beyond_m).max(MIN_LIMIT_MPS * MIN_LIMIT_MPS).sqrt();
+        let least_mps = self.scale.of_full(MIN_LIMIT_MPS);
+        let limit = (other_speed * other_speed + 2.0 * stop * barrier.beyond_m).max(least_mps * least_mps).sqrt();
         let apart = -other.velocity_mps;
         let turn = (apart - normal * apart.dot(&normal)) / other.position_m.norm().max(1e-6);
         let slowing = other_speed * (-braking.dot(&normal) - other_velocity.dot(&turn)) + stop * apart.dot(&normal);
         let bound = -self.gain_per_s * (limit - own_speed) - own.dot(&turn) - slowing / limit;
         Some(HalfPlane { normal, bound })
     }
-}
 
-/// √(2 α x), m/s, and its slope, 1/s. Below `TANGENT_M` the root is continued by its tangent.
-fn root(alpha: f64, x: f64) -> (f64, f64) {
-    let least = (2.0 * alpha * TANGENT_M).sqrt();
-    if x < TANGENT_M {
-        let slope = alpha / least;
-        return (least + slope * (x - TANGENT_M), slope);
+    /// √(2 α x), m/s, and its slope, 1/s. Below `TANGENT_M` the root is continued by its tangent.
+    fn root(&self, alpha: f64, x: f64) -> (f64, f64) {
+        let tangent_m = self.scale.of_full(TANGENT_M);
+        let least = (2.0 * alpha * tangent_m).sqrt();
+        if x < tangent_m {
+            let slope = alpha / least;
+            return (least + slope * (x - tangent_m), slope);
+        }
+        let root = (2.0 * alpha * x).sqrt();
+        (root, alpha / root)
     }
-    let root = (2.0 * alpha * x).sqrt();
-    (root, alpha / root)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use separating_line::{SeparatingLine, Side};
 use separation_pair::{NumberedLine, SeparationPair, Statement};
 use skein_leader::peers::Peers;
 use skein_protocol::payload::{MAX_SEPARATORS, Pose, Separation, Separator};
+use skein_protocol::scale::Scale;
 use skein_protocol::{DroneId, Message, SimTime, Vec2, raised};
 use std::sync::Arc;
 
@@ -377,6 +378,11 @@ fn side_of(me: DroneId, peer: DroneId) -> Side {
 }
 
 impl SeparationParams {
+    /// How small the swarm is. The lengths and speeds in this file are those at full scale.
+    fn scale(&self) -> Scale {
+        Scale::of(self.keep_m, self.start_velocity.norm())
+    }
+
     /// All drones but this one.
     fn others(&self) -> impl Iterator<Item = DroneId> + use<> {
         let me = self.me;
@@ -431,7 +437,8 @@ impl SeparationParams {
         };
         let side = known.pair.side();
         let along_mps = towards_me.dot(&(own.velocity + peer.velocity)) / 2.0;
-        let ahead = along_mps > ABREAST_MPS || (along_mps >= -ABREAST_MPS && side == Side::Front);
+        let abreast_mps = self.scale().of_full(ABREAST_MPS);
+        let ahead = along_mps > abreast_mps || (along_mps >= -abreast_mps && side == Side::Front);
         let patience_s = PATIENCE_S + PATIENCE_ROUND_TRIPS * 2.0 * late_s + self.period_s;
         if !ahead && now.since(known.changed) < patience_s {
             return;
@@ -439,7 +446,7 @@ impl SeparationParams {
         let Some(line) = self.line(&stated.line, side, &own, &peer, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
-        if (turned || shifted_m >= SHIFT_M) && known.pair.propose(line, path.earliest()) {
+        if (turned || shifted_m >= self.scale().of_full(SHIFT_M)) && known.pair.propose(line, path.earliest()) {
             known.changed = now;
         }
     }
@@ -489,7 +496,7 @@ impl SeparationParams {
         let middle_m = (own_m + peer_m + (own_mps + peer_mps) * late_s) / 2.0;
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
-        let still = own.velocity.norm().max(peer.velocity.norm()) < STILL_MPS;
+        let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().of_full(STILL_MPS);
         let aimed_m = match (close && still, side) {
             (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.

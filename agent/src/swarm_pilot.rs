@@ -25,7 +25,10 @@ use crate::silent_drones::SilentDrones;
 use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::{OwnPlan, Straggler};
-use crate::tuning::{BACK_OUT_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S, SILENT_DRONE_RADIUS};
+use crate::tuning::{
+    BACK_OUT_SPEED, LEAST_ESCAPE_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S,
+    SILENT_DRONE_RADIUS,
+};
 use bytemuck::Zeroable;
 use skein_leader::candidates::MAX_ROLLOUT_DRONES;
 use skein_leader::cost::{Flight, shortest, trips};
@@ -279,8 +282,9 @@ impl SwarmPilot {
                 self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity)
             }
             _ => {
-                let peers = self.leading.peers();
-                Vec2::new(self.lone_flight.speed_mps(senses.now, senses.position(), peers, &guidance), 0.0)
+                let (peers, reach_m) = (self.leading.peers(), self.leading.reach_m());
+                let flight = &mut self.lone_flight;
+                Vec2::new(flight.speed_mps(senses.now, senses.position(), peers, reach_m, &guidance), 0.0)
             }
         }
     }
@@ -420,10 +424,12 @@ impl SwarmPilot {
             *senses
         };
         let wanted = self.wanted_velocity(&then, open);
-        let slow_mps = self.params.guidance.speed_mps - self.params.guidance.speed_change_mps;
+        let nominal_mps = self.params.guidance.speed_mps;
+        let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
         let attempts = self.escape.attempts();
-        let wanted = self.escape.steer(then.now, then.velocity(), wanted, patience_s, slow_mps);
+        let wanted =
+            self.escape.steer(then.now, then.velocity(), wanted, patience_s, slow_mps, self.params.safety.scale);
         if self.escape.attempts() > attempts {
             self.give_up_first_place(senses.now, open);
         }

@@ -5,6 +5,7 @@ use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
+use skein_protocol::scale::Scale;
 
 /// The planning of a small swarm whose goal is 100 m ahead.
 pub(crate) fn planner() -> PlannerParams {
@@ -12,7 +13,7 @@ pub(crate) fn planner() -> PlannerParams {
         strategy: Strategy::PaperRule,
         speed_mps: 10.0,
         headway_s: 4.0,
-        routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 40.0 },
+        routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 40.0, scale: Scale::FULL },
         shape: Shape::Line,
         spacing_m: 40.0,
         reformation: Reformation::Identity,

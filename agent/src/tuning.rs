@@ -18,7 +18,7 @@ pub(crate) const BEACON_REACH: f64 = 4.0;
 /// safety filter keeps, so that the filter need not act. `skein sweep experiments/faults.toml`.
 pub(crate) const SILENT_DRONE_RADIUS: f64 = 1.1;
 
-/// Speed below which a drone counts as still, m/s. Chosen by hand. `skein sweep experiments/wide-scenes.toml`.
+/// Speed below which a drone counts as still, m/s, at full [`Scale`](skein_protocol::scale::Scale). Chosen by hand. `skein sweep experiments/wide-scenes.toml`.
 pub(crate) const STILL_MPS: f64 = 0.3;
 
 /// How long a drone on its route waits before it escapes from where it is stuck, s. Chosen by hand. `skein sweep
@@ -37,6 +37,10 @@ pub(crate) const STALE_FORMATION_S: f64 = 5.0;
 /// experiments/faults.toml`.
 pub(crate) const BACK_OUT_SPEED: f64 = 0.5;
 
+/// Least speed at which a drone escapes from where it is stuck, as a share of its nominal speed: its slowest speed in a queue may be 0.
+/// Chosen by hand.
+pub(crate) const LEAST_ESCAPE_SPEED: f64 = 0.5;
+
 /// How long a leader waits for a follower before it assumes that no drone hears it, s. Chosen by hand. `skein sweep
 /// experiments/silence.toml`.
 pub(crate) const UNHEARD_S: f64 = 5.0;
@@ -45,12 +49,19 @@ pub(crate) const UNHEARD_S: f64 = 5.0;
 /// Chosen by hand: the paper's longest passage takes half of it. `skein sweep experiments/wide-scenes.toml`.
 pub(crate) const LEAD_S: f64 = 60.0;
 
+/// A drone without a task stays within this share of the distance over which drones hear each other from the nearest other one. Chosen by
+/// hand.
+pub(crate) const IN_REACH: f64 = 0.75;
+
 /// How far beyond the goal a drone without a task waits, as time at nominal speed, s; a headway per drone is added. Chosen by
 /// hand: the length of a formation. `skein sweep experiments/wide-scenes.toml`.
 pub(crate) const OVERSHOOT_S: f64 = 10.0;
 
 /// Drift of a silent drone after which the corridor is drawn again, m. Chosen by hand.
 pub(crate) const REDRAW_DRIFT_M: f64 = 1.0;
+
+/// The same as a part of the radius of the disc around that drone. The less of the two counts. Chosen by hand.
+pub(crate) const REDRAW_DRIFT: f64 = 0.04;
 
 /// Closing speed per distance to the slot, 1/s. Chosen by hand. `skein reproduce`.
 pub(crate) const APPROACH_PER_S: f64 = 0.8;

@@ -8,6 +8,7 @@ use skein_leader::ledger::Ledger;
 use skein_leader::obstacles::{Obstacles, set_array};
 use skein_leader::routes::RouteParams;
 use skein_protocol::payload::{Assignment, Plan, QueuePlace};
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
@@ -34,8 +35,11 @@ fn first_place(route: &RouteFollower) -> (u16, u16) {
 
 #[test]
 fn a_place_that_was_given_up_comes_back_with_the_next_plan_alone() {
-    let mut ledger =
-        Ledger::new(DroneId(1), 4, RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 });
+    let mut ledger = Ledger::new(
+        DroneId(1),
+        4,
+        RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
+    );
     let mut route = RouteFollower::new(DroneId(1), 0.0);
     route.give_up_place();
     hear_plan(&mut ledger, 1);

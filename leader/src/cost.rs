@@ -1,6 +1,6 @@
 //! Arrival times: how long a drone would take to the gate along a route if it were alone (paper, Alg. 3 and C1).
 
-use crate::funnel::{Corridor, RUN_OUT_M};
+use crate::funnel::Corridor;
 use crate::routes::Routes;
 use skein_protocol::Vec2;
 
@@ -28,7 +28,7 @@ pub struct Trip {
 pub fn trip(earlier: &[(&Routes, usize)], routes: &Routes, route: usize, position: Vec2, flight: &Flight) -> Trip {
     let passages: Vec<(&Routes, usize)> = earlier.iter().copied().chain([(routes, route)]).collect();
     let exit_x_m = passages.iter().map(|(routes, _)| routes.exit_x_m()).fold(f64::NEG_INFINITY, f64::max);
-    let corridor = Corridor::new(&passages, &[], Vec2::new(exit_x_m + RUN_OUT_M, flight.course_y_m));
+    let corridor = Corridor::new(&passages, &[], Vec2::new(exit_x_m + routes.run_out_m(), flight.course_y_m));
     let steering = corridor.pull(position, routes.gate_x_m());
     Trip { arrival_s: steering.to_gate_m / flight.speed_mps, total_s: steering.total_m / flight.speed_mps }
 }

@@ -76,8 +76,9 @@ impl FormationPlanner {
             Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
             None => 0.0,
         };
+        let hold_mps = s.params.routes.scale.of_full(HOLD_SPEED_MPS);
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
-        let still = s.members.iter().all(|m| m.speed_mps < HOLD_SPEED_MPS);
+        let still = s.members.iter().all(|m| m.speed_mps < hold_mps);
         if !still || bundle.plan.phase() != Phase::Reform || (worst <= s.params.arrival_error_m && !self.open) {
             self.stalled = None;
             return false;
@@ -134,7 +135,7 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
 pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2) -> Vec2 {
     let (mut steps, is_blocked) = (0, blocker(s));
     while steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
-        anchor.x += ANCHOR_STEP_M;
+        anchor.x += s.params.routes.scale.of_full(ANCHOR_STEP_M);
         steps += 1;
     }
     anchor

@@ -1,10 +1,9 @@
 //! The funnel algorithm: the shortest path past constraint points, with x never decreasing.
 
 use crate::routes::{Body, Constraint, Routes, Side, Wall, sort};
-use crate::tuning::LOOK_AHEAD_M;
-
-pub use crate::tuning::RUN_OUT_M;
+use crate::tuning::{LOOK_AHEAD_M, RUN_OUT_M};
 use skein_protocol::Vec2;
+use skein_protocol::scale::Scale;
 
 /// Constraint points that are less than this ahead count as passed, m.
 const PASSED_M: f64 = 1e-6;
@@ -15,6 +14,7 @@ const PASSED_M: f64 = 1e-6;
 pub struct Corridor {
     constraints: Vec<Constraint>,
     target: Vec2,
+    scale: Scale,
 }
 
 /// The shortest path through a corridor.
@@ -31,7 +31,7 @@ pub struct Steering {
 
 impl Corridor {
     /// A corridor past these sets, each with the route taken past it (0 = rightmost), to a target on the course line
-    /// (world frame, m), usually [`RUN_OUT_M`] past the last exit.
+    /// (world frame, m), usually [`Routes::run_out_m`] past the last exit.
     ///
     /// A body that leaves no gap between itself and a wall of the routes becomes part of that wall, of the nearest one if
     /// there are several. Any other body stays on the side on which the path from the course line passes its centre.
@@ -39,7 +39,8 @@ impl Corridor {
     pub fn new(passages: &[(&Routes, usize)], bodies: &[Body], target: Vec2) -> Self {
         let taken = || passages.iter().map(|&(routes, route)| routes.route(route));
         let constraints = taken().flat_map(|route| route.constraints().iter().copied()).collect();
-        let mut corridor = Self { constraints, target };
+        let scale = passages.first().map_or(Scale::FULL, |(routes, _)| routes.scale());
+        let mut corridor = Self { constraints, target, scale };
         sort(&mut corridor.constraints);
         if !bodies.is_empty() {
             corridor.evade(bodies, taken().flat_map(|route| route.walls().iter().cloned()).collect());
@@ -75,7 +76,7 @@ impl Corridor {
 
     /// Visits the legs of the shortest path, each at least `PASSED_M` long in x.
     pub fn visit_legs(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
-        let end = Vec2::new(self.target.x.max(position.x + LOOK_AHEAD_M), self.target.y);
+        let end = Vec2::new(self.target.x.max(position.x + self.scale.of_full(LOOK_AHEAD_M)), self.target.y);
         let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
         let mut from = position;
         let mut next = ahead.partition_point(|c| c.x_m <= from.x + PASSED_M);
@@ -91,7 +92,7 @@ impl Corridor {
     /// Ordinate at an abscissa of the path that comes along the course line, m.
     fn height_m(&self, x_m: f64) -> f64 {
         let first_x_m = self.constraints.first().map_or(x_m, |c| c.x_m.min(x_m));
-        let start = Vec2::new(first_x_m - RUN_OUT_M, self.target.y);
+        let start = Vec2::new(first_x_m - self.scale.of_full(RUN_OUT_M), self.target.y);
         let mut y_m = self.target.y;
         self.visit_legs(start, |a, b| {
             if a.x < x_m && x_m <= b.x {

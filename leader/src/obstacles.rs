@@ -2,7 +2,7 @@
 
 use crate::drone_set::DroneSet;
 use crate::geometry::{hull, nearest};
-use crate::tuning::OUTLINE_GROWTH_M;
+use crate::tuning::{OUTLINE_GROWTH, OUTLINE_GROWTH_M};
 use skein_protocol::payload::{MAX_SET, Passed};
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
 use skein_protocol::{DroneId, ObstacleId, SimTime, Vec2};
@@ -45,7 +45,8 @@ impl Obstacles {
     /// Learns of an obstacle, or that its outline reaches farther than was known. Returns whether that is new.
     pub fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
         if let Some(known) = self.known.get_mut(&id) {
-            let Some(grown) = grown(&known.shape, &shape) else { return false };
+            let growth_m = OUTLINE_GROWTH_M.min(OUTLINE_GROWTH * self.reach_m);
+            let Some(grown) = grown(&known.shape, &shape, growth_m) else { return false };
             known.shape = grown;
         } else if self.known.len() < MAX_KNOWN {
             self.known.insert(id, Known { shape, witness, since: now });
@@ -158,13 +159,13 @@ impl Obstacles {
 }
 
 /// The outline that is known after another part of it was seen; `None` if that part adds nothing that matters to planning.
-fn grown(known: &ConvexShape, seen: &ConvexShape) -> Option<ConvexShape> {
+fn grown(known: &ConvexShape, seen: &ConvexShape, growth_m: f64) -> Option<ConvexShape> {
     if known == seen {
         return None;
     }
     let core: Vec<Vec2> = known.vertices().collect();
     let beyond_m = |v: Vec2| (nearest(&core, v) - v).norm() + seen.radius_m - known.radius_m;
-    if seen.vertices().all(|v| beyond_m(v) <= OUTLINE_GROWTH_M) {
+    if seen.vertices().all(|v| beyond_m(v) <= growth_m) {
         return None;
     }
     let mut corners = hull(&core.into_iter().chain(seen.vertices()).collect::<Vec<_>>());

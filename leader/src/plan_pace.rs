@@ -62,6 +62,7 @@ mod tests {
     use crate::routes::RouteParams;
     use crate::slots::Reformation;
     use skein_protocol::formation::Shape;
+    use skein_protocol::scale::Scale;
     use skein_protocol::{GroupId, Vec2};
 
     const TERM: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
@@ -71,7 +72,7 @@ mod tests {
             strategy: Strategy::PaperRule,
             speed_mps: 10.0,
             headway_s: 4.0,
-            routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 },
+            routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
             between: Between::CloseUp,
             shape: Shape::V,
             spacing_m: 40.0,

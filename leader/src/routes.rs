@@ -4,7 +4,8 @@
 //! corners of the inflated obstacles that the path has to pass on a given side.
 
 use crate::geometry::{hull, inflate, inscribed, lower_chain, nearest, separation, upper_chain};
-use crate::tuning::ROUNDING_M;
+use crate::tuning::{ROUNDING_M, RUN_OUT_M};
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 
@@ -17,6 +18,8 @@ pub struct RouteParams {
     pub half_gap_m: f64,
     /// r_plan: distance at which paths are planned, m; at least `half_gap_m`.
     pub planning_distance_m: f64,
+    /// How small the swarm is.
+    pub scale: Scale,
 }
 
 /// The side on which a path has to pass a point.
@@ -120,6 +123,7 @@ pub struct Routes {
     routes: Vec<Route>,
     gate_x_m: f64,
     exit_x_m: f64,
+    scale: Scale,
     /// The obstacles inflated by r_obs, by envelope, from right to left.
     blocks: Vec<Vec<Block>>,
 }
@@ -131,7 +135,8 @@ impl Routes {
     pub fn new(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
         let envelopes = ordered(merged(obstacles, params), params);
         if envelopes.is_empty() {
-            return Self { routes: vec![Route::default()], gate_x_m: 0.0, exit_x_m: 0.0, blocks: Vec::new() };
+            let (routes, scale) = (vec![Route::default()], params.scale);
+            return Self { routes, gate_x_m: 0.0, exit_x_m: 0.0, scale, blocks: Vec::new() };
         }
         let routes = (0..=envelopes.len()).map(|route| Route::new(walls(&envelopes, route, params))).collect();
         let centres = envelopes.iter().map(|envelope| (envelope.low.x + envelope.high.x) / 2.0);
@@ -140,6 +145,7 @@ impl Routes {
             routes,
             gate_x_m: centres.sum::<f64>() / envelopes.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
+            scale: params.scale,
             blocks: envelopes.iter().map(|envelope| envelope.blocks.clone()).collect(),
         }
     }
@@ -196,6 +202,17 @@ impl Routes {
     #[must_use]
     pub fn exit_x_m(&self) -> f64 {
         self.exit_x_m
+    }
+
+    /// Distance behind the exit at which a path past the set ends on the course line, m.
+    #[must_use]
+    pub fn run_out_m(&self) -> f64 {
+        self.scale.of_full(RUN_OUT_M)
+    }
+
+    /// How small the swarm is.
+    pub(crate) fn scale(&self) -> Scale {
+        self.scale
     }
 }
 

@@ -188,7 +188,7 @@ pub(crate) const ROUNDING_M: f64 = 1e-6;
 // ---- Paths (`funnel.rs`) ----
 
 /// Distance of a corridor's target behind the last set's exit, m. 60. By hand; `skein reproduce`.
-pub const RUN_OUT_M: f64 = 60.0;
+pub(crate) const RUN_OUT_M: f64 = 60.0;
 /// Least distance of a corridor's target ahead of the drone, m. 30. By hand.
 pub(crate) const LOOK_AHEAD_M: f64 = 30.0;
 
@@ -210,3 +210,6 @@ pub(crate) const BALANCED: f64 = 1e-3;
 /// distance leaves beyond the clearance. `skein sweep
 /// experiments/sensors.toml --set sensors.outline=seen`.
 pub(crate) const OUTLINE_GROWTH_M: f64 = 2.0;
+/// The same as a part of the distance up to which obstacles are one set, twice the planning distance. The less of the two counts. No
+/// unit. 0.05: with the default planning distance, 2 m. By hand.
+pub(crate) const OUTLINE_GROWTH: f64 = 0.05;

@@ -7,10 +7,12 @@ use skein_leader::ledger::Ledger;
 use skein_leader::obstacles::{Obstacles, set_array};
 use skein_leader::routes::RouteParams;
 use skein_protocol::payload::{Assignment, Plan, Pose, QueuePlace, set_tag};
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
 
-const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 };
+const PARAMS: RouteParams =
+    RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL };
 const STAMP: PlanStamp = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch: 3 };
 
 /// The ledger of drone 1, which heard the plan past obstacle 0 and only its own assignment.

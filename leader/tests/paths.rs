@@ -3,13 +3,18 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
-use skein_leader::funnel::{Corridor, RUN_OUT_M};
+use skein_leader::funnel::Corridor;
 use skein_leader::routes::{Body, Constraint, RouteParams, Routes, Side};
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 use std::fmt::Write;
 
-const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 };
+/// Distance behind the exit at which a path ends, m.
+const RUN_OUT_M: f64 = 60.0;
+
+const PARAMS: RouteParams =
+    RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL };
 
 fn rectangle(x: f64, y: f64, half_x: f64, half_y: f64) -> ConvexShape {
     ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(half_x, half_y), 0.0).unwrap()

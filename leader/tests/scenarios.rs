@@ -6,10 +6,12 @@ use skein_leader::cost::{Flight, trip};
 use skein_leader::routes::{RouteParams, Routes};
 use skein_leader::split::{ArrivalTable, RouteAssignment};
 use skein_protocol::formation::Shape;
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{ObstacleId, Vec2};
 
-const PARAMS: RouteParams = RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 };
+const PARAMS: RouteParams =
+    RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL };
 const FLIGHT: Flight = Flight { speed_mps: 10.0, course_y_m: 0.0 };
 
 /// Spacing, d_safe, half sizes and centre of the obstacle, detection range; m.

@@ -59,6 +59,7 @@ pub mod nearby;
 pub mod payload;
 pub mod radio;
 pub mod record;
+pub mod scale;
 pub mod shape;
 mod short_text;
 pub mod slot;

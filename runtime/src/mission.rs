@@ -12,6 +12,8 @@ use skein_leader::election::ElectionParams;
 use skein_leader::params::{Between, Destination, Objective, PlannerParams, Strategy};
 use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
+use skein_protocol::formation::HOLD_SPEED_MPS;
+use skein_protocol::scale::Scale;
 use skein_protocol::{DroneId, SimTime, Vec2, Vec3};
 use skein_scenario::{
     Between as BetweenKey, End, Failsafe, FaultKind, OutlineSensing, Parts, Reformation as ReformationKey, Scenario,
@@ -77,6 +79,7 @@ pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
         end: end(scenario),
         parts: parts(scenario),
         arrival_error_m: scenario.mission.arrival_error_m,
+        hold_speed_mps: scale(scenario).of_full(HOLD_SPEED_MPS),
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
         energy: EnergyModel {
@@ -86,6 +89,11 @@ pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
         faults: fault_plan(scenario),
         pilots: scenario.pilot_names(),
     })
+}
+
+/// How small the swarm is.
+fn scale(scenario: &Scenario) -> Scale {
+    Scale::of(scenario.drone.safe_distance_m, scenario.drone.speed_mps)
 }
 
 /// The errors of sensors and clocks.
@@ -181,6 +189,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             margin: scenario.guidance.filter_margin,
             reaction_time_s: drone.reaction_time_s,
             dt_s: scenario.time.dt_s,
+            scale: scale(scenario),
         },
         altitude_m: scenario.altitude_m(),
         detection_range_m: scenario.sensors.detection_range_m,
@@ -235,6 +244,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
             half_gap_m: scenario.half_gap_m(),
             planning_distance_m: (avoidance.planning_distance_m + scenario.sensors.obstacle_error_max_m)
                 .max(scenario.half_gap_m()),
+            scale: scale(scenario),
         },
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,

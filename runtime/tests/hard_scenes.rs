@@ -56,6 +56,14 @@ fn no_drone_waits_or_turns_for_ever() {
     }
 }
 
+/// Small and slow drones, a stop between walls that no drone senses, outlines that grow, and drones whose slowest speed is 0.
+#[test]
+fn scenes_of_other_sizes_and_speeds_are_reached() {
+    for name in ["indoor-grid", "outline-grows", "slowest-speed-zero", "walls-beside-the-stop"] {
+        assert_reached(name, "congestion-aware-paper");
+    }
+}
+
 /// The narrowest passable gap is 8 mm wider than twice the clearance. Drones fly round one that is narrower by a fifth of a millimetre, and
 /// through a wider one.
 #[test]

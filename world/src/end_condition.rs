@@ -6,7 +6,6 @@ use crate::grid::Grid;
 use crate::params::{End, WorldParams};
 use crate::stages::Stages;
 use skein_protocol::Vec2;
-use skein_protocol::formation::HOLD_SPEED_MPS;
 
 /// Whether the living drones stand in their formation.
 #[derive(Clone, Debug, Default)]
@@ -18,8 +17,10 @@ pub(crate) struct EndCondition {
     grid: Grid,
     /// Whether a drone stands in each slot.
     taken: Vec<bool>,
-    /// Which drones have been past all obstacles. They may turn back later: the leader chooses where the slots are.
-    past: Vec<bool>,
+    /// The greatest abscissa that each drone has had, m. It may turn back later: the leader chooses where the slots are.
+    reached_x_m: Vec<f64>,
+    /// Beyond this abscissa all obstacles are passed, m.
+    past_x_m: f64,
     /// Memory for the places of the drones, world frame, m.
     places: Vec<Vec2>,
 }
@@ -35,8 +36,9 @@ impl EndCondition {
         parts: &[Vec<usize>],
     ) -> bool {
         if let End::Hold { .. } = params.end {
-            self.note_past(stages.rear_x_m() + params.planning_distance_m, bodies);
-            if !self.holds(bodies) {
+            self.past_x_m = stages.past_x_m() + params.planning_distance_m;
+            self.note_reached(bodies);
+            if !self.holds(params, bodies) {
                 return false;
             }
         }
@@ -45,12 +47,12 @@ impl EndCondition {
 
     /// Whether the drone has been past all obstacles. Only known with [`End::Hold`].
     pub(crate) fn is_past(&self, drone: usize) -> bool {
-        self.past.get(drone).copied().unwrap_or(false)
+        self.reached_x_m.get(drone).is_some_and(|x_m| *x_m >= self.past_x_m)
     }
 
     /// Whether the drone is slow enough for a formation that is held.
-    pub(crate) fn is_slow(body: &Body) -> bool {
-        body.velocity().norm_squared() <= HOLD_SPEED_MPS * HOLD_SPEED_MPS
+    pub(crate) fn is_slow(params: &WorldParams, body: &Body) -> bool {
+        body.velocity().norm_squared() <= params.hold_speed_mps * params.hold_speed_mps
     }
 
     /// Whether these drones stand in their formation.
@@ -77,17 +79,17 @@ impl EndCondition {
         }
     }
 
-    fn note_past(&mut self, past_x_m: f64, bodies: &[Body]) {
-        self.past.resize(bodies.len(), false);
-        for (past, body) in self.past.iter_mut().zip(bodies) {
-            *past |= body.position().x >= past_x_m;
+    fn note_reached(&mut self, bodies: &[Body]) {
+        self.reached_x_m.resize(bodies.len(), f64::NEG_INFINITY);
+        for (reached_x_m, body) in self.reached_x_m.iter_mut().zip(bodies) {
+            *reached_x_m = reached_x_m.max(body.position().x);
         }
     }
 
     /// Whether every living drone has been past every obstacle and is slow.
-    fn holds(&self, bodies: &[Body]) -> bool {
-        let mut living = bodies.iter().zip(&self.past).filter(|(body, _)| body.is_alive());
-        living.all(|(body, past)| *past && Self::is_slow(body))
+    fn holds(&self, params: &WorldParams, bodies: &[Body]) -> bool {
+        let mut living = bodies.iter().enumerate().filter(|(_, body)| body.is_alive());
+        living.all(|(drone, body)| self.is_past(drone) && Self::is_slow(params, body))
     }
 
     /// Makes the slots for this number of drones, unless they are made already.
@@ -133,6 +135,7 @@ mod tests {
     use crate::testing::{params, rectangle, starts};
     use skein_protocol::Vec3;
     use skein_protocol::formation::Shape;
+    use skein_protocol::shape::ConvexShape;
 
     /// Eight drones at rest in a nested V with its front at this point, m.
     fn formed(front: Vec2) -> Vec<Body> {
@@ -180,10 +183,26 @@ mod tests {
         Stages::new(&[], 40.0)
     }
 
+    /// With one obstacle, which a drone has sensed.
+    fn sensed(shape: &ConvexShape) -> Stages {
+        Stages::sensed(&[Outline::new(shape)], 40.0)
+    }
+
+    #[test]
+    fn an_obstacle_that_no_drone_senses_lies_beside_the_way() {
+        let all = formed(Vec2::zeros());
+        let last = all.iter().map(|body| body.position().x).fold(f64::INFINITY, f64::min);
+        // A wall from 21 or 19 m behind the last drone on to far ahead of the first one.
+        let wall = |gap: f64| rectangle(last - gap + 500.0, 400.0, 500.0, 1.0);
+        let unseen = |gap| Stages::new(&[Outline::new(&wall(gap))], 40.0);
+        assert!(is_met(&hold(0.0), &all, &unseen(21.0)));
+        assert!(!is_met(&hold(0.0), &all, &sensed(&wall(21.0))));
+        assert!(!is_met(&hold(0.0), &all, &unseen(19.0)), "it may still lie ahead of the last drone");
+    }
+
     #[test]
     fn a_drone_that_turns_back_to_its_slot_stays_past_the_obstacles() {
-        let outline = Outline::new(&rectangle(0.0, 0.0, 10.0, 10.0));
-        let stages = Stages::new(&[outline], 40.0);
+        let stages = sensed(&rectangle(0.0, 0.0, 10.0, 10.0));
         let (params, mut condition) = (hold(-1e9), EndCondition::default());
         let mut is_met = |all: &[Body]| condition.is_met(&params, all, &stages, &living(all));
         assert!(!is_met(&formed(Vec2::new(20.0, 0.0))));
@@ -227,7 +246,7 @@ mod tests {
         all[7] = Body::new(all[7].position(), Vec3::new(0.0, 1.0, 0.0));
         assert!(is_met(&hold(0.0), &all, &open()));
         let last = all.iter().map(|body| body.position().x).fold(f64::INFINITY, f64::min);
-        let behind = |gap: f64| Stages::new(&[Outline::new(&rectangle(last - gap - 10.0, 0.0, 10.0, 5.0))], 40.0);
+        let behind = |gap: f64| sensed(&rectangle(last - gap - 10.0, 0.0, 10.0, 5.0));
         assert!(is_met(&hold(0.0), &all, &behind(20.001)));
         assert!(!is_met(&hold(0.0), &all, &behind(19.9)));
     }

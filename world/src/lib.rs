@@ -50,6 +50,7 @@
 //!     end: End::Hold { stop_x_m: 1000.0 },
 //!     parts: PartsRule::One,
 //!     arrival_error_m: 0.8,
+//!     hold_speed_mps: 1.0,
 //!     shape: Shape::NestedV,
 //!     spacing_m: 35.0,
 //!     energy: EnergyModel::default(),

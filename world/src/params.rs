@@ -93,6 +93,8 @@ pub struct WorldParams {
     pub parts: PartsRule,
     /// Largest slot error of a closed formation, m.
     pub arrival_error_m: f64,
+    /// Greatest speed of a drone in a formation that is held, m/s.
+    pub hold_speed_mps: f64,
     /// The shape of the formation.
     pub shape: Shape,
     /// The spacing of the formation, m.
@@ -167,6 +169,7 @@ impl WorldParams {
             ("detection_range_m", self.detection_range_m),
             ("ranging_m", self.ranging_m.unwrap_or(0.0)),
             ("arrival_error_m", self.arrival_error_m),
+            ("hold_speed_mps", self.hold_speed_mps),
             ("spacing_m", self.spacing_m),
             ("energy.wind_mps", self.energy.wind_mps.norm()),
         ];

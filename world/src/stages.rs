@@ -20,9 +20,26 @@ struct Stage {
 #[derive(Clone, Debug)]
 pub(crate) struct Stages {
     stages: Vec<Stage>,
-    /// The number of the set of each obstacle.
-    set_of: Vec<usize>,
+    obstacles: Vec<Extent>,
+    past_x_m: f64,
+}
+
+/// Where an obstacle is along the flight.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extent {
+    /// The number of its set.
+    set: usize,
+    front_x_m: f64,
     rear_x_m: f64,
+    /// Whether a living drone has sensed it.
+    sensed: bool,
+}
+
+impl Extent {
+    /// From this abscissa on it does not have to be passed any more, m. One that no drone ever senses lies beside the way.
+    fn end_x_m(&self) -> f64 {
+        if self.sensed { self.rear_x_m } else { self.front_x_m }
+    }
 }
 
 impl Stages {
@@ -30,21 +47,37 @@ impl Stages {
     pub(crate) fn new(outlines: &[Outline], gap_m: f64) -> Self {
         let mut order: Vec<usize> = (0..outlines.len()).collect();
         order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
-        let mut made = Self { stages: Vec::new(), set_of: vec![0; outlines.len()], rear_x_m: f64::NEG_INFINITY };
+        let obstacles = vec![Extent::default(); outlines.len()];
+        let mut made = Self { stages: Vec::new(), obstacles, past_x_m: f64::NEG_INFINITY };
         let mut centres: Vec<f64> = Vec::new();
+        let mut last_x_m = f64::NEG_INFINITY;
         for obstacle in order {
-            let outline = &outlines[obstacle];
-            if !centres.is_empty() && outline.low().x - made.rear_x_m >= gap_m {
+            let (front_x_m, rear_x_m) = (outlines[obstacle].low().x, outlines[obstacle].high().x);
+            if !centres.is_empty() && front_x_m - last_x_m >= gap_m {
                 made.close(&centres);
                 centres.clear();
             }
-            made.set_of[obstacle] = made.stages.len();
-            made.rear_x_m = made.rear_x_m.max(outline.high().x);
-            centres.push((outline.low().x + outline.high().x) / 2.0);
+            made.obstacles[obstacle] = Extent { set: made.stages.len(), front_x_m, rear_x_m, sensed: false };
+            last_x_m = last_x_m.max(rear_x_m);
+            centres.push((front_x_m + rear_x_m) / 2.0);
         }
         if !centres.is_empty() {
             made.close(&centres);
         }
+        made.past_x_m = made.ends();
+        made
+    }
+
+    fn ends(&self) -> f64 {
+        self.obstacles.iter().map(Extent::end_x_m).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// With obstacles that were all sensed.
+    #[cfg(test)]
+    pub(crate) fn sensed(outlines: &[Outline], gap_m: f64) -> Self {
+        let mut made = Self::new(outlines, gap_m);
+        made.obstacles.iter_mut().for_each(|obstacle| obstacle.sensed = true);
+        made.past_x_m = made.ends();
         made
     }
 
@@ -53,9 +86,9 @@ impl Stages {
         self.stages.push(Stage { centre_x_m, detected: false, passed: false });
     }
 
-    /// The greatest abscissa of any obstacle, m; −∞ without obstacles.
-    pub(crate) fn rear_x_m(&self) -> f64 {
-        self.rear_x_m
+    /// The greatest abscissa of the obstacles that were sensed, and of the front edges of all others, m; −∞ without obstacles.
+    pub(crate) fn past_x_m(&self) -> f64 {
+        self.past_x_m
     }
 
     /// Number of sets.
@@ -86,7 +119,11 @@ impl Stages {
     /// Logs the sets that are sensed for the first time, at the time when the tick opens.
     pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
-            let number = self.set_of[contact.obstacle as usize];
+            let obstacle = &mut self.obstacles[contact.obstacle as usize];
+            let number = obstacle.set;
+            if !std::mem::replace(&mut obstacle.sensed, true) {
+                self.past_x_m = self.past_x_m.max(obstacle.rear_x_m);
+            }
             if !std::mem::replace(&mut self.stages[number].detected, true) {
                 let what = EventKind::Detected {
                     stage: number as u32,
@@ -136,7 +173,8 @@ mod tests {
 
     #[test]
     fn sets_are_numbered_in_flight_order() {
-        assert_eq!((forest().set_of, forest().rear_x_m), (vec![1, 1, 0], 650.0));
+        let sets: Vec<usize> = forest().obstacles.iter().map(|obstacle| obstacle.set).collect();
+        assert_eq!(sets, [1, 1, 0]);
         assert_eq!(forest().stages.iter().map(|s| s.centre_x_m).collect::<Vec<_>>(), [320.0, 640.0]);
     }
 
@@ -186,6 +224,6 @@ mod tests {
     #[test]
     fn without_obstacles_all_sets_are_passed() {
         let stages = Stages::new(&[], 40.0);
-        assert_eq!(stages.rear_x_m, f64::NEG_INFINITY);
+        assert_eq!(stages.past_x_m, f64::NEG_INFINITY);
     }
 }

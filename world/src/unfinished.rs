@@ -47,7 +47,7 @@ impl Unfinished<'_> {
         match self.params.end {
             End::Hold { .. } if !self.condition.is_past(drone) => Some(Lack::Pass),
             End::Hold { .. } if outside => Some(Lack::Slot),
-            End::Hold { .. } => (!EndCondition::is_slow(body)).then_some(Lack::Stop),
+            End::Hold { .. } => (!EndCondition::is_slow(self.params, body)).then_some(Lack::Stop),
             End::Goal { .. } => outside.then_some(Lack::Slot),
             End::Pilots => (!self.processes[drone].slot().is_done()).then_some(Lack::Done),
             End::Time { .. } => None,
@@ -87,7 +87,7 @@ mod tests {
     fn found(end: End, bodies: &[Body], slots: &[Slot]) -> Vec<UnfinishedDrone> {
         let params = WorldParams { end, ..params() };
         let outline = Outline::new(&rectangle(-20.0, 0.0, 10.0, 10.0));
-        let (stages, mut condition) = (Stages::new(&[outline], 40.0), EndCondition::default());
+        let (stages, mut condition) = (Stages::sensed(&[outline], 40.0), EndCondition::default());
         let mut processes = vec![Process::default(); bodies.len()];
         for (process, slot) in processes.iter_mut().zip(slots) {
             process.take(slot);

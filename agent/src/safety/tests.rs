@@ -10,6 +10,7 @@ const PARAMS: SafetyParams = SafetyParams {
     margin: 0.02,
     reaction_time_s: 0.0,
     dt_s: DT,
+    scale: Scale::FULL,
 };
 const DT: f64 = 0.02;
 

@@ -14,6 +14,7 @@ use skein_leader::routes::RouteParams;
 use skein_leader::slots::Reformation;
 use skein_protocol::digest::Digest;
 use skein_protocol::formation::Shape;
+use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, PlanStamp, SimTime, Vec2};
 use std::collections::BTreeMap;
@@ -63,7 +64,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             strategy: Strategy::PaperRule,
             speed_mps: SPEED_MPS,
             headway_s: 4.0,
-            routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0 },
+            routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
             shape: Shape::V,
             spacing_m: 40.0,
             reformation: Reformation::Optimal,
