@@ -7,8 +7,9 @@ use crate::onward;
 use crate::own_state::OwnState;
 use crate::params::Between;
 use crate::relays::Relays;
-use crate::tuning::{BEHIND_S, LEFT_OUT_S};
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
+use crate::tuning::{ARRIVED_S, BEHIND_S, LEFT_OUT_S};
+use skein_protocol::payload::Plan;
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, SimTime, Vec2};
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -200,9 +201,17 @@ fn any_has_ahead(k: &Knowledge, now: SimTime, me: &Member) -> bool {
     has_ahead(k, k.living_peers(now).chain([*me]))
 }
 
+/// Whether this drone's group has waited at its destination for long. Groups that plan by themselves may stop where the swarm as a whole
+/// would have to fly on, or in the same slots.
+fn has_waited(k: &Knowledge, now: SimTime) -> bool {
+    let plan = k.ledger().obeyed().map(|bundle| &bundle.plan).filter(|plan| plan.phase() == Phase::Cruise);
+    plan.and_then(Plan::anchor_stops).is_some_and(|stops| now.since(stops) >= ARRIVED_S)
+}
+
 /// Whether groups still go on by themselves.
 fn goes_on(k: &Knowledge, now: SimTime, me: &Member) -> bool {
     k.params().between == Between::GoOn
+        && !has_waited(k, now)
         && onward::is_under_way(k.params(), k.living_peers(now).chain([*me]).map(|m| m.position))
 }
 

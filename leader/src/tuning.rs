@@ -35,6 +35,9 @@ pub(crate) const PARTED_TIMEOUTS: f64 = 4.0;
 pub(crate) const MAX_REJECTIONS: usize = 4;
 /// A leader that has been last in the formation for this long transfers its leadership, s. 3. By hand.
 pub(crate) const BEHIND_S: f64 = 3.0;
+/// A group that goes on by itself and has been at its destination for this long makes one formation of the swarm, s, if no drone has an
+/// obstacle ahead. 20. By hand: longer than groups come one after another.
+pub(crate) const ARRIVED_S: f64 = 20.0;
 /// A drone that has had no assignment in its leader's newest plan for this long concludes that the leader does not hear
 /// it, s. 4. By hand.
 pub(crate) const LEFT_OUT_S: f64 = 4.0;

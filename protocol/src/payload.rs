@@ -293,6 +293,16 @@ impl Plan {
         }
         (here, velocity)
     }
+
+    /// When the anchor has come to its stop; `None` if it never does.
+    #[must_use]
+    pub fn anchor_stops(&self) -> Option<SimTime> {
+        let (way_m, speed_mps) = (self.anchor_stop_x_m - self.anchor_m[0], self.anchor_mps[0]);
+        if speed_mps <= 0.0 || way_m <= 0.0 {
+            return (self.anchor_mps == [0.0; 2] || speed_mps > 0.0).then_some(self.stamp);
+        }
+        way_m.is_finite().then(|| self.stamp.after(way_m / speed_mps))
+    }
 }
 
 impl fmt::Debug for Plan {

@@ -4,7 +4,7 @@ use crate::mission;
 use skein_agent::PilotParams;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 use skein_protocol::{DroneId, SimTime, Vec2};
-use skein_scenario::{End, Scenario};
+use skein_scenario::{End, Parts, Scenario};
 
 /// The greatest speed from which a drone of this scenario stops within what it senses, m/s: before an obstacle at the edge of the
 /// detection range, and before a drone that comes the other way at the edge of the ranging distance.
@@ -47,6 +47,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
         too_fast(scenario, "drone.speed_mps", scenario.drone.speed_mps),
         too_fast(scenario, "mission.reform_speed_max_mps", scenario.reform_speed_max_mps()),
         slots_too_close(scenario),
+        slots_out_of_reach(scenario),
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),
         enclosed(&no_way, 2.0 * scenario.half_gap_m()),
@@ -76,6 +77,8 @@ fn lag(scenario: &Scenario) -> u32 {
 fn too_fast(scenario: &Scenario, key: &str, speed_mps: f64) -> Option<String> {
     let limit_mps = speed_on_sight_mps(scenario);
     (speed_mps > limit_mps + 1e-9).then(|| {
+        // A sum of two keys may end in a rounding error.
+        let speed_mps = (speed_mps * 1e6).round() / 1e6;
         let ranging_m = scenario.ranging_m();
         format!(
             "{key} = {speed_mps} m/s, but drones fly at most {limit_mps:.2} m/s: from a higher speed they cannot stop within \
@@ -97,6 +100,35 @@ fn slots_too_close(scenario: &Scenario) -> Option<String> {
              apart): the formation may not close; raise formation.spacing_m or lower drone.reaction_time_s"
         )
     })
+}
+
+/// Slots that are so far from all others that the drones in them hear no other drone.
+fn slots_out_of_reach(scenario: &Scenario) -> Option<String> {
+    let range_m = scenario.radio().beacon_range_m();
+    if range_m.is_infinite() || scenario.mission.parts == Parts::Each {
+        return None;
+    }
+    let gap_m = widest_gap_m(&scenario.slots())?;
+    (gap_m > range_m).then(|| {
+        format!(
+            "two parts of the formation are {gap_m:.1} m apart, and drones hear each other over radio.range_m = {range_m} m: the \
+             parts do not hear each other; raise radio.range_m, lower formation.spacing_m, or set mission.parts = \"each\""
+        )
+    })
+}
+
+/// The least range over which all points are connected, over any number of others, m; `None` for fewer than two. The longest edge of a
+/// minimum spanning tree (Prim).
+fn widest_gap_m(points: &[Vec2]) -> Option<f64> {
+    let (first, others) = points.split_first()?;
+    let mut left: Vec<(Vec2, f64)> = others.iter().map(|point| (*point, (point - first).norm())).collect();
+    let mut widest_m: Option<f64> = None;
+    while let Some(next) = (0..left.len()).min_by(|&a, &b| left[a].1.total_cmp(&left[b].1)) {
+        let (joined, gap_m) = left.swap_remove(next);
+        widest_m = Some(widest_m.map_or(gap_m, |widest_m| widest_m.max(gap_m)));
+        left.iter_mut().for_each(|(point, gap_m)| *gap_m = gap_m.min((*point - joined).norm()));
+    }
+    widest_m
 }
 
 /// Distance of the two nearest points, m; `None` for fewer than two. A sweep along x.
@@ -225,6 +257,21 @@ mod tests {
             "[formation]\ndrones = 8\n[[fault]]\nkind = \"ranging\"\nat_s = 5\ndrone = 1\nranging_dropout_share = 1\n";
         let scenario = Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &[]).unwrap();
         assert!(kept_distances(&scenario).by_words);
+    }
+
+    #[test]
+    fn a_formation_whose_parts_do_not_hear_each_other_is_warned_of() {
+        let line = "[formation]\ndrones = 6\nshape = \"line\"\nspacing_m = 60\n";
+        assert_eq!(warned(&format!("{line}[radio]\nrange_m = 61\n")), "", "drones pass on what others do not hear");
+        let cut = warned(&format!("{line}[radio]\nrange_m = 59\n"));
+        assert!(cut.contains("60.0 m apart") && cut.contains("radio.range_m = 59 m"), "{cut}");
+        assert_eq!(warned(&format!("{line}[mission]\nparts = \"each\"\n[radio]\nrange_m = 59\n")), "");
+    }
+
+    #[test]
+    fn a_sum_of_two_keys_has_no_rounding_error() {
+        let fast = warned("[drone]\nspeed_mps = 0.63\nspeed_change_mps = 0.63\n[sensors]\ndetection_range_m = 15.01\n");
+        assert!(fast.contains("mission.reform_speed_max_mps = 1.26 m/s"), "{fast}");
     }
 
     #[test]

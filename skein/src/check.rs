@@ -37,7 +37,7 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         for (number, set) in sets.iter().enumerate() {
             let ids: Vec<String> = set.obstacles.iter().map(|id| id.0.to_string()).collect();
             let ids = ids.join(", ");
-            let (routes, gate_x_m) = (set.routes.count(), set.routes.gate_x_m());
+            let (routes, gate_x_m) = (set.routes.count(), (set.routes.gate_x_m() * 1e3).round() / 1e3);
             text += &format!("set {number}      obstacles {ids}: {routes} routes, gate at x = {gate_x_m} m\n");
         }
         text += &format!("on sight   {on_sight_mps:.2} m/s at most: drones can stop within what they sense\n");
