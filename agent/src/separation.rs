@@ -11,7 +11,7 @@ use crate::tuning::STILL_MPS;
 use own_path::OwnPath;
 use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
-use separation_pair::{NumberedLine, SeparationPair, Statement};
+use separation_pair::{NO_LINE, NumberedLine, SeparationPair, Statement};
 use skein_leader::peers::Peers;
 use skein_protocol::payload::{MAX_SEPARATORS, Pose, Separation, Separator};
 use skein_protocol::scale::Scale;
@@ -81,17 +81,18 @@ struct Known {
     changed: SimTime,
     /// What this drone ranges of the other one in this tick.
     seen: Option<Sighting>,
-    /// Whether this drone is bound to a line to which it has heard the other one to be bound. The two have a common line then, and
-    /// from then on.
-    agreed: bool,
     /// Whether this drone makes a first line if there is none.
     opens: bool,
     /// Whether it last said what it says in turn with its newest line.
     answered: bool,
+    /// Whether the other drone has been restarted and was not heard since to be bound to a line of this drone.
+    forgotten: bool,
+    /// How often this drone has spoken to it.
+    turn: usize,
 }
 
 impl Known {
-    fn new(pair: SeparationPair, peer: DroneId, changed: SimTime, agreed: bool) -> Self {
+    fn new(pair: SeparationPair, peer: DroneId, changed: SimTime) -> Self {
         Self {
             pair,
             peer,
@@ -99,17 +100,26 @@ impl Known {
             said: SimTime::ZERO,
             changed,
             seen: None,
-            agreed,
             opens: false,
             answered: false,
+            forgotten: false,
+            turn: 0,
         }
     }
 
-    /// What is to be said now: the newest line; or, every other time, an answer to the other drone.
-    fn statement(&mut self) -> Option<Statement> {
+    /// Hears which incarnation of the other drone speaks.
+    fn hear_incarnation(&mut self, incarnation: u32) {
+        self.forgotten |= self.pair.hear_incarnation(incarnation);
+    }
+
+    /// What is to be said now: the newest line; each line in turn if the other drone has forgotten them; or, every other time, an answer to the other drone. Without a line, that there is none,
+    /// unless ranging keeps the two apart.
+    fn statement(&mut self, ranges: bool) -> Option<Statement> {
         let answer = self.pair.answer().filter(|_| !self.answered);
         self.answered = answer.is_some();
-        answer.or_else(|| self.pair.statement())
+        self.turn = self.turn.wrapping_add(1);
+        let in_turn = if self.forgotten { self.pair.statement_in_turn(self.turn) } else { None };
+        in_turn.or(answer).or_else(|| self.pair.statement()).or_else(|| self.pair.lacks_line().filter(|_| !ranges))
     }
 }
 
@@ -150,7 +160,7 @@ impl Separations {
                 0 | 1 => SeparationPair::new(side, params.first_line(me.min(peer), me.max(peer))),
                 _ => SeparationPair::restarted(side, incarnation),
             };
-            Known::new(pair, peer, now, incarnation < 2)
+            Known::new(pair, peer, now)
         });
         let known = known.collect();
         Self::of(params, known, false)
@@ -162,7 +172,7 @@ impl Separations {
         let (me, incarnation) = (params.me, params.incarnation);
         let known = params.others().map(|peer| {
             let pair = SeparationPair::restarted(side_of(me, peer), incarnation);
-            Known::new(pair, peer, now, false)
+            Known::new(pair, peer, now)
         });
         let known = known.collect();
         Self::of(params, known, true)
@@ -181,19 +191,13 @@ impl Separations {
     /// Whether this drone and another one have a common line, as far as this drone knows.
     #[must_use]
     pub fn has_agreed(&self, peer: DroneId) -> bool {
-        self.known.get(self.place(peer)).is_some_and(|known| known.peer == peer && known.agreed)
+        self.known.get(self.place(peer)).is_some_and(|known| known.peer == peer && known.pair.has_agreed())
     }
 
     /// Whether this drone knows that it has a common line with every other drone.
     #[must_use]
     pub fn has_agreed_with_all(&self) -> bool {
-        self.known.iter().all(|known| known.agreed)
-    }
-
-    /// Whether there is another drone of which no line is known. Such a drone has been restarted; it hovers.
-    #[must_use]
-    pub fn must_hover(&self) -> bool {
-        self.known.iter().any(|known| known.pair.lines().is_empty())
+        self.known.iter().all(|known| known.pair.has_agreed())
     }
 
     /// The lines to which this drone is bound, and its side of each.
@@ -227,7 +231,8 @@ impl Separations {
         let place = |drone: DroneId| peers.last(drone).map_or(params.start(drone), |pose| pose.position());
         let speaker = separation.drone(source);
         let (from, of) = (place(source), place(speaker));
-        for line in separation.separators().iter().filter(|line| line.peer != me && params.knows(line.peer)) {
+        let lines = separation.separators().iter().filter(|line| line.number != NO_LINE);
+        for line in lines.filter(|line| line.peer != me && params.knows(line.peer)) {
             let to = place(line.peer);
             let (said_m, own_m) = ((from - to).norm(), (path.end() - to).norm());
             let distances = Distances { said_m, own_m, pair_m: (of - to).norm(), reach_m };
@@ -242,8 +247,9 @@ impl Separations {
         let Some(known) = self.find(speaker) else { return };
         for separator in separation.separators().iter().filter(|s| s.peer == me) {
             let heard = statement(separator);
+            known.opens |= !ranges && known.pair.may_open(&heard);
             let motion_s = heard.bound_to.line.rests_after_s(path.now());
-            if !known.pair.counts(&heard) || motion_s > LONGEST_MOTION_S {
+            if !known.pair.counts(&heard) || heard.bound_to.number == NO_LINE || motion_s > LONGEST_MOTION_S {
                 continue;
             }
             if known.heard.is_none_or(|before| before.number < heard.bound_to.number) {
@@ -252,7 +258,7 @@ impl Separations {
             }
             let side = known.pair.side();
             known.pair.hear(&heard, |line| path.distance_m(line, side) >= half_m);
-            known.agreed |= known.pair.is_bound_to(heard.bound_to.number);
+            known.forgotten &= !known.pair.is_bound_to(heard.bound_to.number);
             known.opens |= ranges;
         }
     }
@@ -260,7 +266,7 @@ impl Separations {
     /// Hears which incarnation of another drone speaks.
     pub fn hear_incarnation(&mut self, source: DroneId, incarnation: u32) {
         if let Some(known) = self.find(source) {
-            known.pair.hear_incarnation(incarnation);
+            known.hear_incarnation(incarnation);
         }
     }
 
@@ -312,11 +318,11 @@ impl Separations {
             known.said = now;
             if let Some(pose) = peers.last(known.peer).map(|beacon| beacon.pose()) {
                 // A drone that is out of reach may have been restarted: its state is passed on.
-                known.pair.hear_incarnation(pose.incarnation);
+                known.hear_incarnation(pose.incarnation);
                 let pose = known.seen.map_or(pose, |seen| seen.at(now, &pose));
                 self.params.propose(known, &pose, peers.delay_s(), path);
             }
-            separators.extend(known.statement().map(|said| separator(known.peer, &said)));
+            separators.extend(known.statement(self.ranges).map(|said| separator(known.peer, &said)));
         }
         say.extend(separators.chunks(MAX_SEPARATORS).map(message));
     }

@@ -401,7 +401,7 @@ impl SwarmPilot {
             velocity_mps: n.velocity() + now.velocity(),
         });
         let alone = separations.is_some_and(|lines| match self.params.apart_by_words {
-            true => lines.must_hover(),
+            true => !lines.has_agreed_with_all(),
             false => now.broken.ranging && !lines.has_agreed_with_all(),
         });
         // What a drone remembers of an outline may be a part of it.

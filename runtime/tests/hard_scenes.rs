@@ -51,7 +51,9 @@ fn the_papers_rule_reaches_every_hard_scene() {
 /// Drones once turned to and fro before an obstacle, or two parts of a swarm waited for each other, until the time was over.
 #[test]
 fn no_drone_waits_or_turns_for_ever() {
-    for name in ["along-the-wall", "close-corners", "hardly-wide-enough", "parts-that-wait", "to-and-fro", "torn-formation"] {
+    for name in
+        ["along-the-wall", "close-corners", "hardly-wide-enough", "parts-that-wait", "to-and-fro", "torn-formation"]
+    {
         assert_reached(name, "congestion-aware-paper");
     }
 }

@@ -143,3 +143,13 @@ fn a_queue_keeps_its_order_when_assignments_are_lost() {
         assert!(lte < 1.05 * ideal, "seed {seed}: {lte} ticks over lte, {ideal} over an ideal radio");
     }
 }
+
+/// By word alone: two drones at nearly the same time, all drones at once, and one drone in a jam.
+#[test]
+fn restarted_drones_agree_on_lines_again() {
+    let all = r#"{ kind = "restart", at_s = 20, for_s = 1, target = "all" }"#;
+    for (name, keys) in [("two-restarts", &[][..]), ("two-restarts", &[("fault.2", all)]), ("restart-in-a-jam", &[])] {
+        let Ending { outcome, reason, .. } = fly(&format!("hard/{name}"), keys);
+        assert_eq!(outcome, Some(Outcome::Reached), "{name} {keys:?}: {reason}");
+    }
+}

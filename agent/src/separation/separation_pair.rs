@@ -1,10 +1,13 @@
 //! The lines between this drone and one other, and the rules by which they change (docs/safety.md, "By word alone").
 
 use super::separating_line::{SeparatingLine, Side};
-use skein_protocol::SimTime;
+use skein_protocol::{SimTime, Vec2};
 
 /// Greatest number of lines that do not imply each other. A drone that is bound to that many makes no further line.
 const MAX_LINES: usize = 6;
+
+/// In place of the number of a line, if a drone says that it knows no line.
+pub const NO_LINE: u32 = u32::MAX;
 
 /// A line with its number.
 #[derive(Clone, Copy, Debug, PartialEq, Hash)]
@@ -41,6 +44,9 @@ pub struct SeparationPair {
     implied: Vec<u32>,
     /// The highest number seen.
     newest: u32,
+    /// Whether this drone is bound to a line to which it has heard the other one to be bound. The two have a common line then, and from
+    /// then on.
+    agreed: bool,
 }
 
 impl SeparationPair {
@@ -48,13 +54,14 @@ impl SeparationPair {
     #[must_use]
     pub fn new(side: Side, first: SeparatingLine) -> Self {
         let bound = vec![NumberedLine { number: 0, line: first }];
-        Self { side, incarnation: 1, peer_incarnation: 1, bound, implied: Vec::new(), newest: 0 }
+        Self { side, incarnation: 1, peer_incarnation: 1, bound, implied: Vec::new(), newest: 0, agreed: true }
     }
 
-    /// A drone on `side` that has been restarted and knows no line. It hovers until it hears one.
+    /// A drone on `side` that has been restarted and knows no line. It hovers until the two [agree](Self::has_agreed).
     #[must_use]
     pub fn restarted(side: Side, incarnation: u32) -> Self {
-        Self { side, incarnation, peer_incarnation: 1, bound: Vec::new(), implied: Vec::new(), newest: 0 }
+        let (bound, implied) = (Vec::new(), Vec::new());
+        Self { side, incarnation, peer_incarnation: 1, bound, implied, newest: 0, agreed: false }
     }
 
     /// The drone's side.
@@ -67,6 +74,25 @@ impl SeparationPair {
     #[must_use]
     pub fn lines(&self) -> &[NumberedLine] {
         &self.bound
+    }
+
+    /// Whether this drone knows that the two have a common line.
+    #[must_use]
+    pub fn has_agreed(&self) -> bool {
+        self.agreed
+    }
+
+    /// What a drone says that knows no line: the other one may make a first line if it knows none either. `None` if it knows one.
+    #[must_use]
+    pub fn lacks_line(&self) -> Option<Statement> {
+        let nowhere = SeparatingLine::resting(SimTime::ZERO, Vec2::x(), 0.0);
+        self.bound.is_empty().then(|| self.says(NumberedLine { number: NO_LINE, line: nowhere }))
+    }
+
+    /// Whether this drone may make a first line, having heard this: neither drone knows a line of the other's present incarnation.
+    #[must_use]
+    pub fn may_open(&self, heard: &Statement) -> bool {
+        heard.bound_to.number == NO_LINE && self.bound.is_empty() && self.counts(heard)
     }
 
     /// What the drone says: the line with the highest number to which it is bound.
@@ -88,9 +114,20 @@ impl SeparationPair {
         Statement { bound_to, incarnation: self.incarnation, addressed: self.peer_incarnation }
     }
 
-    /// Hears which incarnation of the other drone speaks. From a new one on, what an older one said no longer counts.
-    pub fn hear_incarnation(&mut self, incarnation: u32) {
+    /// What a drone says whose other drone was restarted: each line to which it is bound in turn. The other one keeps to the oldest of them,
+    /// and maybe to no newer one. `turn`: how often it has spoken.
+    #[must_use]
+    pub fn statement_in_turn(&self, turn: usize) -> Option<Statement> {
+        let index = turn.checked_rem(self.bound.len())?;
+        self.bound.get(index).map(|&line| self.says(line))
+    }
+
+    /// Hears which incarnation of the other drone speaks. From a new one on, what an older one said no longer counts. Returns whether it is
+    /// a new one.
+    pub fn hear_incarnation(&mut self, incarnation: u32) -> bool {
+        let is_new = incarnation > self.peer_incarnation;
         self.peer_incarnation = self.peer_incarnation.max(incarnation);
+        is_new
     }
 
     /// Whether a statement counts: it is said by the incarnation that this drone listens to, and to this drone's incarnation.
@@ -103,12 +140,13 @@ impl SeparationPair {
     /// given and full braking after them, keeps to the line. The drone binds itself to the line if it can and if that frees it from an
     /// older line. It is then free of all lines with lower numbers.
     pub fn hear(&mut self, heard: &Statement, keeps: impl FnOnce(&SeparatingLine) -> bool) {
-        if !self.counts(heard) {
+        if !self.counts(heard) || heard.bound_to.number == NO_LINE {
             return;
         }
         let heard = heard.bound_to;
         self.newest = self.newest.max(heard.number);
         if self.is_bound_to(heard.number) {
+            self.agreed = true;
             self.forget_below(heard.number);
             return;
         }
@@ -116,6 +154,7 @@ impl SeparationPair {
         if useful && keeps(&heard.line) {
             let place = self.bound.partition_point(|known| known.number < heard.number);
             self.bound.insert(place, heard);
+            self.agreed = true;
             self.forget_below(heard.number);
         }
     }
@@ -160,7 +199,8 @@ impl SeparationPair {
     /// The next number that no drone has used.
     fn next_number(&self) -> Option<u32> {
         let next = self.newest.checked_add(1)?;
-        if next % 2 == self.parity() { Some(next) } else { next.checked_add(1) }
+        let next = if next % 2 == self.parity() { next } else { next.checked_add(1)? };
+        (next != NO_LINE).then_some(next)
     }
 
     /// Whether the drone is bound to the line with this number.
@@ -178,7 +218,6 @@ impl SeparationPair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_protocol::Vec2;
 
     const NOW: SimTime = SimTime::ZERO;
 
@@ -258,7 +297,7 @@ mod tests {
         assert_eq!(made, MAX_LINES - 1);
         let mut restarted = SeparationPair::restarted(Side::Front, 2);
         assert!(!restarted.propose(line(0.0), NOW));
-        let bound_to = NumberedLine { number: u32::MAX, line: line(0.0) };
+        let bound_to = NumberedLine { number: NO_LINE - 1, line: line(0.0) };
         restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 1 }, |_| true);
         assert!(restarted.lines().is_empty(), "it was said to the incarnation before");
         restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 2 }, |_| true);

@@ -84,10 +84,10 @@ fn the_drone_ahead_gives_room_to_its_follower() {
 fn a_restarted_drone_hovers_until_all_others_have_addressed_it() {
     let (mut restarted, mut others) = (separations(1, 2), [separations(0, 1), separations(2, 1)]);
     let here = path(0, Vec2::new(-60.0, 0.0), Vec2::zeros());
-    assert!(restarted.must_hover() && restarted.lines().count() == 0);
+    assert!(!restarted.has_agreed_with_all() && restarted.lines().count() == 0);
     for (other, source) in others.iter_mut().zip([0, 2].map(DroneId)) {
         for knows in [false, true] {
-            assert!(restarted.must_hover(), "drone {source:?} has not addressed it");
+            assert!(!restarted.has_agreed_with_all(), "drone {source:?} has not addressed it");
             if knows {
                 other.hear_incarnation(DroneId(1), 2);
             }
@@ -102,7 +102,7 @@ fn a_restarted_drone_hovers_until_all_others_have_addressed_it() {
             restarted.hear(source, &said, &no_peers(), &here);
         }
     }
-    assert!(!restarted.must_hover());
+    assert!(restarted.has_agreed_with_all());
 }
 
 proptest! {

@@ -125,7 +125,7 @@ impl Crowd {
         let braking = self.params.law().braking(velocity);
         let acceleration = match talk.exchange(self, i, random) {
             None => braking,
-            Some(lines) if lines.must_hover() => braking,
+            Some(lines) if !lines.has_agreed_with_all() => braking,
             Some(lines) => {
                 let position = given.last().copied().unwrap();
                 let own = OwnMotion {

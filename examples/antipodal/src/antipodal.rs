@@ -140,7 +140,7 @@ impl Pilot for Antipodal {
         self.hear(senses.now, inbox, &path);
         self.speak(senses, &path, out);
         self.flown_m += velocity.norm() * limits.dt_s;
-        let wanted = match self.separations.must_hover() {
+        let wanted = match !self.separations.has_agreed_with_all() {
             true => limits.law().braking(velocity),
             false => self.wanted(position, velocity, limits.dt_s),
         };
