@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_sum_of_two_keys_has_no_rounding_error() {
-        let fast = warned("[drone]\nspeed_mps = 0.63\nspeed_change_mps = 0.63\n[sensors]\ndetection_range_m = 15.01\n");
+        let fast = warned("[drone]\nspeed_mps = 0.63\nspeed_change_mps = 0.63\n[sensors]\ndetection_range_m = 15.05\n");
         assert!(fast.contains("mission.reform_speed_max_mps = 1.26 m/s"), "{fast}");
     }
 
