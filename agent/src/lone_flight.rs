@@ -1,5 +1,6 @@
 //! Flight of a drone that has nothing left to pass and no formation to join: it flies on along the course. It waits beyond the
-//! goal, when it is too far ahead of the last drone, or when no other drone would hear it farther on. It does not return to the goal, where it could block other drones.
+//! goal, when it is too far ahead of the last drone, or when no other drone would hear it farther on. It does not return to the
+//! goal, where it could block other drones.
 
 use crate::guidance::GuidanceParams;
 use crate::tuning::{IN_REACH, LEAD_S, OVERSHOOT_S};

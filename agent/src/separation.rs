@@ -112,8 +112,8 @@ impl Known {
         self.forgotten |= self.pair.hear_incarnation(incarnation);
     }
 
-    /// What is to be said now: the newest line; each line in turn if the other drone has forgotten them; or, every other time, an answer to the other drone. Without a line, that there is none,
-    /// unless ranging keeps the two apart.
+    /// What is to be said now: the newest line; each line in turn if the other drone has forgotten them; or, every other time, an answer to
+    /// the other drone. Without a line, that there is none, unless ranging keeps the two apart.
     fn statement(&mut self, ranges: bool) -> Option<Statement> {
         let answer = self.pair.answer().filter(|_| !self.answered);
         self.answered = answer.is_some();

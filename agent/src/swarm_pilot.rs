@@ -400,10 +400,8 @@ impl SwarmPilot {
             position_m: n.position(),
             velocity_mps: n.velocity() + now.velocity(),
         });
-        let alone = separations.is_some_and(|lines| match self.params.apart_by_words {
-            true => !lines.has_agreed_with_all(),
-            false => now.broken.ranging && !lines.has_agreed_with_all(),
-        });
+        let by_words_alone = self.params.apart_by_words || now.broken.ranging;
+        let alone = by_words_alone && separations.is_some_and(|lines| !lines.has_agreed_with_all());
         // What a drone remembers of an outline may be a part of it.
         let hovers = alone || (now.broken.obstacles && self.params.sensing.partial_outlines);
         let wanted = if hovers { self.braking_filter.params().law().braking(then.velocity()) } else { wanted };

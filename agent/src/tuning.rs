@@ -18,7 +18,8 @@ pub(crate) const BEACON_REACH: f64 = 4.0;
 /// safety filter keeps, so that the filter need not act. `skein sweep experiments/faults.toml`.
 pub(crate) const SILENT_DRONE_RADIUS: f64 = 1.1;
 
-/// Speed below which a drone counts as still, m/s, at full [`Scale`](skein_protocol::scale::Scale). Chosen by hand. `skein sweep experiments/wide-scenes.toml`.
+/// Speed below which a drone counts as still, m/s, at full [`Scale`](skein_protocol::scale::Scale). Chosen by hand. `skein sweep
+/// experiments/wide-scenes.toml`.
 pub(crate) const STILL_MPS: f64 = 0.3;
 
 /// How long a drone on its route waits before it escapes from where it is stuck, s. Chosen by hand. `skein sweep

@@ -5,7 +5,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Scale(f64);
 
-/// Drones that keep at least this distance are not small, m: the paper's safe distance.
+/// Drones that keep at least this distance are not small, m: the safe distance of `scenarios/paper/forest.toml`.
 const SAFE_DISTANCE_M: f64 = 25.0;
 /// Drones that fly at least at this speed are not small, m/s: the paper's nominal speed.
 const SPEED_MPS: f64 = 10.0;

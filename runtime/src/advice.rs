@@ -102,7 +102,7 @@ fn slots_too_close(scenario: &Scenario) -> Option<String> {
     })
 }
 
-/// Slots that are so far from all others that the drones in them hear no other drone.
+/// A formation in parts that are too far apart for drones to hear each other.
 fn slots_out_of_reach(scenario: &Scenario) -> Option<String> {
     let range_m = scenario.radio().beacon_range_m();
     if range_m.is_infinite() || scenario.mission.parts == Parts::Each {

@@ -140,9 +140,9 @@ impl Pilot for Antipodal {
         self.hear(senses.now, inbox, &path);
         self.speak(senses, &path, out);
         self.flown_m += velocity.norm() * limits.dt_s;
-        let wanted = match !self.separations.has_agreed_with_all() {
-            true => limits.law().braking(velocity),
-            false => self.wanted(position, velocity, limits.dt_s),
+        let wanted = match self.separations.has_agreed_with_all() {
+            true => self.wanted(position, velocity, limits.dt_s),
+            false => limits.law().braking(velocity),
         };
         let own = OwnMotion {
             tick: senses.tick,
