@@ -29,10 +29,30 @@ const TURNS: [f64; 5] = [
 /// Escape attempts of one drone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Escape {
-    still_since: Option<SimTime>,
+    still: Option<Standstill>,
     until: Option<SimTime>,
     direction: Vec2,
     attempts: usize,
+}
+
+/// The motion of the drone that may be stuck.
+#[derive(Clone, Copy, Debug)]
+pub struct Course {
+    /// When it is or will be in this state.
+    pub now: SimTime,
+    /// World frame, m.
+    pub position: Vec2,
+    /// World frame, m/s.
+    pub velocity: Vec2,
+    /// Velocity that it wants to fly, world frame, m/s.
+    pub wanted: Vec2,
+}
+
+/// Where and when a drone became still.
+#[derive(Clone, Copy, Debug)]
+struct Standstill {
+    since: SimTime,
+    position: Vec2,
 }
 
 impl Escape {
@@ -42,29 +62,30 @@ impl Escape {
         self.attempts
     }
 
-    /// Returns the velocity to fly, world frame, m/s. This is `wanted` unless the drone has been stuck for `patience_s`. Then
-    /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `velocity` and `wanted`: world frame, m/s.
-    /// `scale`: how small the swarm is.
-    pub fn steer(
-        &mut self,
-        now: SimTime,
-        velocity: Vec2,
-        wanted: Vec2,
-        patience_s: f64,
-        speed_mps: f64,
-        scale: Scale,
-    ) -> Vec2 {
+    /// Returns the velocity to fly, world frame, m/s. This is the wanted one unless the drone has been stuck for `patience_s`. Then
+    /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `scale`: how small the swarm is.
+    ///
+    /// A drone that moves to and fro in one place is stuck as well: it counts as still until it is as far away as it would be after
+    /// `patience_s` at the speed of a still drone.
+    pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
+        let Course { now, position, velocity, wanted } = *course;
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        if velocity.norm() >= scale.of_full(STILL_MPS) || wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
-            self.still_since = None;
+        let still_mps = scale.of_full(STILL_MPS);
+        let is_still = velocity.norm() < still_mps;
+        let has_left = |still: Standstill| (position - still.position).norm() > still_mps * patience_s;
+        if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) || self.still.is_some_and(has_left) {
+            self.still = None;
             return wanted;
         }
-        let since = *self.still_since.get_or_insert(now);
+        if !is_still {
+            return wanted;
+        }
+        let since = self.still.get_or_insert(Standstill { since: now, position }).since;
         if now.since(since) < patience_s {
             return wanted;
         }
@@ -72,7 +93,7 @@ impl Escape {
         self.direction = turn * wanted.normalize();
         self.until = Some(now.after((FIRST_S + LONGER_S * self.attempts as f64).min(LONGEST_S)));
         self.attempts += 1;
-        self.still_since = None;
+        self.still = None;
         self.direction * speed_mps
     }
 }
@@ -83,43 +104,65 @@ mod tests {
 
     const WANTED: Vec2 = Vec2::new(10.0, 0.0);
 
+    /// The velocities that a drone flies in each second, with this patience and speed of escape. `state`: its position and velocity
+    /// in that second.
+    fn flown(seconds: u32, wanted: Vec2, speed_mps: f64, state: impl Fn(f64) -> (Vec2, Vec2)) -> Vec<Vec2> {
+        let mut escape = Escape::default();
+        let mut steer = |second: u32| {
+            let (position, velocity) = state(f64::from(second));
+            let course = Course { now: SimTime::from_secs(f64::from(second)), position, velocity, wanted };
+            escape.steer(&course, 3.0, speed_mps, Scale::FULL)
+        };
+        (0..seconds).map(&mut steer).collect()
+    }
+
+    fn at_rest(_: f64) -> (Vec2, Vec2) {
+        (Vec2::zeros(), Vec2::zeros())
+    }
+
     #[test]
     fn a_drone_that_moves_or_wants_to_stay_does_not_escape() {
-        let mut escape = Escape::default();
-        for second in 0..100 {
-            let now = SimTime::from_secs(f64::from(second));
-            assert_eq!(escape.steer(now, WANTED, WANTED, 3.0, 5.0, Scale::FULL), WANTED);
-            assert_eq!(escape.steer(now, Vec2::zeros(), Vec2::zeros(), 3.0, 5.0, Scale::FULL), Vec2::zeros());
-        }
+        let moved = flown(100, WANTED, 5.0, |second| (WANTED * second, WANTED));
+        assert!(moved.iter().all(|&velocity| velocity == WANTED));
+        let stayed = flown(100, Vec2::zeros(), 5.0, at_rest);
+        assert!(stayed.iter().all(|&velocity| velocity == Vec2::zeros()));
+    }
+
+    #[test]
+    fn a_drone_that_is_still_now_and_then_on_its_way_does_not_escape() {
+        // Every third second it is still, and it flies on for 2 m in between.
+        let state = |second: f64| {
+            let still = (second as u32).is_multiple_of(3);
+            (Vec2::new((second / 3.0).ceil() * 2.0, 0.0), Vec2::new(if still { 0.0 } else { 1.0 }, 0.0))
+        };
+        assert!(flown(100, WANTED, 5.0, state).iter().all(|&velocity| velocity == WANTED));
+    }
+
+    #[test]
+    fn a_drone_that_moves_to_and_fro_in_one_place_gets_stuck_as_well() {
+        // Half a metre to and fro, at half a metre per second.
+        let state = |second: f64| {
+            let odd = f64::from(second as u32 % 2);
+            (Vec2::new(odd * 0.5, 0.0), Vec2::new(odd * 0.5, 0.0))
+        };
+        let flown = flown(6, WANTED, 5.0, state);
+        assert_eq!(flown[..4], [WANTED; 4]);
+        assert!((flown[4] - Vec2::new(-5.0, 0.0)).norm() < 1e-9, "{flown:?}");
     }
 
     #[test]
     fn a_slow_drone_gets_stuck_as_well() {
-        let (mut escape, wanted) = (Escape::default(), Vec2::new(2.4, 0.0));
-        let at = |second: u32| SimTime::from_secs(f64::from(second));
-        let flown: Vec<Vec2> =
-            (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7, Scale::FULL)).collect();
-        assert_eq!(flown[2], wanted);
-        assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
-    }
-
-    #[test]
-    fn a_slow_drone_in_a_queue_gets_stuck_as_well() {
-        let (mut escape, wanted) = (Escape::default(), Vec2::new(1.7, 0.0));
-        let at = |second: u32| SimTime::from_secs(f64::from(second));
-        let flown: Vec<Vec2> =
-            (0..5).map(|second| escape.steer(at(second), Vec2::zeros(), wanted, 3.0, 1.7, Scale::FULL)).collect();
-        assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
+        // The second one is in a queue: it wants to fly at the speed of its escape.
+        for wanted in [Vec2::new(2.4, 0.0), Vec2::new(1.7, 0.0)] {
+            let flown = flown(5, wanted, 1.7, at_rest);
+            assert_eq!(flown[2], wanted);
+            assert!((flown[3] - Vec2::new(-1.7, 0.0)).norm() < 1e-9, "{flown:?}");
+        }
     }
 
     #[test]
     fn a_stuck_drone_backs_off_and_then_tries_the_sides() {
-        let mut escape = Escape::default();
-        let tried: Vec<Vec2> = (0..60)
-            .map(|second| {
-                escape.steer(SimTime::from_secs(f64::from(second)), Vec2::zeros(), WANTED, 3.0, 5.0, Scale::FULL)
-            })
-            .collect();
+        let tried = flown(60, WANTED, 5.0, at_rest);
         assert_eq!(tried[2], WANTED);
         assert!((tried[3] - Vec2::new(-5.0, 0.0)).norm() < 1e-9 && (tried[8] - tried[3]).norm() < 1e-9);
         assert_eq!(tried[9], WANTED);

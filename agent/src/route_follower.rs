@@ -90,6 +90,11 @@ impl RouteFollower {
         self.emergency = Some(route);
     }
 
+    /// Forgets the route of the drone's own.
+    pub fn drop_emergency(&mut self) {
+        self.emergency = None;
+    }
+
     /// Gives up the place in the queue of the first set that the drone has still to leave. It keeps its route, and flies behind all
     /// others until a new plan gives it a place.
     pub fn give_up_place(&mut self) {

@@ -6,7 +6,7 @@ use crate::braking_filter::{BrakingFilter, Moving, OwnMotion};
 use crate::detection::Detection;
 use crate::detour::{Detour, RouteView};
 use crate::emergency_route::EmergencyRoute;
-use crate::escape::Escape;
+use crate::escape::{Course, Escape};
 use crate::guidance::anchor;
 use crate::lone_flight::LoneFlight;
 use crate::navigator::{Heading, Navigator};
@@ -225,6 +225,7 @@ impl SwarmPilot {
     fn emergency_avoidance(&mut self, senses: &Senses<'_>) {
         // While the formation closes, the path to the slot leads round obstacles anyway.
         if self.leading.obeyed().is_some_and(|bundle| bundle.plan.phase() == Phase::Reform) {
+            self.route.drop_emergency();
             return;
         }
         let Some(id) = self.urgent_obstacle(senses) else { return };
@@ -426,8 +427,8 @@ impl SwarmPilot {
         let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
         let attempts = self.escape.attempts();
-        let wanted =
-            self.escape.steer(then.now, then.velocity(), wanted, patience_s, slow_mps, self.params.safety.scale);
+        let course = Course { now: then.now, position: then.position(), velocity: then.velocity(), wanted };
+        let wanted = self.escape.steer(&course, patience_s, slow_mps, self.params.safety.scale);
         if self.escape.attempts() > attempts {
             self.give_up_first_place(senses.now, open);
         }

@@ -25,6 +25,8 @@ pub(crate) struct FormationPlanner {
     stalled: Option<SimTime>,
     /// Whether the ranks are open.
     open: bool,
+    /// Whether the members have changed their slots since the ranks were last closed.
+    swapped: bool,
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
@@ -50,12 +52,7 @@ impl FormationPlanner {
             if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
                 return self.assign(s, Phase::Reform);
             }
-            return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| {
-                let pinned = s.members.iter().any(|m| is_alone(m, s));
-                let open = !pinned && !self.open;
-                *self = Self { open, pinned, pace: self.pace, ..Self::default() };
-                self.assign(s, bundle.plan.phase())
-            });
+            return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| self.loosen(s, bundle));
         }
         let changed = *self.changed.get_or_insert(s.now);
         if !passed && obeyed.is_some() && (s.now.since(changed) < s.params.debounce_s || !self.pace.allows(s)) {
@@ -85,6 +82,23 @@ impl FormationPlanner {
         }
         let since = *self.stalled.get_or_insert(s.now);
         s.now.since(since) >= STALLED_S
+    }
+
+    /// The plan for members that are stuck. A drone that has reached its slot may shut others out of theirs: first each takes the slot that
+    /// is best from where it stands now. If that changes nothing, the ranks open, and then they close again.
+    fn loosen(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
+        let pinned = s.members.iter().any(|m| is_alone(m, s));
+        let fresh = Self { pinned, pace: self.pace, ..Self::default() };
+        if !pinned && !self.open && !self.swapped {
+            let swapped = Self { swapped: true, ..fresh };
+            let plan = swapped.assign(s, bundle.plan.phase());
+            if plan.as_ref().is_some_and(|plan| takes_other_slots(plan, bundle)) {
+                *self = swapped;
+                return plan;
+            }
+        }
+        *self = Self { open: !pinned && !self.open, ..fresh };
+        self.assign(s, bundle.plan.phase())
     }
 
     /// The plan that assigns the slots. `None` without a slot for every member.
@@ -119,7 +133,8 @@ impl FormationPlanner {
 }
 
 /// Where the front slot goes: the goal; or the mean position of the members, moved on until it is clear of obstacles and
-/// of dead drones.
+/// of dead drones. With a limited range, drones that are missing may be out of reach: the members do not wait farther on than where
+/// all parts of the swarm come.
 fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     if let (Destination::Goal { front_m }, Phase::Reform) = (s.params.destination, phase) {
         return front_m;
@@ -127,8 +142,20 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     let count = s.members.len().max(1) as f64;
     let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
     let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
-    let anchor = Vec2::new(x, s.params.course_y_m);
-    if phase == Phase::Reform { moved_on(s, shape, anchor) } else { anchor }
+    if phase != Phase::Reform {
+        return Vec2::new(x, s.params.course_y_m);
+    }
+    let misses = s.params.limited_range && !s.silent.is_empty();
+    let x = if misses { x.min(meeting_x_m(s, shape)) } else { x };
+    moved_on(s, shape, Vec2::new(x, s.params.course_y_m))
+}
+
+/// The least abscissa of the front slot beyond the stop for which all slots lie past all known obstacles, m.
+fn meeting_x_m(s: &Situation<'_>, shape: &[Vec2]) -> f64 {
+    let last = shape.iter().map(|slot| slot.x).fold(0.0, f64::min);
+    let past = |rear_m: f64| rear_m + s.params.routes.planning_distance_m - last;
+    let rears = s.obstacles.iter().map(|(_, known)| known.shape.bounds().1.x);
+    rears.map(past).fold(s.params.destination.stop_x_m(), f64::max)
 }
 
 /// The anchor, moved on until the slots of the shape are clear of obstacles and of dead drones.
@@ -178,6 +205,11 @@ fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) ->
         Some(slot) => (stands - shape[slot], Some(Pin { member, slot })),
         None => (usual, None),
     }
+}
+
+/// Whether a drone has another slot than before.
+fn takes_other_slots(plan: &PlanBundle, before: &PlanBundle) -> bool {
+    plan.parts.iter().any(|part| before.parts.get(part.drone).is_none_or(|old| old.slot_m != part.slot_m))
 }
 
 /// Whether the swarm has cruised up to its goal without any obstacle on the way, and its anchor stands beside the goal.

@@ -165,7 +165,7 @@ fn start_too_fast(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<
     })
 }
 
-/// A formation that stops before any drone senses the first obstacle, though the mission ends behind it.
+/// A formation that stops before any drone senses the first obstacle.
 fn stops_unseen(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<String> {
     let (stop_x_m, range_m) = (scenario.mission.stop_x_m, scenario.sensors.detection_range_m);
     if scenario.mission.end != End::Hold || shapes.is_empty() {
@@ -175,7 +175,7 @@ fn stops_unseen(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<St
     (stop_x_m + range_m < first_x_m).then(|| {
         format!(
             "the formation stops at mission.stop_x_m = {stop_x_m} m and senses {range_m} m far, but the first obstacle begins at \
-             x = {first_x_m:.1} m: no drone ever senses it, and the mission does not end before its time limit"
+             x = {first_x_m:.1} m: no drone senses an obstacle before the mission ends"
         )
     })
 }

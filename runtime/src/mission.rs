@@ -262,6 +262,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
             BetweenKey::CloseUp => Between::CloseUp,
             BetweenKey::GoOn => Between::GoOn,
         },
+        limited_range: scenario.radio().beacon_range_m().is_finite(),
         debounce_s: scenario.protocol.debounce_s,
     }
 }

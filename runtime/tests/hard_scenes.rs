@@ -66,6 +66,17 @@ fn scenes_of_other_sizes_and_speeds_are_reached() {
     }
 }
 
+/// What an independent generator of scenes found: routes that nobody needed, drones that shut each other out of their slots, parts out of
+/// each other's reach, and obstacles or corners that no drone senses.
+#[test]
+fn scenes_of_an_independent_generator_are_reached() {
+    for name in
+        ["lost-straggler", "part-of-an-outline", "shut-out", "stop-before-the-next-wall", "wall-behind-the-goal"]
+    {
+        assert_reached(name, "congestion-aware-paper");
+    }
+}
+
 /// The narrowest passable gap is 8 mm wider than twice the clearance. Drones fly round one that is narrower by a fifth of a millimetre, and
 /// through a wider one.
 #[test]

@@ -271,8 +271,8 @@ pub enum Reformation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum End {
-    /// All obstacles are passed and the formation is restored around its anchor. An obstacle that no drone ever senses has to be passed up
-    /// to its front edge only.
+    /// All obstacles are passed and the formation is restored around its anchor. An obstacle that no drone ever senses does not have to
+    /// be passed.
     Hold,
     /// Every drone is in a slot of the formation at `goal_m`.
     Goal,

@@ -19,7 +19,7 @@ pub(crate) struct EndCondition {
     taken: Vec<bool>,
     /// The greatest abscissa that each drone has had, m. It may turn back later: the leader chooses where the slots are.
     reached_x_m: Vec<f64>,
-    /// Beyond this abscissa all obstacles are passed, m.
+    /// Beyond this abscissa all obstacles are passed, m. Drones plan to stop farther away, but may not have seen an outline as a whole.
     past_x_m: f64,
     /// Memory for the places of the drones, world frame, m.
     places: Vec<Vec2>,
@@ -36,7 +36,7 @@ impl EndCondition {
         parts: &[Vec<usize>],
     ) -> bool {
         if let End::Hold { .. } = params.end {
-            self.past_x_m = stages.past_x_m() + params.planning_distance_m;
+            self.past_x_m = stages.past_x_m();
             self.note_reached(bodies);
             if !self.holds(params, bodies) {
                 return false;
@@ -189,15 +189,16 @@ mod tests {
     }
 
     #[test]
-    fn an_obstacle_that_no_drone_senses_lies_beside_the_way() {
+    fn an_obstacle_that_no_drone_senses_does_not_have_to_be_passed() {
         let all = formed(Vec2::zeros());
-        let last = all.iter().map(|body| body.position().x).fold(f64::INFINITY, f64::min);
-        // A wall from 21 or 19 m behind the last drone on to far ahead of the first one.
-        let wall = |gap: f64| rectangle(last - gap + 500.0, 400.0, 500.0, 1.0);
-        let unseen = |gap| Stages::new(&[Outline::new(&wall(gap))], 40.0);
-        assert!(is_met(&hold(0.0), &all, &unseen(21.0)));
-        assert!(!is_met(&hold(0.0), &all, &sensed(&wall(21.0))));
-        assert!(!is_met(&hold(0.0), &all, &unseen(19.0)), "it may still lie ahead of the last drone");
+        // Beside the formation, ahead of it, and both.
+        let beside = rectangle(-50.0, 400.0, 20.0, 1.0);
+        let ahead = rectangle(300.0, 0.0, 20.0, 20.0);
+        let long = rectangle(450.0, 400.0, 500.0, 1.0);
+        for shape in [beside, ahead, long] {
+            assert!(is_met(&hold(0.0), &all, &Stages::new(&[Outline::new(&shape)], 40.0)));
+            assert!(!is_met(&hold(0.0), &all, &sensed(&shape)));
+        }
     }
 
     #[test]
@@ -205,9 +206,9 @@ mod tests {
         let stages = sensed(&rectangle(0.0, 0.0, 10.0, 10.0));
         let (params, mut condition) = (hold(-1e9), EndCondition::default());
         let mut is_met = |all: &[Body]| condition.is_met(&params, all, &stages, &living(all));
-        assert!(!is_met(&formed(Vec2::new(20.0, 0.0))));
+        assert!(!is_met(&formed(Vec2::new(0.0, 0.0))));
         assert!(is_met(&formed(Vec2::new(500.0, 0.0))));
-        assert!(is_met(&formed(Vec2::new(20.0, 0.0))));
+        assert!(is_met(&formed(Vec2::new(0.0, 0.0))));
     }
 
     #[test]
@@ -247,8 +248,8 @@ mod tests {
         assert!(is_met(&hold(0.0), &all, &open()));
         let last = all.iter().map(|body| body.position().x).fold(f64::INFINITY, f64::min);
         let behind = |gap: f64| sensed(&rectangle(last - gap - 10.0, 0.0, 10.0, 5.0));
-        assert!(is_met(&hold(0.0), &all, &behind(20.001)));
-        assert!(!is_met(&hold(0.0), &all, &behind(19.9)));
+        assert!(is_met(&hold(0.0), &all, &behind(0.001)));
+        assert!(!is_met(&hold(0.0), &all, &behind(-0.1)));
     }
 
     #[test]

@@ -29,17 +29,7 @@ pub(crate) struct Stages {
 struct Extent {
     /// The number of its set.
     set: usize,
-    front_x_m: f64,
     rear_x_m: f64,
-    /// Whether a living drone has sensed it.
-    sensed: bool,
-}
-
-impl Extent {
-    /// From this abscissa on it does not have to be passed any more, m. One that no drone ever senses lies beside the way.
-    fn end_x_m(&self) -> f64 {
-        if self.sensed { self.rear_x_m } else { self.front_x_m }
-    }
 }
 
 impl Stages {
@@ -57,27 +47,21 @@ impl Stages {
                 made.close(&centres);
                 centres.clear();
             }
-            made.obstacles[obstacle] = Extent { set: made.stages.len(), front_x_m, rear_x_m, sensed: false };
+            made.obstacles[obstacle] = Extent { set: made.stages.len(), rear_x_m };
             last_x_m = last_x_m.max(rear_x_m);
             centres.push((front_x_m + rear_x_m) / 2.0);
         }
         if !centres.is_empty() {
             made.close(&centres);
         }
-        made.past_x_m = made.ends();
         made
-    }
-
-    fn ends(&self) -> f64 {
-        self.obstacles.iter().map(Extent::end_x_m).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// With obstacles that were all sensed.
     #[cfg(test)]
     pub(crate) fn sensed(outlines: &[Outline], gap_m: f64) -> Self {
         let mut made = Self::new(outlines, gap_m);
-        made.obstacles.iter_mut().for_each(|obstacle| obstacle.sensed = true);
-        made.past_x_m = made.ends();
+        made.past_x_m = made.obstacles.iter().map(|obstacle| obstacle.rear_x_m).fold(f64::NEG_INFINITY, f64::max);
         made
     }
 
@@ -86,7 +70,8 @@ impl Stages {
         self.stages.push(Stage { centre_x_m, detected: false, passed: false });
     }
 
-    /// The greatest abscissa of the obstacles that were sensed, and of the front edges of all others, m; −∞ without obstacles.
+    /// The greatest abscissa of the obstacles that living drones have sensed, m; −∞ without any. An obstacle that no drone ever senses
+    /// lies beside the way, or beyond its end.
     pub(crate) fn past_x_m(&self) -> f64 {
         self.past_x_m
     }
@@ -119,11 +104,8 @@ impl Stages {
     /// Logs the sets that are sensed for the first time, at the time when the tick opens.
     pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
-            let obstacle = &mut self.obstacles[contact.obstacle as usize];
-            let number = obstacle.set;
-            if !std::mem::replace(&mut obstacle.sensed, true) {
-                self.past_x_m = self.past_x_m.max(obstacle.rear_x_m);
-            }
+            let Extent { set: number, rear_x_m } = self.obstacles[contact.obstacle as usize];
+            self.past_x_m = self.past_x_m.max(rear_x_m);
             if !std::mem::replace(&mut self.stages[number].detected, true) {
                 let what = EventKind::Detected {
                     stage: number as u32,

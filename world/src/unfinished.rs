@@ -86,7 +86,7 @@ mod tests {
 
     fn found(end: End, bodies: &[Body], slots: &[Slot]) -> Vec<UnfinishedDrone> {
         let params = WorldParams { end, ..params() };
-        let outline = Outline::new(&rectangle(-20.0, 0.0, 10.0, 10.0));
+        let outline = Outline::new(&rectangle(0.0, 0.0, 10.0, 10.0));
         let (stages, mut condition) = (Stages::sensed(&[outline], 40.0), EndCondition::default());
         let mut processes = vec![Process::default(); bodies.len()];
         for (process, slot) in processes.iter_mut().zip(slots) {

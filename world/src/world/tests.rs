@@ -6,7 +6,7 @@ use crate::testing::{command, event_kinds, events, params, rectangle, starts, ti
 use skein_protocol::record::{ROW_ALIVE, ROW_LATE, RunEvent, Totals, ViolationKind};
 use skein_protocol::shape::ShapeError;
 use skein_protocol::slot::SLOT_LEADS;
-use skein_protocol::{Ballot, Lack, Message, ObstacleId, PlanStamp};
+use skein_protocol::{Ballot, Lack, Message, ObstacleId, PlanStamp, Vec2};
 
 const CRUISE: [f64; 3] = [10.0, 0.0, 0.0];
 
@@ -189,9 +189,9 @@ fn dead_bodies_still_count_for_separation_until_they_have_landed() {
 #[test]
 fn a_time_out_says_who_is_not_done_and_whether_the_swarm_stands_still() {
     let ended = |brakes_mps2: f64| {
-        let params = WorldParams { end: End::Hold { stop_x_m: 0.0 }, timeout_s: 30.0, ..params() };
+        let params = WorldParams { end: End::Goal { front_m: Vec2::new(1e4, 0.0) }, timeout_s: 30.0, ..params() };
         let mut world = eight(params, &[rectangle(900.0, 0.0, 5.0, 5.0)]);
-        // After 10 s they brake to a stop, or hardly brake and fly on. They pass nothing in either case.
+        // After 10 s they brake to a stop, or hardly brake and fly on. They are far from their slots in either case.
         for at in 0.. {
             let braking = if (500..600).contains(&at) { brakes_mps2 } else { 0.0 };
             tick(&mut world, &command(braking, 0.0));
@@ -210,7 +210,7 @@ fn a_time_out_says_who_is_not_done_and_whether_the_swarm_stands_still() {
     assert!(reason.starts_with("the time of 30 s is over; no drone has moved for 1"), "{reason}");
     assert!(standstill_s.is_some_and(|still_s| (18.0..20.0).contains(&still_s)), "{standstill_s:?}");
     assert_eq!(unfinished.len(), 8);
-    assert!(unfinished.iter().all(|drone| drone.lack == Lack::Pass && drone.stage == Some(0)), "{unfinished:?}");
+    assert!(unfinished.iter().all(|drone| drone.lack == Lack::Slot && drone.stage == Some(0)), "{unfinished:?}");
     let (reason, unfinished, standstill_s) = ended(-0.05);
     assert!(reason.contains("slow: 8 of the 8 drones"), "{reason}");
     assert_eq!((unfinished.len(), standstill_s), (8, None));
