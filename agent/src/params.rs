@@ -5,6 +5,7 @@ use crate::detection::Braking;
 use crate::guidance::GuidanceParams;
 use crate::neighbour_table::NeighbourParams;
 use crate::queue::QueueParams;
+use crate::reaction::ReactionDelay;
 use crate::rollout::RolloutParams;
 use crate::safety::SafetyParams;
 use crate::sensing_errors::SensingErrors;
@@ -165,6 +166,7 @@ impl PilotParams {
             incarnation: self.incarnation,
             starts_m,
             start_velocity: Vec2::new(self.guidance.speed_mps, 0.0),
+            reaction_time_s: ReactionDelay::new(self.braking.reaction_time_s, self.dt_s).delay_s(),
             keep_m: self.braking_filter().keep_m() + 2.0 * self.sensing.position_m,
             braking_mps2: self.safety.braking_mps2,
             period_s: self.separation_period_s,

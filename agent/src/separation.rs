@@ -52,6 +52,8 @@ pub struct SeparationParams {
     pub starts_m: Arc<[Vec2]>,
     /// The velocity at the start, world frame, m/s.
     pub start_velocity: Vec2,
+    /// Time for which drones keep this velocity before the first command takes effect, s.
+    pub reaction_time_s: f64,
     /// Distance that two drones keep, m.
     pub keep_m: f64,
     /// Deceleration of full braking, m/s².
@@ -411,17 +413,19 @@ impl SeparationParams {
         tick % period == u64::from(self.me.0) % period
     }
 
-    /// The line between two drones at the start. `front` has the lower id.
+    /// The line between two drones at the start. `front` has the lower id. It moves as the two drones do if their first command is to
+    /// brake fully: at constant speed for the reaction time, and then with constant deceleration.
     fn first_line(&self, front: DroneId, back: DroneId) -> SeparatingLine {
         let (velocity, braking) = (self.start_velocity, self.braking_mps2);
         let normal = (self.start(front) - self.start(back)).try_normalize(1e-9).unwrap_or(Vec2::x());
-        let line = SeparatingLine::resting(SimTime::ZERO, normal, 0.0);
+        let line = SeparatingLine::resting(SimTime::ZERO.after(self.reaction_time_s), normal, 0.0);
         let speed = velocity.norm();
-        let middle = (self.start(front) + self.start(back)) / 2.0 + velocity * (speed / (2.0 * braking));
+        let way = velocity * (self.reaction_time_s + speed / (2.0 * braking));
+        let middle = (self.start(front) + self.start(back)) / 2.0 + way;
         let along = line.normal().dot(&velocity);
         let way_m = along * speed / (2.0 * braking);
         let moving = line.shifted(line.normal().dot(&middle));
-        if speed > 0.0 { moving.arriving(way_m, braking * along.abs() / speed, braking) } else { moving }
+        if speed > 0.0 { moving.arriving_at(way_m, braking * along.abs() / speed) } else { moving }
     }
 
     /// Makes a new line, if it is this drone's turn and the new line is better than the present one.

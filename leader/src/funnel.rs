@@ -80,7 +80,8 @@ impl Corridor {
         let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
         let mut from = position;
         let mut next = ahead.partition_point(|c| c.x_m <= from.x + PASSED_M);
-        while let Some(bend) = first_bend(from, &ahead[next..], end) {
+        let is_behind = |c: &Constraint| c.is_behind(position);
+        while let Some(bend) = first_bend(from, &ahead[next..], end, is_behind) {
             let to = Vec2::new(ahead[next + bend].x_m, ahead[next + bend].y_m);
             leg(from, to);
             from = to;
@@ -129,11 +130,12 @@ fn closed_side(walls: &[Wall], body: &Body) -> Option<Side> {
 }
 
 /// Index of the point at which the path from `from` to `end` first bends; `None` if it is straight. The funnel of
-/// directions narrows point by point until a point, or the end, is outside of it. All points must be ahead of `from`.
-fn first_bend(from: Vec2, points: &[Constraint], end: Vec2) -> Option<usize> {
+/// directions narrows point by point until a point, or the end, is outside of it. All points must be ahead of `from`. Those that
+/// `is_behind` names are left out.
+fn first_bend(from: Vec2, points: &[Constraint], end: Vec2, is_behind: impl Fn(&Constraint) -> bool) -> Option<usize> {
     let slope = |x_m: f64, y_m: f64| (y_m - from.y) / (x_m - from.x);
     let (mut low, mut high) = ((f64::NEG_INFINITY, None), (f64::INFINITY, None));
-    for (i, point) in points.iter().enumerate() {
+    for (i, point) in points.iter().enumerate().filter(|(_, point)| !is_behind(point)) {
         let slope = slope(point.x_m, point.y_m);
         match point.side {
             Side::Above if slope > high.0 => return high.1,

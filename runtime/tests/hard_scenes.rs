@@ -66,15 +66,51 @@ fn scenes_of_other_sizes_and_speeds_are_reached() {
     }
 }
 
-/// What an independent generator of scenes found: routes that nobody needed, drones that shut each other out of their slots, parts out of
-/// each other's reach, and obstacles or corners that no drone senses.
+/// What an independent generator of scenes found: routes that nobody needed or that led back, drones that shut each other out of their
+/// slots, parts out of each other's reach, obstacles or corners that no drone senses, and two drones whose first line was wrong.
 #[test]
 fn scenes_of_an_independent_generator_are_reached() {
-    for name in
-        ["lost-straggler", "part-of-an-outline", "shut-out", "stop-before-the-next-wall", "wall-behind-the-goal"]
-    {
+    for name in [
+        "late-first-command",
+        "lost-straggler",
+        "part-of-an-outline",
+        "shut-out",
+        "stop-before-the-next-wall",
+        "strip-behind-a-wall",
+        "wall-behind-the-goal",
+    ] {
         assert_reached(name, "congestion-aware-paper");
     }
+}
+
+/// The drone stands 5 cm beyond the clearance from a wall. Its new process once sensed no obstacles in its first tick, and accelerated fully.
+#[test]
+fn a_restarted_drone_senses_the_wall_beside_it_at_once() {
+    let scenario = parse(
+        r#"
+            [time]
+            dt_s = 0.1
+            timeout_s = 65
+            [formation]
+            drones = 1
+            [mission]
+            end = "goal"
+            goal_m = [100, 0]
+            arrival_error_m = 0.002
+            [[obstacle]]
+            shape = "rectangle"
+            centre_m = [120.003, 0]
+            half_size_m = [5, 40]
+            [[fault]]
+            kind = "restart"
+            drone = 0
+            at_s = 60
+            for_s = 2
+        "#,
+    );
+    let world = fly_to_the_end(&scenario, None);
+    let clearance_m = world.min_clearance_m();
+    assert!((15.0..15.1).contains(&clearance_m), "{clearance_m}");
 }
 
 /// The narrowest passable gap is 8 mm wider than twice the clearance. Drones fly round one that is narrower by a fifth of a millimetre, and

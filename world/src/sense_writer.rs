@@ -43,7 +43,9 @@ impl SenseWriter {
         for ((drone, body), (incarnation, sensor_fault)) in sensed.bodies.iter().enumerate().zip(drones) {
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
-                self.write_contact(contact, sensed, &sensor_fault, down);
+                if body.is_alive() {
+                    self.write_contact(contact, sensed, &sensor_fault, down);
+                }
             }
             if body.is_alive() && !sensor_fault.no_ranging {
                 sensed.write_neighbours(drone, &sensor_fault.ranging, down);

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::geometry::{Nearest, Outline};
 use crate::neighbours::Neighbours;
 
-/// An obstacle that a living drone senses.
+/// An obstacle that a drone senses if it lives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Contact {
     pub(crate) drone: u32,
@@ -77,8 +77,7 @@ impl SensorSweep {
 
     /// Adds the contacts of one drone. Returns its distance to the nearest obstacle, m.
     fn look_around(&mut self, drone: usize, body: &Body, range: SweepRange) -> f64 {
-        let detection_m = if body.is_alive() { range.detection_m } else { f64::NEG_INFINITY };
-        let limit_m = detection_m.max(range.clearance_m);
+        let limit_m = range.detection_m.max(range.clearance_m);
         let mut clearance_m = f64::INFINITY;
         for (obstacle, outline) in self.outlines.iter().enumerate() {
             if outline.box_distance_squared(body.position()) > limit_m * limit_m {
@@ -86,7 +85,7 @@ impl SensorSweep {
             }
             let nearest = outline.nearest(body.position());
             clearance_m = clearance_m.min(nearest.distance_m);
-            if nearest.distance_m <= detection_m {
+            if nearest.distance_m <= range.detection_m {
                 self.contacts.push(Contact { drone: drone as u32, obstacle: obstacle as u32, nearest });
             }
         }

@@ -39,7 +39,7 @@ impl Side {
     }
 }
 
-/// A line that moves along its normal, brakes with constant deceleration, and stops. World frame.
+/// A line that moves along its normal at constant speed until its stamp, then brakes with constant deceleration, and stops. World frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeparatingLine {
     stamp: SimTime,
@@ -72,7 +72,14 @@ impl SeparatingLine {
     #[must_use]
     pub fn arriving(self, way_m: f64, braking_mps2: f64, full_braking_mps2: f64) -> Self {
         let step = DECELERATION_STEP * full_braking_mps2;
-        let deceleration = f64::from(((braking_mps2 / step).floor() * step) as f32);
+        self.arriving_at(way_m, (braking_mps2 / step).floor() * step)
+    }
+
+    /// The same line, if it still has `way_m` to go at its stamp and brakes with this deceleration, m/s². It rests if that is 0.
+    #[must_use]
+    pub fn arriving_at(self, way_m: f64, deceleration_mps2: f64) -> Self {
+        // The message holds the two numbers with less precision.
+        let deceleration = f64::from(deceleration_mps2 as f32);
         if deceleration <= 0.0 {
             return self;
         }
@@ -137,8 +144,10 @@ impl SeparatingLine {
         if self.speed_mps == 0.0 || self.deceleration_mps2 <= 0.0 {
             return self.stop_m;
         }
-        let left_mps = (self.speed_mps.abs() - self.deceleration_mps2 * (now.since(self.stamp) + span_s)).max(0.0);
-        self.stop_m - (left_mps * left_mps / (2.0 * self.deceleration_mps2)).copysign(self.speed_mps)
+        let since_s = now.since(self.stamp) + span_s;
+        let left_mps = (self.speed_mps.abs() - self.deceleration_mps2 * since_s.max(0.0)).max(0.0);
+        let left_m = left_mps * left_mps / (2.0 * self.deceleration_mps2) - left_mps * since_s.min(0.0);
+        self.stop_m - left_m.copysign(self.speed_mps)
     }
 
     /// The same for a clock that is wrong by up to `error_s`: of all offsets that the line may have then, the one that is nearest to
@@ -168,7 +177,8 @@ impl SeparatingLine {
     /// Whether a drone on `side` that keeps to this line from `now` on also keeps to `other`.
     #[must_use]
     pub fn implies(&self, other: &Self, side: Side, now: SimTime) -> bool {
-        let comparable = self.deceleration_mps2 == other.deceleration_mps2
+        let both_brake = now >= self.stamp.max(other.stamp);
+        let comparable = (both_brake && self.deceleration_mps2 == other.deceleration_mps2)
             || other.rests_after_s(now) == 0.0
             || self.rests_after_s(now) == 0.0;
         let beyond = |a_m: f64, b_m: f64| side.sign() * (a_m - b_m) >= 0.0;
@@ -194,6 +204,16 @@ mod tests {
         assert!((line.rests_after_s(now) - 4.0).abs() < 1e-5);
         let from_the_front = SeparatingLine::resting(now, Vec2::x(), 50.0).arriving(-40.0, 5.0, 5.0);
         assert!((from_the_front.offset_m(now, 0.0) - 90.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_line_moves_at_constant_speed_until_its_stamp() {
+        let stamp = SimTime::from_secs(2.0);
+        let line = SeparatingLine::resting(stamp, Vec2::x(), 50.0).arriving_at(40.0, 5.0);
+        let before = |span_s: f64| line.offset_m(SimTime::ZERO, span_s);
+        assert!((before(2.0) - 10.0).abs() < 1e-4 && (before(1.5) - 0.0).abs() < 1e-4, "{line:?}");
+        assert!((before(0.0) + 30.0).abs() < 1e-4 && (line.rests_after_s(SimTime::ZERO) - 6.0).abs() < 1e-5);
+        assert!((before(4.0) - 40.0).abs() < 1e-4);
     }
 
     #[test]

@@ -20,6 +20,7 @@ fn separations(me: u32, incarnation: u32) -> Separations {
         incarnation,
         starts_m: [0.0, -60.0, -120.0].map(|x| Vec2::new(x, 0.0)).into(),
         start_velocity: Vec2::zeros(),
+        reaction_time_s: 0.0,
         keep_m: FILTER.keep_m(),
         braking_mps2: FILTER.braking_mps2,
         period_s: 0.1,

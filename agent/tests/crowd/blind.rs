@@ -51,6 +51,7 @@ impl Crowd {
             incarnation: 1,
             starts_m: vec![Vec2::zeros(); self.bodies.len()].into(),
             start_velocity: Vec2::zeros(),
+            reaction_time_s: 0.0,
             keep_m: self.params.keep_m(),
             braking_mps2: self.params.braking_mps2,
             period_s: BEACON_S,

@@ -171,6 +171,7 @@ impl Talk {
             incarnation: self.incarnations[i],
             starts_m: Arc::clone(&self.starts_m),
             start_velocity: self.start_velocity,
+            reaction_time_s: 0.0,
             keep_m: crowd.params.keep_m() + 2.0 * self.errors.allowed.position_m,
             braking_mps2: crowd.params.braking_mps2,
             period_s: BEACON_S,

@@ -71,6 +71,7 @@ impl Antipodal {
             incarnation: birth.incarnation,
             starts_m: starts.clone().into(),
             start_velocity: Vec2::new(drone.speed_mps, 0.0),
+            reaction_time_s: 0.0,
             keep_m: filter.params().keep_m(),
             braking_mps2: scenario.braking_mps2(),
             period_s: scenario.separation_period_s(messages(starts.len())),
