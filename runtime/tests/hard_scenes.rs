@@ -107,6 +107,7 @@ fn a_restarted_drone_senses_the_wall_beside_it_at_once() {
             at_s = 60
             for_s = 2
         "#,
+        &[],
     );
     let world = fly_to_the_end(&scenario, None);
     let clearance_m = world.min_clearance_m();
