@@ -511,7 +511,7 @@ impl Passed {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Separator {
-    /// The time at which `speed_mps` is valid.
+    /// The time from which the line brakes. Before it, the line moves at `speed_mps`.
     pub stamp: SimTime,
     /// Where the line stops: the component of its points along the normal, world frame, m.
     pub stop_m: f64,
