@@ -42,13 +42,11 @@ pub struct Course {
     pub now: SimTime,
     /// World frame, m.
     pub position: Vec2,
-    /// World frame, m/s.
-    pub velocity: Vec2,
     /// Velocity that it wants to fly, world frame, m/s.
     pub wanted: Vec2,
 }
 
-/// Where and when a drone became still.
+/// Where a drone has been since when.
 #[derive(Clone, Copy, Debug)]
 struct Standstill {
     since: SimTime,
@@ -65,24 +63,20 @@ impl Escape {
     /// Returns the velocity to fly, world frame, m/s. This is the wanted one unless the drone has been stuck for `patience_s`. Then
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `scale`: how small the swarm is.
     ///
-    /// A drone that moves to and fro in one place is stuck as well: it counts as still until it is as far away as it would be after
-    /// `patience_s` at the speed of a still drone.
+    /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone: one that moves to
+    /// and fro in one place is stuck as well.
     pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
-        let Course { now, position, velocity, wanted } = *course;
+        let Course { now, position, wanted } = *course;
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        let still_mps = scale.of_full(STILL_MPS);
-        let is_still = velocity.norm() < still_mps;
-        let has_left = |still: Standstill| (position - still.position).norm() > still_mps * patience_s;
+        let place_m = scale.speed(STILL_MPS) * patience_s;
+        let has_left = |still: Standstill| (position - still.position).norm() > place_m;
         if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) || self.still.is_some_and(has_left) {
             self.still = None;
-            return wanted;
-        }
-        if !is_still {
             return wanted;
         }
         let since = self.still.get_or_insert(Standstill { since: now, position }).since;
@@ -104,25 +98,23 @@ mod tests {
 
     const WANTED: Vec2 = Vec2::new(10.0, 0.0);
 
-    /// The velocities that a drone flies in each second, with this patience and speed of escape. `state`: its position and velocity
-    /// in that second.
-    fn flown(seconds: u32, wanted: Vec2, speed_mps: f64, state: impl Fn(f64) -> (Vec2, Vec2)) -> Vec<Vec2> {
+    /// The velocities that a drone flies in each second, with this speed of escape. `place`: its position in that second.
+    fn flown(seconds: u32, wanted: Vec2, speed_mps: f64, place: impl Fn(f64) -> Vec2) -> Vec<Vec2> {
         let mut escape = Escape::default();
         let mut steer = |second: u32| {
-            let (position, velocity) = state(f64::from(second));
-            let course = Course { now: SimTime::from_secs(f64::from(second)), position, velocity, wanted };
+            let course = Course { now: SimTime::from_secs(f64::from(second)), position: place(f64::from(second)), wanted };
             escape.steer(&course, 3.0, speed_mps, Scale::FULL)
         };
         (0..seconds).map(&mut steer).collect()
     }
 
-    fn at_rest(_: f64) -> (Vec2, Vec2) {
-        (Vec2::zeros(), Vec2::zeros())
+    fn at_rest(_: f64) -> Vec2 {
+        Vec2::zeros()
     }
 
     #[test]
     fn a_drone_that_moves_or_wants_to_stay_does_not_escape() {
-        let moved = flown(100, WANTED, 5.0, |second| (WANTED * second, WANTED));
+        let moved = flown(100, WANTED, 5.0, |second| WANTED * second);
         assert!(moved.iter().all(|&velocity| velocity == WANTED));
         let stayed = flown(100, Vec2::zeros(), 5.0, at_rest);
         assert!(stayed.iter().all(|&velocity| velocity == Vec2::zeros()));
@@ -130,24 +122,17 @@ mod tests {
 
     #[test]
     fn a_drone_that_is_still_now_and_then_on_its_way_does_not_escape() {
-        // Every third second it is still, and it flies on for 2 m in between.
-        let state = |second: f64| {
-            let still = (second as u32).is_multiple_of(3);
-            (Vec2::new((second / 3.0).ceil() * 2.0, 0.0), Vec2::new(if still { 0.0 } else { 1.0 }, 0.0))
-        };
-        assert!(flown(100, WANTED, 5.0, state).iter().all(|&velocity| velocity == WANTED));
+        // Every third second it flies on for 2 m.
+        let place = |second: f64| Vec2::new((second / 3.0).ceil() * 2.0, 0.0);
+        assert!(flown(100, WANTED, 5.0, place).iter().all(|&velocity| velocity == WANTED));
     }
 
     #[test]
     fn a_drone_that_moves_to_and_fro_in_one_place_gets_stuck_as_well() {
-        // Half a metre to and fro, at half a metre per second.
-        let state = |second: f64| {
-            let odd = f64::from(second as u32 % 2);
-            (Vec2::new(odd * 0.5, 0.0), Vec2::new(odd * 0.5, 0.0))
-        };
-        let flown = flown(6, WANTED, 5.0, state);
-        assert_eq!(flown[..4], [WANTED; 4]);
-        assert!((flown[4] - Vec2::new(-5.0, 0.0)).norm() < 1e-9, "{flown:?}");
+        let place = |second: f64| Vec2::new(f64::from(second as u32 % 2) * 0.5, 0.0);
+        let flown = flown(6, WANTED, 5.0, place);
+        assert_eq!(flown[..3], [WANTED; 3]);
+        assert!((flown[3] - Vec2::new(-5.0, 0.0)).norm() < 1e-9, "{flown:?}");
     }
 
     #[test]

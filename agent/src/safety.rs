@@ -223,7 +223,7 @@ impl Safety {
         let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
         let intruded_m = params.keep_m(0.0) - INTRUSION * params.margin_m();
         let first = (neighbour.share >= 1.0 && !chased)
-            || (neighbour.share > 0.5 && missing > params.scale.of_full(NON_COOPERATIVE_MPS2))
+            || (neighbour.share > 0.5 && missing > params.scale.length(NON_COOPERATIVE_MPS2))
             || (neighbour.sensed && neighbour.position_m.norm() < intruded_m);
         Assessed { neighbour, barrier, braking, missing, first }
     }
@@ -267,7 +267,7 @@ struct Barrier {
 impl SafetyParams {
     /// Margin on the safe distance, m.
     fn margin_m(&self) -> f64 {
-        (self.safe_distance_m * self.margin).max(self.scale.of_full(MIN_MARGIN_M))
+        (self.safe_distance_m * self.margin).max(self.scale.length(MIN_MARGIN_M))
     }
 
     /// Distance to keep from a drone whose state is known with a delay of `late_s`, m.
@@ -290,7 +290,7 @@ impl SafetyParams {
     fn obstacle_margin_m(&self, obstacle: &NearObstacle, all: &[NearObstacle]) -> f64 {
         let opposite = all.iter().filter(|other| other.normal().dot(&obstacle.normal()) < OPPOSITE);
         let narrowest_m = opposite.map(|other| obstacle.distance_m + other.distance_m).fold(f64::INFINITY, f64::min);
-        self.scale.of_full(OBSTACLE_MARGIN_M).min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
+        self.scale.length(OBSTACLE_MARGIN_M).min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
     }
 
     fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
@@ -321,7 +321,7 @@ impl SafetyParams {
             return None;
         }
         let stop = self.braking_mps2;
-        let least_mps = self.scale.of_full(MIN_LIMIT_MPS);
+        let least_mps = self.scale.speed(MIN_LIMIT_MPS);
         let limit = (other_speed * other_speed + 2.0 * stop * barrier.beyond_m).max(least_mps * least_mps).sqrt();
         let apart = -other.velocity_mps;
         let turn = (apart - normal * apart.dot(&normal)) / other.position_m.norm().max(1e-6);
@@ -332,7 +332,7 @@ impl SafetyParams {
 
     /// √(2 α x), m/s, and its slope, 1/s. Below `TANGENT_M` the root is continued by its tangent.
     fn root(&self, alpha: f64, x: f64) -> (f64, f64) {
-        let tangent_m = self.scale.of_full(TANGENT_M);
+        let tangent_m = self.scale.length(TANGENT_M);
         let least = (2.0 * alpha * tangent_m).sqrt();
         if x < tangent_m {
             let slope = alpha / least;

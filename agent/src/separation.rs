@@ -233,8 +233,7 @@ impl Separations {
         let place = |drone: DroneId| peers.last(drone).map_or(params.start(drone), |pose| pose.position());
         let speaker = separation.drone(source);
         let (from, of) = (place(source), place(speaker));
-        let lines = separation.separators().iter().filter(|line| line.number != NO_LINE);
-        for line in lines.filter(|line| line.peer != me && params.knows(line.peer)) {
+        for line in separation.separators().iter().filter(|line| line.peer != me && params.knows(line.peer)) {
             let to = place(line.peer);
             let (said_m, own_m) = ((from - to).norm(), (path.end() - to).norm());
             let distances = Distances { said_m, own_m, pair_m: (of - to).norm(), reach_m };
@@ -447,7 +446,7 @@ impl SeparationParams {
         };
         let side = known.pair.side();
         let along_mps = towards_me.dot(&(own.velocity + peer.velocity)) / 2.0;
-        let abreast_mps = self.scale().of_full(ABREAST_MPS);
+        let abreast_mps = self.scale().speed(ABREAST_MPS);
         let ahead = along_mps > abreast_mps || (along_mps >= -abreast_mps && side == Side::Front);
         let patience_s = PATIENCE_S + PATIENCE_ROUND_TRIPS * 2.0 * late_s + self.period_s;
         if !ahead && now.since(known.changed) < patience_s {
@@ -456,7 +455,7 @@ impl SeparationParams {
         let Some(line) = self.line(&stated.line, side, &own, &peer, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
-        if (turned || shifted_m >= self.scale().of_full(SHIFT_M)) && known.pair.propose(line, path.earliest()) {
+        if (turned || shifted_m >= self.scale().length(SHIFT_M)) && known.pair.propose(line, path.earliest()) {
             known.changed = now;
         }
     }
@@ -506,7 +505,7 @@ impl SeparationParams {
         let middle_m = (own_m + peer_m + (own_mps + peer_mps) * late_s) / 2.0;
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
-        let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().of_full(STILL_MPS);
+        let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().speed(STILL_MPS);
         let aimed_m = match (close && still, side) {
             (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.

@@ -2,7 +2,7 @@
 
 use crate::draft::draft;
 use crate::formation_pace::FormationPace;
-use crate::geometry::nearest;
+use crate::geometry::{nearest, separation};
 use crate::member::{Member, group_leaders};
 use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
@@ -11,10 +11,14 @@ use crate::slots::{self, Reformation};
 use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_S};
 use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
+use skein_protocol::shape::ConvexShape;
 use skein_protocol::{GroupId, Phase, SimTime, Vec2};
+use std::iter;
 
 /// Most steps by which the anchor moves on. Obstacles without end do not hold up the leader.
 const MAX_ANCHOR_STEPS: u32 = 10_000;
+/// Distances that differ by less than this are equal, m.
+const ROUNDING_M: f64 = 1e-6;
 
 /// What a leader remembers while the formation closes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,6 +31,9 @@ pub(crate) struct FormationPlanner {
     open: bool,
     /// Whether the members have changed their slots since the ranks were last closed.
     swapped: bool,
+    /// Whether drones were still shut out of their slots after the ranks had been open. From then on slots are assigned by
+    /// [`Reformation::Optimal`], whatever the scenario's method.
+    shut_out: bool,
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
@@ -73,7 +80,7 @@ impl FormationPlanner {
             Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
             None => 0.0,
         };
-        let hold_mps = s.params.routes.scale.of_full(HOLD_SPEED_MPS);
+        let hold_mps = s.params.routes.scale.speed(HOLD_SPEED_MPS);
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
         let still = s.members.iter().all(|m| m.speed_mps < hold_mps);
         if !still || bundle.plan.phase() != Phase::Reform || (worst <= s.params.arrival_error_m && !self.open) {
@@ -85,10 +92,12 @@ impl FormationPlanner {
     }
 
     /// The plan for members that are stuck. A drone that has reached its slot may shut others out of theirs: first each takes the slot that
-    /// is best from where it stands now. If that changes nothing, the ranks open, and then they close again.
+    /// is best from where it stands now. If that changes nothing, the ranks open, and then they close again, with the slots that are best
+    /// for all.
     fn loosen(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
         let pinned = s.members.iter().any(|m| is_alone(m, s));
-        let fresh = Self { pinned, pace: self.pace, ..Self::default() };
+        let shut_out = self.shut_out || self.open;
+        let fresh = Self { pinned, shut_out, pace: self.pace, ..Self::default() };
         if !pinned && !self.open && !self.swapped {
             let swapped = Self { swapped: true, ..fresh };
             let plan = swapped.assign(s, bundle.plan.phase());
@@ -108,10 +117,11 @@ impl FormationPlanner {
             Some(member) => anchor_for(s, &close, phase, member),
             None => (anchor(s, &close, phase), None),
         };
-        let shape = if self.open { opened(&close) } else { close };
+        let shape = if self.open { opened(&close, anchor, &Occupied::of(s)) } else { close };
         let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
-        let taken = assign_pinned(s.params.reformation, positions, places, pin)?;
+        let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
+        let taken = assign_pinned(method, positions, places, pin)?;
         let plan = draft(s, phase, &[], anchor);
         let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
         let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
@@ -160,27 +170,49 @@ fn meeting_x_m(s: &Situation<'_>, shape: &[Vec2]) -> f64 {
 
 /// The anchor, moved on until the slots of the shape are clear of obstacles and of dead drones.
 pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2) -> Vec2 {
-    let (mut steps, is_blocked) = (0, blocker(s));
-    while steps < MAX_ANCHOR_STEPS && is_blocked(shape, anchor) {
-        anchor.x += s.params.routes.scale.of_full(ANCHOR_STEP_M);
+    let (mut steps, occupied) = (0, Occupied::of(s));
+    while steps < MAX_ANCHOR_STEPS && shape.iter().any(|slot| occupied.blocks(slot + anchor)) {
+        anchor.x += s.params.routes.scale.length(ANCHOR_STEP_M);
         steps += 1;
     }
     anchor
 }
 
-/// A test of whether any slot of a shape is too near to an obstacle or to a dead drone, given the shape and the position
-/// of its front slot.
-fn blocker<'a>(s: &Situation<'a>) -> impl Fn(&[Vec2], Vec2) -> bool + use<'a> {
-    let keep_m = SLOT_BERTH * s.params.safe_distance_m;
-    let clear_m = s.params.routes.planning_distance_m;
-    let shapes: Vec<(Vec<Vec2>, f64)> =
-        s.obstacles.iter().map(|(_, known)| (known.shape.vertices().collect(), known.shape.radius_m)).collect();
-    let silent = s.silent;
-    let blocked = move |slot: Vec2| {
-        silent.iter().any(|dead| (slot - dead).norm() < keep_m)
-            || shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + clear_m)
-    };
-    move |shape, front| shape.iter().any(|slot| blocked(slot + front))
+/// Where no slot can be: near obstacles and near dead drones.
+struct Occupied<'a> {
+    keep_m: f64,
+    clear_m: f64,
+    /// The vertices of each obstacle's core, m, and the radius around it, m.
+    shapes: Vec<(Vec<Vec2>, f64)>,
+    silent: &'a [Vec2],
+}
+
+impl<'a> Occupied<'a> {
+    fn of(s: &Situation<'a>) -> Self {
+        let core = |shape: &ConvexShape| (shape.vertices().collect(), shape.radius_m);
+        Self {
+            keep_m: SLOT_BERTH * s.params.safe_distance_m,
+            clear_m: s.params.routes.planning_distance_m,
+            shapes: s.obstacles.iter().map(|(_, known)| core(&known.shape)).collect(),
+            silent: s.silent,
+        }
+    }
+
+    /// Whether a slot is too near to an obstacle or to a dead drone. World frame, m.
+    fn blocks(&self, slot: Vec2) -> bool {
+        self.silent.iter().any(|dead| (slot - dead).norm() < self.keep_m)
+            || self.shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + self.clear_m)
+    }
+
+    /// Whether a straight way leads nearer to an obstacle than a slot can be and than it begins, or its end is too near to a dead
+    /// drone. World frame, m.
+    fn blocks_way(&self, from: Vec2, to: Vec2) -> bool {
+        let nearer = |(core, radius_m): &(Vec<Vec2>, f64)| {
+            let begins_m = (nearest(core, from) - from).norm();
+            separation(&[from, to], core).norm() < begins_m.min(radius_m + self.clear_m) - ROUNDING_M
+        };
+        self.silent.iter().any(|dead| (to - dead).norm() < self.keep_m) || self.shapes.iter().any(nearer)
+    }
 }
 
 /// Where the front slot goes so that a member that follows no leader has a slot, and which slot that is: the one it
@@ -193,13 +225,13 @@ fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) ->
         let here = nearest_of(&mut (0..shape.len())).filter(|slot| off(slot) <= s.params.arrival_error_m);
         return (usual, Some(Pin { member, slot: here.unwrap_or(0) }));
     };
-    let is_blocked = blocker(s);
+    let occupied = Occupied::of(s);
     // A drone that hears no other, though there were others, may stand in a slot whose front is beyond the stop.
     let least_x_m = if s.members.len() == 1 && !s.silent.is_empty() { f64::NEG_INFINITY } else { stop_x_m };
     let free = |slot: &usize| {
         let (anchor, mut others) = (stands - shape[*slot], shape.to_vec());
         others.remove(*slot);
-        anchor.x >= least_x_m && !is_blocked(&others, anchor)
+        anchor.x >= least_x_m && !others.iter().any(|other| occupied.blocks(other + anchor))
     };
     match nearest_of(&mut (0..shape.len()).filter(free)) {
         Some(slot) => (stands - shape[slot], Some(Pin { member, slot })),
@@ -254,11 +286,23 @@ fn group_of(member: &Member, split: &[&Member]) -> GroupId {
     split.iter().min_by(|a, b| near(a).total_cmp(&near(b)).then(a.id.cmp(&b.id))).map_or(GroupId::ALL, |m| m.group)
 }
 
-/// The shape, widened about its own centre. A drone that is shut out finds a way in. When the ranks close again, all
-/// drones move in proportion.
-fn opened(shape: &[Vec2]) -> Vec<Vec2> {
+/// The shape, widened about its own centre, or else about the corner or the side of its bounding box for which the fewest drones meet
+/// an obstacle on the way. `front`: position of the front slot, world frame, m. A drone that is shut out finds a way in. When the ranks
+/// close again, all drones move in proportion.
+fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied<'_>) -> Vec<Vec2> {
     let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
-    shape.iter().map(|slot| centre + (slot - centre) * OPEN_RANKS).collect()
+    let (low, high) = shape.iter().fold((centre, centre), |(low, high), slot| (low.inf(slot), high.sup(slot)));
+    let middle = (low + high) / 2.0;
+    let xs = [middle.x, low.x, high.x];
+    let sides = xs.into_iter().flat_map(|x| [middle.y, low.y, high.y].map(|y| Vec2::new(x, y)));
+    let widened = |fixed: Vec2| move |slot: &Vec2| fixed + (slot - fixed) * OPEN_RANKS;
+    let met = |fixed: &Vec2| {
+        let meets = |slot: &&Vec2| occupied.blocks_way(*slot + front, widened(*fixed)(slot) + front);
+        shape.iter().filter(meets).count()
+    };
+    // Of equals the first: the centre.
+    let fixed = iter::once(centre).chain(sides).min_by_key(met).unwrap_or(centre);
+    shape.iter().map(widened(fixed)).collect()
 }
 
 #[cfg(test)]
@@ -275,5 +319,24 @@ mod tests {
         assert_eq!(assign(Some(Pin { member: 0, slot: 1 })), Some(vec![1, 0, 2]));
         let front = Some(Pin { member: 0, slot: 0 });
         assert_eq!(assign_pinned(Reformation::Optimal, drones, line(&[0.0]), front), None);
+    }
+
+    /// Slots in a square whose sides are 10 m, and an obstacle of 2 m by 200 m at x = `wall_x_m`.
+    fn opened_beside(wall_x_m: f64) -> Vec<Vec2> {
+        let square = [(0.0, -5.0), (0.0, 5.0), (-10.0, -5.0), (-10.0, 5.0)].map(|(x, y)| Vec2::new(x, y));
+        let wall = [(-1.0, -100.0), (1.0, -100.0), (1.0, 100.0), (-1.0, 100.0)];
+        let wall = wall.map(|(x, y)| Vec2::new(x + wall_x_m, y)).to_vec();
+        let occupied = Occupied { keep_m: 5.0, clear_m: 1.0, shapes: vec![(wall, 0.0)], silent: &[] };
+        opened(&square, Vec2::zeros(), &occupied)
+    }
+
+    #[test]
+    fn ranks_open_away_from_walls() {
+        let xs = |slots: Vec<Vec2>| [slots[0].x, slots[3].x];
+        assert_eq!(xs(opened_beside(50.0)), [3.0, -13.0], "about the centre");
+        assert_eq!(xs(opened_beside(4.0)), [0.0, -16.0], "a wall in front");
+        assert_eq!(xs(opened_beside(-14.0)), [6.0, -10.0], "a wall behind");
+        assert_eq!(xs(opened_beside(2.5)), [0.0, -16.0], "no slot is beyond the wall");
+        assert_eq!(xs(opened_beside(1.5)), [0.0, -16.0], "a slot that stands near the wall comes no nearer");
     }
 }

@@ -76,7 +76,7 @@ impl Corridor {
 
     /// Visits the legs of the shortest path, each at least `PASSED_M` long in x.
     pub fn visit_legs(&self, position: Vec2, mut leg: impl FnMut(Vec2, Vec2)) {
-        let end = Vec2::new(self.target.x.max(position.x + self.scale.of_full(LOOK_AHEAD_M)), self.target.y);
+        let end = Vec2::new(self.target.x.max(position.x + self.scale.length(LOOK_AHEAD_M)), self.target.y);
         let ahead = &self.constraints[..self.constraints.partition_point(|c| c.x_m < end.x)];
         let mut from = position;
         let mut next = ahead.partition_point(|c| c.x_m <= from.x + PASSED_M);
@@ -93,7 +93,7 @@ impl Corridor {
     /// Ordinate at an abscissa of the path that comes along the course line, m.
     fn height_m(&self, x_m: f64) -> f64 {
         let first_x_m = self.constraints.first().map_or(x_m, |c| c.x_m.min(x_m));
-        let start = Vec2::new(first_x_m - self.scale.of_full(RUN_OUT_M), self.target.y);
+        let start = Vec2::new(first_x_m - self.scale.length(RUN_OUT_M), self.target.y);
         let mut y_m = self.target.y;
         self.visit_legs(start, |a, b| {
             if a.x < x_m && x_m <= b.x {

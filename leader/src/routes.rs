@@ -230,7 +230,7 @@ impl Routes {
     /// Distance behind the exit at which a path past the set ends on the course line, m.
     #[must_use]
     pub fn run_out_m(&self) -> f64 {
-        self.scale.of_full(RUN_OUT_M)
+        self.scale.length(RUN_OUT_M)
     }
 
     /// How small the swarm is.

@@ -130,6 +130,18 @@ fn tilted_neighbours_are_ordered_as_a_line_across_meets_them() {
 }
 
 #[test]
+fn a_drone_in_the_strip_behind_a_wall_is_not_led_back_round_it() {
+    let routes = routes(&[rectangle(100.0, -100.0, 5.0, 100.0)]);
+    let lane = lane(&routes, 1, &[]);
+    let towards = |x: f64| lane.pull(Vec2::new(x, -80.0), routes.gate_x_m()).direction;
+    // The rear is at 105 m, the clearance ends at 120 m, and the planning distance at 125 m.
+    assert!(towards(119.0).y > 0.99, "it still has the wall to pass: {:?}", towards(119.0));
+    for x in [120.1, 124.9, 125.1] {
+        assert!((towards(x) - (lane.target() - Vec2::new(x, -80.0)).normalize()).norm() < 1e-9, "{x}");
+    }
+}
+
+#[test]
 fn without_obstacles_there_is_one_free_route() {
     let mut broken = circle(0.0, 0.0, 1.0);
     broken.count = 99;

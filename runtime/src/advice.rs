@@ -4,7 +4,7 @@ use crate::mission;
 use skein_agent::PilotParams;
 use skein_protocol::shape::{ConvexShape, ShapeError};
 use skein_protocol::{DroneId, SimTime, Vec2};
-use skein_scenario::{End, Parts, Scenario};
+use skein_scenario::{End, FaultKind, OutlineSensing, Parts, Scenario, Sensor};
 
 /// The greatest speed from which a drone of this scenario stops within what it senses, m/s: before an obstacle at the edge of the
 /// detection range, and before a drone that comes the other way at the edge of the ranging distance.
@@ -62,7 +62,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
             ("sensors.clock_error_max_s", "s"),
         ),
     ];
-    Ok(found.into_iter().flatten().collect())
+    Ok(found.into_iter().flatten().chain(outside_the_proof(scenario)).collect())
 }
 
 fn pilot(scenario: &Scenario) -> PilotParams {
@@ -192,6 +192,22 @@ fn beyond_the_margin(what: &str, (possible, allowed): (f64, f64), (key, unit): (
     })
 }
 
+/// The faults of kinds for which nothing is proved (docs/safety.md, "Outside the scope of the proof"), a sentence for each.
+fn outside_the_proof(scenario: &Scenario) -> impl Iterator<Item = String> {
+    scenario.fault_plan.iter().enumerate().filter_map(|(number, fault)| {
+        let reason = match fault.kind {
+            FaultKind::Wind => "wind weakens braking",
+            FaultKind::Slow => "commands that were given take effect later than planned",
+            FaultKind::Noise if fault.velocity_bias_mps.is_some() || fault.velocity_std_mps.is_some() => "no margin allows for a wrong velocity",
+            FaultKind::Blind if fault.sensor != Some(Sensor::Ranging) && !scenario.obstacles.is_empty() && scenario.sensors.outline == OutlineSensing::Whole => {
+                "the drone may hit an obstacle that nobody has reported; with sensors.outline = \"seen\" it hovers"
+            }
+            _ => return None,
+        };
+        Some(format!("fault.{number} ({}) is outside the safety statement: {reason}", fault.kind.word()))
+    })
+}
+
 fn enclosed(drones: &[u32], gap_m: f64) -> Option<String> {
     let ids: Vec<String> = drones.iter().map(u32::to_string).collect();
     (!ids.is_empty()).then(|| {
@@ -249,6 +265,20 @@ mod tests {
             less.contains("wrong by 1.000 s") && less.contains("raise sensors.clock_error_max_s to 1.000"),
             "{less}"
         );
+    }
+
+    #[test]
+    fn faults_outside_the_safety_statement_are_warned_of() {
+        let wall = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\ncentre_m = [200, 0]\n";
+        let fault = |keys: &str| warned(&format!("{wall}[[fault]]\nat_s = 5\ntarget = \"all\"\n{keys}"));
+        let wind = fault("kind = \"wind\"\ngust_mps2 = 0.5\n");
+        assert_eq!(wind, "fault.0 (wind) is outside the safety statement: wind weakens braking");
+        assert!(fault("kind = \"slow\"\nreaction_time_s = 0.1\n").contains("fault.0 (slow) is outside"));
+        assert!(fault("kind = \"noise\"\nvelocity_std_mps = 0.1\n").contains("fault.0 (noise) is outside"));
+        assert!(fault("kind = \"blind\"\n").contains("sensors.outline"));
+        assert_eq!(fault("kind = \"blind\"\nsensor = \"ranging\"\n"), "");
+        assert_eq!(fault("kind = \"blind\"\n[sensors]\noutline = \"seen\"\n"), "");
+        assert_eq!(fault("kind = \"freeze\"\nfor_s = 1\n"), "");
     }
 
     #[test]

@@ -79,7 +79,7 @@ pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
         end: end(scenario),
         parts: parts(scenario),
         arrival_error_m: scenario.mission.arrival_error_m,
-        hold_speed_mps: scale(scenario).of_full(HOLD_SPEED_MPS),
+        hold_speed_mps: scale(scenario).speed(HOLD_SPEED_MPS),
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
         energy: EnergyModel {

@@ -20,6 +20,8 @@ enum Flight {
     Flying,
     /// It has lost its process and has stopped, and now goes down.
     Descending,
+    /// A new process took over on its way down. It has not been at a height since at which a drone may fly.
+    Rising,
     /// It is no body any more.
     Landed,
 }
@@ -62,12 +64,15 @@ impl Body {
         let dt = params.dt_s();
         self.energy_j += params.energy.power_w(self.velocity, acceleration_mps2) * dt;
         self.glide(clip(self.velocity + (acceleration_mps2 + push_mps2) * dt, params.speed_max_mps), dt);
+        if self.flight == Flight::Rising && self.velocity.z >= 0.0 && self.position.z >= params.clearance_m {
+            self.flight = Flight::Flying;
+        }
     }
 
     /// One tick of a drone without a process: it brakes to a stop. Then it stays, or it descends, lands and is no
     /// body any more.
     pub(crate) fn fail_safe(&mut self, params: &WorldParams) {
-        if self.flight == Flight::Flying && (self.brake(params) || params.failsafe == Failsafe::Hover) {
+        if matches!(self.flight, Flight::Flying | Flight::Rising) && (self.brake(params) || params.failsafe == Failsafe::Hover) {
             return;
         }
         if self.flies() {
@@ -91,7 +96,14 @@ impl Body {
     /// A new process flies the drone again, from where it is.
     pub(crate) fn revive(&mut self) {
         self.alive = true;
-        self.flight = Flight::Flying;
+        if self.flight == Flight::Descending {
+            self.flight = Flight::Rising;
+        }
+    }
+
+    /// Whether its process has to keep it above the ground. A process that took over on the way down has to rise first.
+    pub(crate) fn keeps_height(&self) -> bool {
+        self.alive && self.flight == Flight::Flying
     }
 
     /// Goes straight down until it is on the ground.
@@ -199,6 +211,23 @@ mod tests {
         let ticks = ticks.count();
         assert!((599..=602).contains(&ticks), "{ticks}");
         assert_eq!((body.position.z, body.velocity), (0.0, Vec3::zeros()));
+    }
+
+    #[test]
+    fn a_process_that_takes_over_on_the_way_down_has_to_rise_first() {
+        let land = WorldParams { failsafe: Failsafe::Land, ..params() };
+        let mut body = cruising();
+        body.kill();
+        while body.position.z > land.clearance_m + 1.0 {
+            body.fail_safe(&land);
+        }
+        body.revive();
+        let mut lowest_m = f64::INFINITY;
+        while !body.keeps_height() {
+            body.fly(Vec3::new(0.0, 0.0, 2.0), Vec3::zeros(), &land);
+            lowest_m = lowest_m.min(body.position.z);
+        }
+        assert!(lowest_m < land.clearance_m && body.position.z >= land.clearance_m, "{lowest_m} m");
     }
 
     #[test]

@@ -254,7 +254,7 @@ impl<P: RolloutPilot> RolloutSwarm<P> {
         let (place, velocity) = anchor(plan, self.now);
         let error_m = self.params.planner.arrival_error_m;
         let holds = matches!(self.params.planner.destination, Destination::Hold { .. });
-        let hold_mps = self.params.planner.routes.scale.of_full(HOLD_SPEED_MPS);
+        let hold_mps = self.params.planner.routes.scale.speed(HOLD_SPEED_MPS);
         let in_slot = |drone: &RolloutDrone<P>| {
             let slot = drone.pilot.slot().map(|slot| place + slot);
             let still = !holds || (drone.velocity - velocity).norm() <= hold_mps;

@@ -7,6 +7,7 @@
 //! more rarely; from the start most rarely if its two drones are near each other. A new line of the same two drones shortens the wait. A
 //! line is not passed on for a while after the other drone answered it. Answers themselves are not answered: they are only repeated rarely.
 
+use super::separation_pair::NO_LINE;
 use crate::tuning::{LINE_ANSWERED_S, LINE_FIRST_S, LINE_FORGET_S, LINE_NEAR, LINE_REDUNDANCY, LINE_REPEAT_S};
 use skein_protocol::payload::{MAX_SEPARATORS, Separation, Separator};
 use skein_protocol::{DroneId, SimTime};
@@ -66,9 +67,9 @@ struct Key {
 }
 
 impl Key {
-    /// Drones with the lower id make lines with even numbers.
+    /// Drones with the lower id make lines with even numbers. That a drone knows no line is its own word.
     fn new(speaker: DroneId, line: &Separator) -> Self {
-        Self { speaker, peer: line.peer, own: line.number % 2 == u32::from(speaker > line.peer) }
+        Self { speaker, peer: line.peer, own: number(line).is_none_or(|number| number % 2 == u32::from(speaker > line.peer)) }
     }
 }
 
@@ -113,7 +114,7 @@ impl RelayedLines {
     fn note_answer(&mut self, now: SimTime, speaker: DroneId, line: &Separator) {
         let Some(asked) = self.heard.get_mut(&Key { speaker: line.peer, peer: speaker, own: true }) else { return };
         let same = asked.line.incarnation == line.peer_incarnation && asked.line.peer_incarnation == line.incarnation;
-        if same && line.number >= asked.line.number {
+        if same && number(line).is_some_and(|answered| Some(answered) >= number(&asked.line)) {
             asked.answered = now;
         }
     }
@@ -163,9 +164,14 @@ fn slowest_s() -> f64 {
     LINE_REPEAT_S * f64::from(1_u32 << MAX_DOUBLINGS)
 }
 
-/// Of two lines of the same drones, the one with the greater version is said later.
-fn version(line: &Separator) -> (u16, u16, u32) {
-    (line.incarnation, line.peer_incarnation, line.number)
+/// Of two lines of the same drones, the one with the greater version is said later. A drone that knows no line says so before it says any.
+fn version(line: &Separator) -> (u16, u16, Option<u32>) {
+    (line.incarnation, line.peer_incarnation, number(line))
+}
+
+/// The number of a line; `None` if its speaker says that it knows no line.
+fn number(line: &Separator) -> Option<u32> {
+    Some(line.number).filter(|&number| number != NO_LINE)
 }
 
 #[cfg(test)]
@@ -288,6 +294,22 @@ mod tests {
             }
         });
         assert!((2..=4).contains(&said.len()), "{said:?}");
+    }
+
+    #[test]
+    fn the_word_that_there_is_no_line_is_passed_on_until_there_is_one() {
+        let mut lines = RelayedLines::default();
+        let far = distances(600.0, 400.0, 600.0);
+        let mut said = |tenth: u32, heard: &[(u32, Separator)]| {
+            for (speaker, line) in heard {
+                lines.hear(at(tenth), DroneId(*speaker), line, true, far);
+            }
+            lines.speak(at(tenth)).map(|said| said.separators[0].number)
+        };
+        assert_eq!(said(0, &[(0, line(NO_LINE)), (9, answer(NO_LINE))]), None);
+        assert_eq!(said(10, &[]), Some(NO_LINE), "that the other drone knows none either is no answer");
+        assert_eq!(said(20, &[(0, line(0))]), Some(0));
+        assert_ne!(said(30, &[(0, line(NO_LINE))]), Some(NO_LINE), "it is older than the line");
     }
 
     #[test]

@@ -145,18 +145,20 @@ impl Crowd {
         let law = self.params.law();
         let path = BrakingPath::new(position, velocity, law);
         let keep_m = self.params.safe_distance_m + self.params.margin_m();
-        let clear_m = self.params.clearance_m + 0.01;
-        let clear = |shape: &ConvexShape| {
-            let along = path.end() - path.start();
-            (0..=100).all(|k| {
-                shape_distance_m(shape, path.start() + along * (f64::from(k) / 100.0)) >= clear_m + along.norm() / 100.0
-            })
-        };
         let apart = |other: &(Vec2, Vec2)| {
             let other_path = BrakingPath::new(other.0, other.1, law);
             (0..=path.ticks().max(other_path.ticks())).all(|k| (path.at(k) - other_path.at(k)).norm() >= keep_m)
         };
-        self.obstacles.iter().all(clear) && self.bodies.iter().all(apart)
+        self.is_clear(path.start(), path.end()) && self.bodies.iter().all(apart)
+    }
+
+    /// Whether a straight way keeps the clearance from all obstacles.
+    fn is_clear(&self, from: Vec2, to: Vec2) -> bool {
+        let (clear_m, along) = (self.params.clearance_m + 0.01, to - from);
+        let is_clear = |shape: &ConvexShape, k: i32| {
+            shape_distance_m(shape, from + along * (f64::from(k) / 100.0)) >= clear_m + along.norm() / 100.0
+        };
+        self.obstacles.iter().all(|shape| (0..=100).all(|k| is_clear(shape, k)))
     }
 
     /// The acceleration that drone `i` wants, m/s².

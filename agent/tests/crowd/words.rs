@@ -77,21 +77,30 @@ struct Talk {
 }
 
 impl Crowd {
-    /// Starts anew: all drones of the crowd fly with one velocity, and their braking paths keep all distances.
+    /// Starts anew: all drones of the crowd fly straight on with one velocity until their first commands take effect. From there their
+    /// braking paths keep all distances.
     fn with_one_velocity(&mut self, random: &mut Keyed) -> Vec2 {
         let velocity = random.disc(self.params.speed_max_mps);
+        let straight_m = velocity * self.reaction_time_s();
         let bodies = std::mem::take(&mut self.bodies);
         self.pending.clear();
         self.frozen.clear();
         self.tick = 0;
         for (position, _) in bodies {
-            if self.admits((position, velocity)) {
-                self.bodies.push((position, velocity));
-                self.pending.push(self.braking_commands(velocity));
+            // As the velocity is common, bodies that are apart when their first commands take effect are apart before.
+            if self.admits((position + straight_m, velocity)) && self.is_clear(position, position + straight_m) {
+                self.bodies.push((position + straight_m, velocity));
+                self.pending.push(std::iter::repeat_n(Vec2::zeros(), self.lag as usize).collect());
                 self.frozen.push(0);
             }
         }
+        self.bodies.iter_mut().for_each(|body| body.0 -= straight_m);
         velocity
+    }
+
+    /// Delay from a command to its effect, s.
+    fn reaction_time_s(&self) -> f64 {
+        f64::from(self.lag) * self.params.dt_s
     }
 
     /// The time by the clock of a drone.
@@ -171,7 +180,7 @@ impl Talk {
             incarnation: self.incarnations[i],
             starts_m: Arc::clone(&self.starts_m),
             start_velocity: self.start_velocity,
-            reaction_time_s: 0.0,
+            reaction_time_s: crowd.reaction_time_s(),
             keep_m: crowd.params.keep_m() + 2.0 * self.errors.allowed.position_m,
             braking_mps2: crowd.params.braking_mps2,
             period_s: BEACON_S,
