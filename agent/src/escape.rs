@@ -17,6 +17,9 @@ const LONGER_S: f64 = 2.0;
 const LONGEST_S: f64 = 16.0;
 /// The attempts are forgotten this long after the end of the last one, s.
 const FREE_S: f64 = 20.0;
+/// A drone is stuck if it has not left the place where it is for this many times the patience. The place is as large as a still drone
+/// flies in that time: a drone that swings to and fro over some metres is stuck as well, but is given more time.
+const WINDOWS: [f64; 2] = [1.0, 10.0];
 /// Directions of the attempts, relative to the blocked direction, rad, in the order in which they are tried.
 const TURNS: [f64; 5] = [
     std::f64::consts::PI,
@@ -29,7 +32,8 @@ const TURNS: [f64; 5] = [
 /// Escape attempts of one drone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Escape {
-    still: Option<Standstill>,
+    /// For each of [`WINDOWS`].
+    stays: [Option<Stay>; WINDOWS.len()],
     until: Option<SimTime>,
     direction: Vec2,
     attempts: usize,
@@ -48,7 +52,7 @@ pub struct Course {
 
 /// Where a drone has been since when.
 #[derive(Clone, Copy, Debug)]
-struct Standstill {
+struct Stay {
     since: SimTime,
     position: Vec2,
 }
@@ -63,8 +67,8 @@ impl Escape {
     /// Returns the velocity to fly, world frame, m/s. This is the wanted one unless the drone has been stuck for `patience_s`. Then
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `scale`: how small the swarm is.
     ///
-    /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone: one that moves to
-    /// and fro in one place is stuck as well.
+    /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone, or not for ten
+    /// times as long.
     pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
         let Course { now, position, wanted } = *course;
         if self.until.is_some_and(|until| now < until) {
@@ -73,21 +77,27 @@ impl Escape {
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        let place_m = scale.speed(STILL_MPS) * patience_s;
-        let has_left = |still: Standstill| (position - still.position).norm() > place_m;
-        if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) || self.still.is_some_and(has_left) {
-            self.still = None;
+        if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
+            self.stays = Default::default();
             return wanted;
         }
-        let since = self.still.get_or_insert(Standstill { since: now, position }).since;
-        if now.since(since) < patience_s {
+        let still_mps = scale.speed(STILL_MPS);
+        let mut is_stuck = false;
+        for (stay, times) in self.stays.iter_mut().zip(WINDOWS) {
+            let window_s = times * patience_s;
+            let is_here = |stay: &Stay| (position - stay.position).norm() <= still_mps * window_s;
+            let here = stay.filter(is_here).unwrap_or(Stay { since: now, position });
+            *stay = Some(here);
+            is_stuck |= now.since(here.since) >= window_s;
+        }
+        if !is_stuck {
             return wanted;
         }
         let turn = nalgebra::Rotation2::new(TURNS[self.attempts % TURNS.len()]);
         self.direction = turn * wanted.normalize();
         self.until = Some(now.after((FIRST_S + LONGER_S * self.attempts as f64).min(LONGEST_S)));
         self.attempts += 1;
-        self.still = None;
+        self.stays = Default::default();
         self.direction * speed_mps
     }
 }
@@ -133,6 +143,14 @@ mod tests {
         let flown = flown(6, WANTED, 5.0, place);
         assert_eq!(flown[..3], [WANTED; 3]);
         assert!((flown[3] - Vec2::new(-5.0, 0.0)).norm() < 1e-9, "{flown:?}");
+    }
+
+    #[test]
+    fn a_drone_that_swings_over_some_metres_gets_stuck_later() {
+        let place = |second: f64| Vec2::new((second * 0.8).sin() * 4.0, 0.0);
+        let flown = flown(40, WANTED, 5.0, place);
+        let escapes = flown.iter().position(|velocity| *velocity != WANTED);
+        assert_eq!(escapes, Some(30), "{flown:?}");
     }
 
     #[test]

@@ -26,12 +26,14 @@ pub struct QueueParams {
 }
 
 /// The speed at which a drone with `remaining_m` to the gate arrives one headway after the drone before it, m/s:
-/// t₁ = s₁/v, t_k = max(s_k/v, t_{k−1} + h), speed s/t, within [v − δ, v]. Past the gate it is v.
+/// t₁ = s₁/v, t_k = max(s_k/v, t_{k−1} + h), speed s/t, within [v − δ, v]. A drone past the gate was there at s_k/v, whenever those before
+/// it arrive. Past the gate the speed is v.
 #[must_use]
 pub fn queue_speed(queue: &[Ahead], remaining_m: f64, params: &QueueParams) -> f64 {
     let QueueParams { headway_s, speed_mps, speed_change_mps } = *params;
     let free = |s: f64| s / speed_mps;
-    let before = queue.iter().fold(f64::NEG_INFINITY, |t, one| free(one.remaining_m).max(t + headway_s));
+    let next = |t: f64, s: f64| free(s).max(if s > 0.0 { t + headway_s } else { t });
+    let before = queue.iter().fold(f64::NEG_INFINITY, |t, one| next(t, one.remaining_m));
     let mine = free(remaining_m).max(before + headway_s);
     if remaining_m <= 0.0 || mine <= 1e-6 {
         return speed_mps;
