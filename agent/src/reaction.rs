@@ -60,11 +60,13 @@ impl ReactionDelay {
         self.pending_motions(velocity).last().unwrap_or(none)
     }
 
-    /// Replaces all pending commands by full braking from `velocity` (m/s). A drone that missed ticks was braked by its failsafe, and
-    /// goes on braking until its next command takes effect.
-    pub(crate) fn brake(&mut self, mut velocity: Vec2, law: BrakingLaw) {
+    /// In tick `tick`, replaces all pending commands by full braking from `velocity` (m/s). A drone that missed ticks was braked by its
+    /// failsafe, and goes on braking until its next command takes effect. At the start, before the first command of any drone takes
+    /// effect, the failsafe flies straight on.
+    pub(crate) fn brake(&mut self, tick: u64, mut velocity: Vec2, law: BrakingLaw) {
+        let (first, mut ticks) = (self.commands.ticks() as u64, tick..);
         self.commands.replace(|| {
-            let braking = law.braking(velocity);
+            let braking = if ticks.next() < Some(first) { Vec2::zeros() } else { law.braking(velocity) };
             velocity += braking * law.dt_s;
             braking
         });
@@ -110,10 +112,10 @@ mod tests {
             delay.push(Vec2::new(3.0, 0.0));
         }
         let law = BrakingLaw { deceleration_mps2: 5.0, dt_s: 0.02 };
-        delay.brake(Vec2::new(0.0, 1.0), law);
+        delay.brake(9, Vec2::new(0.0, 1.0), law);
         let motion = delay.pending_motion(Vec2::new(0.0, 1.0));
         assert!((motion.velocity - Vec2::new(0.0, 0.5)).norm() < 1e-12, "{motion:?}");
-        delay.brake(Vec2::new(0.0, 0.15), law);
+        delay.brake(9, Vec2::new(0.0, 0.15), law);
         assert!(
             delay.pending_motion(Vec2::new(0.0, 0.15)).velocity.norm() < 1e-12,
             "it stops, and does not turn round"
@@ -130,5 +132,15 @@ mod tests {
         }
         // Two ticks late. Then command 1 repeats until the delay is four ticks. Then two commands are skipped.
         assert_eq!(effective, [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 5.0, 6.0]);
+    }
+
+    #[test]
+    fn a_drone_that_missed_ticks_at_the_start_flies_straight_on_at_first() {
+        let mut delay = ReactionDelay::new(0.1, 0.02);
+        let law = BrakingLaw { deceleration_mps2: 5.0, dt_s: 0.02 };
+        delay.brake(2, Vec2::new(0.0, 1.0), law);
+        let speeds: Vec<f64> = delay.pending_motions(Vec2::new(0.0, 1.0)).map(|motion| motion.velocity.y).collect();
+        let expected = [1.0, 1.0, 1.0, 0.9, 0.8];
+        assert!(speeds.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{speeds:?}");
     }
 }

@@ -436,9 +436,7 @@ impl SeparationParams {
         let own = Stop { at: path.end(), velocity: path.velocity() };
         let Some(towards_me) = (own.at - peer.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
-            let side = known.pair.side();
-            let between = SeparatingLine::resting(now, towards_me * side.sign(), 0.0);
-            let first = if known.opens { self.line(&between, side, &own, &peer, late_s, path) } else { None };
+            let first = if known.opens { self.line(None, known.pair.side(), &own, &peer, late_s, path) } else { None };
             if first.is_some_and(|line| known.pair.open(line)) {
                 known.changed = now;
             }
@@ -452,7 +450,7 @@ impl SeparationParams {
         if !ahead && now.since(known.changed) < patience_s {
             return;
         }
-        let Some(line) = self.line(&stated.line, side, &own, &peer, late_s, path) else { return };
+        let Some(line) = self.line(Some(&stated.line), side, &own, &peer, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
         if (turned || shifted_m >= self.scale().length(SHIFT_M)) && known.pair.propose(line, path.earliest()) {
@@ -482,7 +480,7 @@ impl SeparationParams {
     /// far as this drone's path now and the other's path then allow.
     fn line(
         &self,
-        present: &SeparatingLine,
+        present: Option<&SeparatingLine>,
         side: Side,
         own: &Stop,
         peer: &Stop,
@@ -492,11 +490,10 @@ impl SeparationParams {
         let now = path.now();
         let half_m = self.keep_m / 2.0;
         let wanted = (own.at - peer.at).try_normalize(1e-9)? * side.sign();
-        let keeps_normal = present.normal().perp(&wanted).abs() < TURN && present.normal().dot(&wanted) > 0.0;
-        let resting = if keeps_normal {
-            SeparatingLine::resting(now, present.normal(), 0.0).with_normal_of(present)
-        } else {
-            SeparatingLine::resting(now, wanted, 0.0)
+        let keeps = |line: &&SeparatingLine| line.normal().perp(&wanted).abs() < TURN && line.normal().dot(&wanted) > 0.0;
+        let resting = match present.filter(keeps) {
+            Some(present) => SeparatingLine::resting(now, present.normal(), 0.0).with_normal_of(present),
+            None => SeparatingLine::resting(now, wanted, 0.0),
         };
         // From here on along the direction from the other drone to this one.
         let n = resting.normal() * side.sign();
@@ -506,7 +503,8 @@ impl SeparationParams {
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
         let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().speed(STILL_MPS);
-        let aimed_m = match (close && still, side) {
+        // The first line is in the middle: the other drone, which hovers, must keep to it.
+        let aimed_m = match (close && still && present.is_some(), side) {
             (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.
             (true, Side::Front) => peer_m + half_m,

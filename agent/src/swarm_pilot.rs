@@ -462,7 +462,7 @@ impl SwarmPilot {
             None => self.params.incarnation > 1,
         };
         if missed {
-            self.reaction.brake(senses.velocity(), self.braking_filter.params().law());
+            self.reaction.brake(senses.tick, senses.velocity(), self.braking_filter.params().law());
             self.braking_filter.forget();
         }
     }

@@ -67,6 +67,7 @@ pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
         safe_distance_m: drone.safe_distance_m,
         clearance_m: scenario.avoidance.clearance_m,
         planning_distance_m: scenario.avoidance.planning_distance_m,
+        reaction_time_s: scenario.drone.reaction_time_s,
         detection_range_m: scenario.sensors.detection_range_m,
         ranging_m: scenario.sensors.ranging.then_some(scenario.ranging_m()),
         sensors: sensor_errors(scenario),

@@ -1,7 +1,7 @@
 //! One drone's body: a point mass (the paper's K1, in space), its failsafe, its energy (the paper's E7).
 
 use crate::params::{Failsafe, WorldParams};
-use crate::tuning::DESCENT_MPS;
+use crate::tuning::{DESCENT_MPS, TAKE_OVER_S};
 use skein_protocol::Vec3;
 
 /// The true state of one drone.
@@ -20,8 +20,8 @@ enum Flight {
     Flying,
     /// It has lost its process and has stopped, and now goes down.
     Descending,
-    /// A new process took over on its way down. It has not been at a height since at which a drone may fly.
-    Rising,
+    /// It is so low on its way down that it can only land.
+    Landing,
     /// It is no body any more.
     Landed,
 }
@@ -64,19 +64,16 @@ impl Body {
         let dt = params.dt_s();
         self.energy_j += params.energy.power_w(self.velocity, acceleration_mps2) * dt;
         self.glide(clip(self.velocity + (acceleration_mps2 + push_mps2) * dt, params.speed_max_mps), dt);
-        if self.flight == Flight::Rising && self.velocity.z >= 0.0 && self.position.z >= params.clearance_m {
-            self.flight = Flight::Flying;
-        }
     }
 
     /// One tick of a drone without a process: it brakes to a stop. Then it stays, or it descends, lands and is no
     /// body any more.
     pub(crate) fn fail_safe(&mut self, params: &WorldParams) {
-        if matches!(self.flight, Flight::Flying | Flight::Rising) && (self.brake(params) || params.failsafe == Failsafe::Hover) {
+        if self.flight == Flight::Flying && (self.brake(params) || params.failsafe == Failsafe::Hover) {
             return;
         }
         if self.flies() {
-            self.descend(params.dt_s());
+            self.descend(params);
         }
     }
 
@@ -93,23 +90,30 @@ impl Body {
         self.alive = false;
     }
 
+    /// Whether a new process can take over: the drone lost its process, and is not so low on its way down that it can only land.
+    pub(crate) fn can_revive(&self) -> bool {
+        !self.alive && matches!(self.flight, Flight::Flying | Flight::Descending)
+    }
+
     /// A new process flies the drone again, from where it is.
     pub(crate) fn revive(&mut self) {
         self.alive = true;
-        if self.flight == Flight::Descending {
-            self.flight = Flight::Rising;
-        }
+        self.flight = Flight::Flying;
     }
 
-    /// Whether its process has to keep it above the ground. A process that took over on the way down has to rise first.
-    pub(crate) fn keeps_height(&self) -> bool {
-        self.alive && self.flight == Flight::Flying
+    /// One tick of a drone whose process does nothing before the first command of any drone takes effect: it flies straight on.
+    pub(crate) fn coast(&mut self, params: &WorldParams) {
+        if self.alive {
+            self.energy_j += params.energy.power_w(self.velocity, Vec3::zeros()) * params.dt_s();
+        }
+        self.glide(self.velocity, params.dt_s());
     }
 
     /// Goes straight down until it is on the ground.
-    fn descend(&mut self, dt: f64) {
-        self.flight = Flight::Descending;
-        self.glide(Vec3::new(0.0, 0.0, -DESCENT_MPS), dt);
+    fn descend(&mut self, params: &WorldParams) {
+        self.glide(Vec3::new(0.0, 0.0, -DESCENT_MPS), params.dt_s());
+        let is_low = self.position.z < params.clearance_m + DESCENT_MPS * TAKE_OVER_S;
+        self.flight = if is_low { Flight::Landing } else { Flight::Descending };
         if self.position.z <= 0.0 {
             (self.position.z, self.velocity, self.flight) = (0.0, Vec3::zeros(), Flight::Landed);
         }
@@ -214,20 +218,22 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_takes_over_on_the_way_down_has_to_rise_first() {
+    fn a_drone_that_is_low_on_its_way_down_can_only_land() {
         let land = WorldParams { failsafe: Failsafe::Land, ..params() };
         let mut body = cruising();
+        assert!(!body.can_revive(), "it lives");
         body.kill();
-        while body.position.z > land.clearance_m + 1.0 {
+        let mut lowest_m = body.position.z;
+        while body.can_revive() {
+            lowest_m = body.position.z;
             body.fail_safe(&land);
         }
-        body.revive();
-        let mut lowest_m = f64::INFINITY;
-        while !body.keeps_height() {
-            body.fly(Vec3::new(0.0, 0.0, 2.0), Vec3::zeros(), &land);
-            lowest_m = lowest_m.min(body.position.z);
-        }
-        assert!(lowest_m < land.clearance_m && body.position.z >= land.clearance_m, "{lowest_m} m");
+        assert!((25.0..25.2).contains(&lowest_m), "{lowest_m} m");
+        let hover = params();
+        let mut low = Body::new(Vec3::new(0.0, 0.0, 15.0), Vec3::zeros());
+        low.kill();
+        low.fail_safe(&hover);
+        assert!(low.can_revive(), "it hovers");
     }
 
     #[test]

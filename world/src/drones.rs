@@ -4,7 +4,7 @@ use crate::body::{Body, admissible};
 use crate::params::WorldParams;
 use crate::process::Process;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Vec3};
+use skein_protocol::{DroneId, SimTime, Vec3};
 
 /// All drones. Calls about a drone that does not exist have no effect.
 #[derive(Clone, Debug)]
@@ -122,9 +122,9 @@ impl DroneTable {
         self.processes.get_mut(id.index()).is_some_and(|process| process.set_frozen(false)) && alive
     }
 
-    /// A new process takes over a dead drone. Returns its incarnation; `None` if the drone lives or has landed.
+    /// A new process takes over a dead drone. Returns its incarnation; `None` if the drone lives or is landing.
     pub(crate) fn restart(&mut self, id: DroneId) -> Option<u32> {
-        let body = self.bodies.get_mut(id.index()).filter(|body| !body.is_alive() && body.flies())?;
+        let body = self.bodies.get_mut(id.index()).filter(|body| body.can_revive())?;
         body.revive();
         Some(self.processes[id.index()].restart())
     }
@@ -134,19 +134,21 @@ impl DroneTable {
         self.processes.get_mut(id.index()).is_some_and(|process| process.set_incarnation(incarnation))
     }
 
-    /// Moves every body by one tick: as its process commands, or as its autopilot flies without a command. `wind_mps2`
-    /// is added to the commands. Returns how many commands were rejected because they were not finite.
-    pub(crate) fn fly(&mut self, params: &WorldParams, wind_mps2: impl Fn(DroneId) -> Vec3) -> u64 {
+    /// Moves every body by one tick, which opens at `opening`: as its process commands, or as its autopilot flies without a command.
+    /// `wind_mps2` is added to the commands. Returns how many commands were rejected because they were not finite.
+    pub(crate) fn fly(&mut self, params: &WorldParams, opening: SimTime, wind_mps2: impl Fn(DroneId) -> Vec3) -> u64 {
+        // Whatever happens to a process, the others cannot react before their first commands take effect.
+        let coasts = opening.since(SimTime::ZERO) < params.reaction_time_s - params.dt_s() / 2.0;
         let mut rejected = 0;
         for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
             if !body.is_alive() {
-                body.fail_safe(params);
+                if coasts { body.coast(params) } else { body.fail_safe(params) }
                 continue;
             }
             // The safety rule allows a command in the state in which it was given, and braking in every state. A pilot that has
             // failed in this tick commands nothing.
             if process.is_frozen() || process.is_late() || process.slot().has_failed() {
-                body.hover(params);
+                if coasts { body.coast(params) } else { body.hover(params) }
                 continue;
             }
             let command = admissible(process.slot().acceleration_mps2, params.acceleration_max_mps2);

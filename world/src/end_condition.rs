@@ -36,7 +36,9 @@ impl EndCondition {
         parts: &[Vec<usize>],
     ) -> bool {
         if let End::Hold { .. } = params.end {
-            self.past_x_m = stages.past_x_m();
+            // Where an outline ends that is sensed in part, no drone knows.
+            let in_part = params.sensors.view_m.is_some();
+            self.past_x_m = if in_part { stages.begun_x_m() } else { stages.past_x_m() };
             self.note_reached(bodies);
             if !self.holds(params, bodies) {
                 return false;

@@ -41,6 +41,7 @@
 //!     safe_distance_m: 25.0,
 //!     clearance_m: 15.0,
 //!     planning_distance_m: 20.0,
+//!     reaction_time_s: 0.0,
 //!     detection_range_m: 90.0,
 //!     ranging_m: Some(50.0),
 //!     sensors: SensorErrors::default(),

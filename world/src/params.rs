@@ -68,6 +68,8 @@ pub struct WorldParams {
     pub acceleration_max_mps2: f64,
     /// Deceleration of a drone that brakes fully, m/s².
     pub braking_mps2: f64,
+    /// Time from a command to its effect, s. Until the first command takes effect, the autopilot flies straight on.
+    pub reaction_time_s: f64,
     /// Least distance of two bodies, m.
     pub safe_distance_m: f64,
     /// Least distance of a body to an obstacle, m.
@@ -166,6 +168,7 @@ impl WorldParams {
             ("safe_distance_m", self.safe_distance_m),
             ("clearance_m", self.clearance_m),
             ("planning_distance_m", self.planning_distance_m),
+            ("reaction_time_s", self.reaction_time_s),
             ("detection_range_m", self.detection_range_m),
             ("ranging_m", self.ranging_m.unwrap_or(0.0)),
             ("arrival_error_m", self.arrival_error_m),

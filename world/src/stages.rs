@@ -21,6 +21,7 @@ struct Stage {
 pub(crate) struct Stages {
     stages: Vec<Stage>,
     obstacles: Vec<Extent>,
+    begun_x_m: f64,
     past_x_m: f64,
 }
 
@@ -29,6 +30,7 @@ pub(crate) struct Stages {
 struct Extent {
     /// The number of its set.
     set: usize,
+    front_x_m: f64,
     rear_x_m: f64,
 }
 
@@ -38,7 +40,7 @@ impl Stages {
         let mut order: Vec<usize> = (0..outlines.len()).collect();
         order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
         let obstacles = vec![Extent::default(); outlines.len()];
-        let mut made = Self { stages: Vec::new(), obstacles, past_x_m: f64::NEG_INFINITY };
+        let mut made = Self { stages: Vec::new(), obstacles, begun_x_m: f64::NEG_INFINITY, past_x_m: f64::NEG_INFINITY };
         let mut centres: Vec<f64> = Vec::new();
         let mut last_x_m = f64::NEG_INFINITY;
         for obstacle in order {
@@ -47,7 +49,7 @@ impl Stages {
                 made.close(&centres);
                 centres.clear();
             }
-            made.obstacles[obstacle] = Extent { set: made.stages.len(), rear_x_m };
+            made.obstacles[obstacle] = Extent { set: made.stages.len(), front_x_m, rear_x_m };
             last_x_m = last_x_m.max(rear_x_m);
             centres.push((front_x_m + rear_x_m) / 2.0);
         }
@@ -62,6 +64,7 @@ impl Stages {
     pub(crate) fn sensed(outlines: &[Outline], gap_m: f64) -> Self {
         let mut made = Self::new(outlines, gap_m);
         made.past_x_m = made.obstacles.iter().map(|obstacle| obstacle.rear_x_m).fold(f64::NEG_INFINITY, f64::max);
+        made.begun_x_m = made.obstacles.iter().map(|obstacle| obstacle.front_x_m).fold(f64::NEG_INFINITY, f64::max);
         made
     }
 
@@ -74,6 +77,11 @@ impl Stages {
     /// lies beside the way, or beyond its end.
     pub(crate) fn past_x_m(&self) -> f64 {
         self.past_x_m
+    }
+
+    /// The greatest abscissa at which an obstacle begins that living drones have sensed, m; −∞ without any.
+    pub(crate) fn begun_x_m(&self) -> f64 {
+        self.begun_x_m
     }
 
     /// Number of sets.
@@ -104,7 +112,8 @@ impl Stages {
     /// Logs the sets that are sensed for the first time, at the time when the tick opens.
     pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
-            let Extent { set: number, rear_x_m } = self.obstacles[contact.obstacle as usize];
+            let Extent { set: number, front_x_m, rear_x_m } = self.obstacles[contact.obstacle as usize];
+            self.begun_x_m = self.begun_x_m.max(front_x_m);
             self.past_x_m = self.past_x_m.max(rear_x_m);
             if !std::mem::replace(&mut self.stages[number].detected, true) {
                 let what = EventKind::Detected {

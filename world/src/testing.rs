@@ -22,6 +22,7 @@ pub(crate) fn params() -> WorldParams {
         speed_max_mps: 20.0,
         acceleration_max_mps2: 5.0,
         braking_mps2: 5.0,
+        reaction_time_s: 0.0,
         safe_distance_m: 33.0,
         clearance_m: 15.0,
         planning_distance_m: 20.0,

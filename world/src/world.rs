@@ -374,7 +374,7 @@ impl World {
 
     fn move_bodies(&mut self, opening: SimTime) {
         let faults = self.faults.schedule();
-        let rejected = self.drones.fly(&self.params, |id| faults.wind_mps2(id, opening).push(0.0));
+        let rejected = self.drones.fly(&self.params, opening, |id| faults.wind_mps2(id, opening).push(0.0));
         self.counters.count_rejected(rejected);
     }
 

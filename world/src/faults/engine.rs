@@ -121,7 +121,7 @@ impl FaultEngine {
         Some("continued".to_owned())
     }
 
-    /// The description of the event; `None` if the drone has landed meanwhile.
+    /// The description of the event; `None` if the drone is landing meanwhile.
     fn restart(&mut self, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
         let incarnation = drones.restart(drone)?;
         self.commands.push(ProcessCommand::Restart(drone, incarnation));

@@ -99,12 +99,12 @@ impl DistanceMonitor {
         violations
     }
 
-    /// A drone without a process may land, and a new process that takes over on the way down has to rise first.
+    /// A drone without a process may land.
     fn check_ground(&mut self, bodies: &[Body], end: SimTime, log: &mut EventLog) -> u64 {
         let mut violations = 0;
         for (i, (body, low)) in bodies.iter().zip(&mut self.low).enumerate() {
             let altitude_m = body.position().z;
-            let before = std::mem::replace(low, body.keeps_height() && altitude_m < self.clearance_m - ROUNDING_M);
+            let before = std::mem::replace(low, body.is_alive() && altitude_m < self.clearance_m - ROUNDING_M);
             if *low && !before {
                 violations += 1;
                 log.push_violation(end, ViolationKind::Ground, &[DroneId(i as u32)], altitude_m);

@@ -214,7 +214,8 @@ impl WorldPart {
         }
         self.uplink.close(self.time_of(self.tick));
         self.drones.hold_unanswered();
-        self.drones.fly(&self.params, |_| Vec3::zeros());
+        let opening = self.time_of(self.tick);
+        self.drones.fly(&self.params, opening, |_| Vec3::zeros());
         let (mut drones, mut words) = (Vec::with_capacity(self.ids.len()), Vec::new());
         for ((&id, body), process) in self.ids.iter().zip(self.drones.bodies()).zip(self.drones.processes()) {
             TickDigest::write_drone(&mut words, body, process);
