@@ -112,7 +112,8 @@ mod tests {
     fn flown(seconds: u32, wanted: Vec2, speed_mps: f64, place: impl Fn(f64) -> Vec2) -> Vec<Vec2> {
         let mut escape = Escape::default();
         let mut steer = |second: u32| {
-            let course = Course { now: SimTime::from_secs(f64::from(second)), position: place(f64::from(second)), wanted };
+            let course =
+                Course { now: SimTime::from_secs(f64::from(second)), position: place(f64::from(second)), wanted };
             escape.steer(&course, 3.0, speed_mps, Scale::FULL)
         };
         (0..seconds).map(&mut steer).collect()

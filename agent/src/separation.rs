@@ -490,7 +490,8 @@ impl SeparationParams {
         let now = path.now();
         let half_m = self.keep_m / 2.0;
         let wanted = (own.at - peer.at).try_normalize(1e-9)? * side.sign();
-        let keeps = |line: &&SeparatingLine| line.normal().perp(&wanted).abs() < TURN && line.normal().dot(&wanted) > 0.0;
+        let keeps =
+            |line: &&SeparatingLine| line.normal().perp(&wanted).abs() < TURN && line.normal().dot(&wanted) > 0.0;
         let resting = match present.filter(keeps) {
             Some(present) => SeparatingLine::resting(now, present.normal(), 0.0).with_normal_of(present),
             None => SeparatingLine::resting(now, wanted, 0.0),

@@ -5,10 +5,11 @@ use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::obstacles::Obstacles;
 use crate::own_state::OwnState;
-use crate::params::{LeadingParams, PlannerParams};
+use crate::params::{Destination, LeadingParams, PlannerParams};
 use crate::peers::Peers;
 use crate::plan_bundle::PlanBundle;
 use crate::tuning::MAX_REJECTIONS;
+use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
@@ -128,7 +129,7 @@ impl Knowledge {
     pub(crate) fn myself(&self, own: &OwnState) -> Member {
         let OwnState { position, velocity, .. } = *own;
         let (speed_mps, group) = (velocity.norm(), self.ledger.group());
-        Member { id: self.me, position, speed_mps, velocity, group, follows: true }
+        Member { id: self.me, position, speed_mps, velocity, group, follows: true, settled: false }
     }
 
     /// Living peers, extrapolated to `now`, by id. A peer's group is the one that the obeyed plan, or the plan that split
@@ -142,8 +143,20 @@ impl Knowledge {
             let group = group.unwrap_or_else(|| pose.group());
             let velocity = pose.velocity();
             let (position, follows) = (pose.extrapolated(now), pose.term() == self.election.obeyed());
-            Member { id, position, speed_mps: velocity.norm(), velocity, group, follows }
+            let speed_mps = velocity.norm();
+            let settled = pose.term() < self.election.obeyed() && self.rests_at_destination(position, speed_mps);
+            Member { id, position, speed_mps, velocity, group, follows, settled }
         })
+    }
+
+    /// Whether a drone with this position (world frame, m) and speed is where it stays if it hears no other drone.
+    fn rests_at_destination(&self, position: Vec2, speed_mps: f64) -> bool {
+        let (destination, error_m) = (self.params.destination, self.params.arrival_error_m);
+        let there = match destination {
+            Destination::Hold { stop_x_m } => position.x >= stop_x_m - error_m,
+            Destination::Goal { front_m } => (position - front_m).norm() <= error_m,
+        };
+        there && speed_mps < self.params.routes.scale.speed(HOLD_SPEED_MPS)
     }
 
     /// Number of living drones of the scope that claim before this one: those closer to the destination, and healthy ones

@@ -19,6 +19,9 @@ pub struct Member {
     pub group: GroupId,
     /// Whether its last beacon shows that it obeys this leader's term.
     pub follows: bool,
+    /// Whether it rests at the destination and obeys an older term: it does not hear this leader, so it will not pass what it does not
+    /// know.
+    pub settled: bool,
 }
 
 /// The leader of each member's group: the member of that group that is closest to the destination. The lower id wins a

@@ -94,6 +94,7 @@ mod tests {
             velocity: Vec2::zeros(),
             group: GroupId::ALL,
             follows: true,
+            settled: false,
         };
         ids.iter().map(member).collect()
     }

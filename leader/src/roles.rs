@@ -185,7 +185,7 @@ fn has_ahead(k: &Knowledge, drones: impl Iterator<Item = Member> + Clone) -> boo
     let behind = |set: &[ObstacleId]| k.params().destination.is_before(k.obstacles().front_x_m(set) - planning_m);
     k.obstacles().sets().iter().filter(|set| !behind(set)).any(|set| {
         let exit_x_m = k.obstacles().exit_x_m(set, planning_m);
-        drones.clone().any(|m| !k.obstacles().is_past(m.id, m.position.x, set, exit_x_m))
+        drones.clone().any(|m| !m.settled && !k.obstacles().is_past(m.id, m.position.x, set, exit_x_m))
     })
 }
 

@@ -49,7 +49,7 @@ impl Situation<'_> {
     /// Drones of other groups that still have to pass a set.
     pub(crate) fn others_before(&self, set: &[ObstacleId]) -> Vec<DroneId> {
         let exit_x_m = self.exit_x_m(set);
-        let before = |m: &&Member| !self.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
+        let before = |m: &&Member| !m.settled && !self.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
         self.others.iter().filter(before).map(|m| m.id).collect()
     }
 

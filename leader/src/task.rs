@@ -26,7 +26,7 @@ impl Task {
         let mut task = Self::Form;
         for set in s.obstacles.sets().iter().filter(|set| !s.is_behind_goal(set)) {
             let exit_x_m = s.exit_x_m(set);
-            let past = |m: &Member| s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
+            let past = |m: &Member| m.settled || s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
             if s.members.iter().all(past) {
                 continue;
             }

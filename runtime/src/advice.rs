@@ -198,8 +198,14 @@ fn outside_the_proof(scenario: &Scenario) -> impl Iterator<Item = String> {
         let reason = match fault.kind {
             FaultKind::Wind => "wind weakens braking",
             FaultKind::Slow => "commands that were given take effect later than planned",
-            FaultKind::Noise if fault.velocity_bias_mps.is_some() || fault.velocity_std_mps.is_some() => "no margin allows for a wrong velocity",
-            FaultKind::Blind if fault.sensor != Some(Sensor::Ranging) && !scenario.obstacles.is_empty() && scenario.sensors.outline == OutlineSensing::Whole => {
+            FaultKind::Noise if fault.velocity_bias_mps.is_some() || fault.velocity_std_mps.is_some() => {
+                "no margin allows for a wrong velocity"
+            }
+            FaultKind::Blind
+                if fault.sensor != Some(Sensor::Ranging)
+                    && !scenario.obstacles.is_empty()
+                    && scenario.sensors.outline == OutlineSensing::Whole =>
+            {
                 "the drone may hit an obstacle that nobody has reported; with sensors.outline = \"seen\" it hovers"
             }
             _ => return None,

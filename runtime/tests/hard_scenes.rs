@@ -61,22 +61,38 @@ fn no_drone_waits_or_turns_for_ever() {
 /// Small and slow drones, a stop between walls that no drone senses, outlines that grow, and drones whose slowest speed is 0.
 #[test]
 fn scenes_of_other_sizes_and_speeds_are_reached() {
-    for name in ["indoor-grid", "outline-grows", "slowest-speed-zero", "walls-beside-the-stop"] {
+    for name in [
+        "indoor-grid",
+        "outline-grows",
+        "slow-and-far-apart",
+        "slowest-speed-zero",
+        "stopped-at-the-gate",
+        "walls-beside-the-stop",
+    ] {
         assert_reached(name, "congestion-aware-paper");
     }
 }
 
-/// What an independent generator of scenes found: routes that nobody needed or that led back, drones that shut each other out of their
-/// slots, parts out of each other's reach, obstacles or corners that no drone senses, and two drones whose first line was wrong.
+/// What independent generators of scenes found: routes that nobody needed or that led back, drones that shut each other out of their
+/// slots or push against each other, parts out of each other's reach, obstacles or corners that no drone senses, and two drones whose
+/// first line was wrong.
 #[test]
 fn scenes_of_an_independent_generator_are_reached() {
     for name in [
+        "chattering-first-in-queue",
+        "deaf-at-the-goal",
+        "end-of-an-outline",
+        "greedy-ranks",
+        "head-on-at-a-gap",
+        "identity-in-a-corridor",
         "late-first-command",
         "lost-straggler",
         "part-of-an-outline",
         "shut-out",
+        "slit-with-coarse-ticks",
         "stop-before-the-next-wall",
         "strip-behind-a-wall",
+        "two-parts-in-a-pocket",
         "wall-behind-the-goal",
     ] {
         assert_reached(name, "congestion-aware-paper");

@@ -144,11 +144,29 @@ fn a_queue_keeps_its_order_when_assignments_are_lost() {
     }
 }
 
-/// By word alone: two drones at nearly the same time, all drones at once, and one drone in a jam.
+/// A drone that stops when those behind it cannot brake yet, and a process that starts while its drone lands.
+#[test]
+fn a_process_that_ends_early_or_comes_late_breaks_no_distance() {
+    let kind = |kind: &str| format!("{{ kind = \"{kind}\", drone = 5, at_s = 0.1, for_s = 3 }}");
+    let (freeze, restart) = (kind("freeze"), kind("restart"));
+    let kill = r#"{ kind = "kill", drone = 5, at_s = 0.1 }"#.to_owned();
+    for fault in [freeze, restart, kill] {
+        for ranging in ["true", "false"] {
+            let keys = [("fault.0", &*fault), ("sensors.ranging", ranging)];
+            let Ending { outcome, reason, .. } = fly("hard/stopped-before-the-first-command", &keys);
+            assert_eq!(outcome, Some(Outcome::Reached), "{keys:?}: {reason}");
+        }
+    }
+    let Ending { outcome, reason, .. } = fly("hard/restart-while-landing", &[]);
+    assert_eq!(outcome, Some(Outcome::Reached), "{reason}");
+}
+
+/// By word alone: two drones at nearly the same time, all drones at once, one drone in a jam, and two drones that do not hear each other.
 #[test]
 fn restarted_drones_agree_on_lines_again() {
     let all = r#"{ kind = "restart", at_s = 20, for_s = 1, target = "all" }"#;
-    for (name, keys) in [("two-restarts", &[][..]), ("two-restarts", &[("fault.2", all)]), ("restart-in-a-jam", &[])] {
+    let few = [("two-restarts", &[][..]), ("two-restarts", &[("fault.2", all)]), ("restart-in-a-jam", &[])];
+    for (name, keys) in few.into_iter().chain([("restarts-out-of-reach", &[][..]), ("all-restarted-at-once", &[])]) {
         let Ending { outcome, reason, .. } = fly(&format!("hard/{name}"), keys);
         assert_eq!(outcome, Some(Outcome::Reached), "{name} {keys:?}: {reason}");
     }

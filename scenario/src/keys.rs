@@ -205,7 +205,8 @@ pub struct Mission {
     /// Greatest distance to its slot at which a drone has arrived.
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub arrival_error_m: f64,
-    /// How slots are assigned to drones when the formation closes.
+    /// How slots are assigned to drones when the formation closes. Drones that are shut out of their slots for long get the slots that
+    /// are best for all, as with `"optimal"`.
     pub reformation: Reformation,
     /// With `reformation = "tps"`: λ of the thin-plate spline (the paper's E6), m². A greater value keeps the order of the
     /// formation better. With 0, each drone maps to the closest slot, whatever the order.

@@ -1,7 +1,7 @@
 //! One drone's body: a point mass (the paper's K1, in space), its failsafe, its energy (the paper's E7).
 
 use crate::params::{Failsafe, WorldParams};
-use crate::tuning::{DESCENT_MPS, TAKE_OVER_S};
+use crate::tuning::DESCENT_MPS;
 use skein_protocol::Vec3;
 
 /// The true state of one drone.
@@ -20,8 +20,6 @@ enum Flight {
     Flying,
     /// It has lost its process and has stopped, and now goes down.
     Descending,
-    /// It is so low on its way down that it can only land.
-    Landing,
     /// It is no body any more.
     Landed,
 }
@@ -73,7 +71,7 @@ impl Body {
             return;
         }
         if self.flies() {
-            self.descend(params);
+            self.descend(params.dt_s());
         }
     }
 
@@ -90,15 +88,14 @@ impl Body {
         self.alive = false;
     }
 
-    /// Whether a new process can take over: the drone lost its process, and is not so low on its way down that it can only land.
+    /// Whether a new process can take over: the drone lost its process, and is not on its way down. Others may fly above it then.
     pub(crate) fn can_revive(&self) -> bool {
-        !self.alive && matches!(self.flight, Flight::Flying | Flight::Descending)
+        !self.alive && self.flight == Flight::Flying
     }
 
     /// A new process flies the drone again, from where it is.
     pub(crate) fn revive(&mut self) {
         self.alive = true;
-        self.flight = Flight::Flying;
     }
 
     /// One tick of a drone whose process does nothing before the first command of any drone takes effect: it flies straight on.
@@ -110,10 +107,9 @@ impl Body {
     }
 
     /// Goes straight down until it is on the ground.
-    fn descend(&mut self, params: &WorldParams) {
-        self.glide(Vec3::new(0.0, 0.0, -DESCENT_MPS), params.dt_s());
-        let is_low = self.position.z < params.clearance_m + DESCENT_MPS * TAKE_OVER_S;
-        self.flight = if is_low { Flight::Landing } else { Flight::Descending };
+    fn descend(&mut self, dt: f64) {
+        self.flight = Flight::Descending;
+        self.glide(Vec3::new(0.0, 0.0, -DESCENT_MPS), dt);
         if self.position.z <= 0.0 {
             (self.position.z, self.velocity, self.flight) = (0.0, Vec3::zeros(), Flight::Landed);
         }
@@ -218,22 +214,21 @@ mod tests {
     }
 
     #[test]
-    fn a_drone_that_is_low_on_its_way_down_can_only_land() {
-        let land = WorldParams { failsafe: Failsafe::Land, ..params() };
-        let mut body = cruising();
-        assert!(!body.can_revive(), "it lives");
-        body.kill();
-        let mut lowest_m = body.position.z;
-        while body.can_revive() {
-            lowest_m = body.position.z;
-            body.fail_safe(&land);
+    fn a_drone_on_its_way_down_lands() {
+        for (failsafe, ticks) in [(Failsafe::Land, 99), (Failsafe::Hover, 1000)] {
+            let params = WorldParams { failsafe, ..params() };
+            let mut body = cruising();
+            assert!(!body.can_revive(), "it lives");
+            body.kill();
+            // It brakes for two seconds.
+            let can = (0..1000).map(|_| {
+                body.fail_safe(&params);
+                body.can_revive()
+            });
+            let can: Vec<bool> = can.collect();
+            let braking = can.iter().take_while(|can| **can).count();
+            assert!((ticks..=ticks + 2).contains(&braking) && can[braking..].iter().all(|can| !can), "{braking}");
         }
-        assert!((25.0..25.2).contains(&lowest_m), "{lowest_m} m");
-        let hover = params();
-        let mut low = Body::new(Vec3::new(0.0, 0.0, 15.0), Vec3::zeros());
-        low.kill();
-        low.fail_safe(&hover);
-        assert!(low.can_revive(), "it hovers");
     }
 
     #[test]

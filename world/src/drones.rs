@@ -142,13 +142,21 @@ impl DroneTable {
         let mut rejected = 0;
         for ((body, process), id) in self.bodies.iter_mut().zip(&self.processes).zip(0..) {
             if !body.is_alive() {
-                if coasts { body.coast(params) } else { body.fail_safe(params) }
+                if coasts {
+                    body.coast(params)
+                } else {
+                    body.fail_safe(params)
+                }
                 continue;
             }
             // The safety rule allows a command in the state in which it was given, and braking in every state. A pilot that has
             // failed in this tick commands nothing.
             if process.is_frozen() || process.is_late() || process.slot().has_failed() {
-                if coasts { body.coast(params) } else { body.hover(params) }
+                if coasts {
+                    body.coast(params)
+                } else {
+                    body.hover(params)
+                }
                 continue;
             }
             let command = admissible(process.slot().acceleration_mps2, params.acceleration_max_mps2);

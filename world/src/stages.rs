@@ -40,7 +40,8 @@ impl Stages {
         let mut order: Vec<usize> = (0..outlines.len()).collect();
         order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
         let obstacles = vec![Extent::default(); outlines.len()];
-        let mut made = Self { stages: Vec::new(), obstacles, begun_x_m: f64::NEG_INFINITY, past_x_m: f64::NEG_INFINITY };
+        let mut made =
+            Self { stages: Vec::new(), obstacles, begun_x_m: f64::NEG_INFINITY, past_x_m: f64::NEG_INFINITY };
         let mut centres: Vec<f64> = Vec::new();
         let mut last_x_m = f64::NEG_INFINITY;
         for obstacle in order {

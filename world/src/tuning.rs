@@ -4,10 +4,6 @@
 /// measures it.
 pub(crate) const DESCENT_MPS: f64 = 5.0;
 
-/// A new process takes over a drone on its way down only if that drone would take at least this long to reach the least height, s. The
-/// paper's pilot stops a descent in half of it. Chosen by hand; no command measures it.
-pub(crate) const TAKE_OVER_S: f64 = 2.0;
-
 /// Up to this number of bodies, comparing every pair is faster than filling a grid.
 ///
 /// Chosen by hand. It changes the time of a step and nothing else: `skein bench runtime --drones 8,64` measures it.

@@ -69,7 +69,11 @@ struct Key {
 impl Key {
     /// Drones with the lower id make lines with even numbers. That a drone knows no line is its own word.
     fn new(speaker: DroneId, line: &Separator) -> Self {
-        Self { speaker, peer: line.peer, own: number(line).is_none_or(|number| number % 2 == u32::from(speaker > line.peer)) }
+        Self {
+            speaker,
+            peer: line.peer,
+            own: number(line).is_none_or(|number| number % 2 == u32::from(speaker > line.peer)),
+        }
     }
 }
 
