@@ -57,6 +57,33 @@ fn command(separations: &Separations, position: Vec2, velocity: Vec2) -> Vec2 {
     BrakingFilter::new(FILTER).filter(&own, Vec2::new(5.0, 0.0), [].into_iter(), [].into_iter(), separations.lines())
 }
 
+/// Two drones that fly one behind the other, and whose first command takes effect after half a second.
+#[test]
+fn both_drones_keep_to_their_first_line_if_their_first_command_is_to_brake() {
+    let (lag, velocity) = (25, Vec2::new(8.0, 6.0));
+    let starts_m = [Vec2::new(40.0, 30.0), Vec2::zeros()];
+    for (me, side) in [(0, Side::Front), (1, Side::Back)] {
+        let params = SeparationParams {
+            me: DroneId(me),
+            starts_m: starts_m.into(),
+            start_velocity: velocity,
+            reaction_time_s: f64::from(lag) * FILTER.dt_s,
+            ..separations(me, 1).params
+        };
+        let lines = Separations::new(params, SimTime::ZERO);
+        let (line, _) = lines.lines().next().unwrap();
+        let way = |ticks: u32| starts_m[me as usize] + velocity * (f64::from(ticks) * FILTER.dt_s);
+        let given = (0..=lag).map(way).collect();
+        let path = OwnPath::new((0, SimTime::ZERO), given, velocity, FILTER.law(), FILTER.stride());
+        // The line stays in the middle of the two, 50 m apart.
+        let distance_m = path.distance_m(line, side);
+        assert!((distance_m - 25.0).abs() < 1e-3, "{side:?}: {distance_m} m");
+        let braking = OwnPath::new((0, SimTime::ZERO), vec![way(0)], velocity, FILTER.law(), FILTER.stride());
+        let early_m = braking.distance_m(line, side);
+        assert!((early_m < 21.0) == (side == Side::Front), "a front drone that brakes at once: {early_m} m");
+    }
+}
+
 #[test]
 fn a_drone_stops_half_of_the_distance_before_its_line() {
     let follower = separations(1, 1);
