@@ -195,11 +195,11 @@ fn beside_the_paper(rows: &BTreeMap<String, Value>) {
         assert!(with > 1.1 && without < with - 0.05, "{scenario}: {with}, {without}");
     }
     assert!(ratio("ablation.s1-right.queue-false") < 1.0 && ratio("ablation.s3b-right.queue-false") < 1.0);
-    // In a gap for one drone the gain is real with the law. Without it, drones crowd in the gap by either rule.
+    // In a gap for one drone the gain is real with the law. Without it, drones crowd in the gap by either rule, and escape one by one.
     assert!(ratio("narrow.gap-40.queue-true") > 1.1);
     for strategy in ["congestion-aware-paper", "shortest-path"] {
         let energy = |queue: &str| ours(&format!("narrow.gap-40.queue-{queue}.{strategy}.total"));
-        assert!(energy("true") < 0.75 * energy("false"), "{} and {}", energy("true"), energy("false"));
+        assert!(energy("true") < 0.85 * energy("false"), "{} and {}", energy("true"), energy("false"));
     }
     // The ratio depends on when the mission ends.
     for geometry in ["S1", "S2"] {

@@ -385,9 +385,11 @@ fn side_of(me: DroneId, peer: DroneId) -> Side {
 }
 
 impl SeparationParams {
-    /// How small the swarm is. The lengths and speeds in this file are those at full scale.
+    /// How small the swarm is. The lengths and speeds in this file are those at full scale. Drones that start at rest have no speed to
+    /// compare with.
     fn scale(&self) -> Scale {
-        Scale::of(self.keep_m, self.start_velocity.norm())
+        let speed_mps = self.start_velocity.norm();
+        if speed_mps > 0.0 { Scale::of(self.keep_m, speed_mps) } else { Scale::FULL }
     }
 
     /// All drones but this one.

@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn faults_outside_the_safety_statement_are_warned_of() {
-        let wall = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\ncentre_m = [200, 0]\n";
+        let wall = "[[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [5, 50]\ncentre_m = [150, 0]\n";
         let fault = |keys: &str| warned(&format!("{wall}[[fault]]\nat_s = 5\ntarget = \"all\"\n{keys}"));
         let wind = fault("kind = \"wind\"\ngust_mps2 = 0.5\n");
         assert_eq!(wind, "fault.0 (wind) is outside the safety statement: wind weakens braking");
