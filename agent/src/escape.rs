@@ -46,6 +46,10 @@ pub struct Course {
     pub now: SimTime,
     /// World frame, m.
     pub position: Vec2,
+    /// World frame, m/s.
+    pub velocity: Vec2,
+    /// Whether it keeps apart from others by words. Then it moves in steps, whenever others have answered.
+    pub by_words: bool,
     /// Velocity that it wants to fly, world frame, m/s.
     pub wanted: Vec2,
 }
@@ -68,9 +72,9 @@ impl Escape {
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `scale`: how small the swarm is.
     ///
     /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone, or not for ten
-    /// times as long.
+    /// times as long. By words, it has to be still as well, and the longer time does not count.
     pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
-        let Course { now, position, wanted } = *course;
+        let Course { now, position, velocity, by_words, wanted } = *course;
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
@@ -82,13 +86,14 @@ impl Escape {
             return wanted;
         }
         let still_mps = scale.speed(STILL_MPS);
+        let steps = by_words && velocity.norm() >= still_mps;
+        let windows = if by_words { 1 } else { WINDOWS.len() };
         let mut is_stuck = false;
-        for (stay, times) in self.stays.iter_mut().zip(WINDOWS) {
+        for (stay, times) in self.stays.iter_mut().zip(WINDOWS).take(windows) {
             let window_s = times * patience_s;
             let is_here = |stay: &Stay| (position - stay.position).norm() <= still_mps * window_s;
-            let here = stay.filter(is_here).unwrap_or(Stay { since: now, position });
-            *stay = Some(here);
-            is_stuck |= now.since(here.since) >= window_s;
+            *stay = stay.filter(is_here).or_else(|| (!steps).then_some(Stay { since: now, position }));
+            is_stuck |= !steps && stay.is_some_and(|stay| now.since(stay.since) >= window_s);
         }
         if !is_stuck {
             return wanted;
@@ -112,8 +117,8 @@ mod tests {
     fn flown(seconds: u32, wanted: Vec2, speed_mps: f64, place: impl Fn(f64) -> Vec2) -> Vec<Vec2> {
         let mut escape = Escape::default();
         let mut steer = |second: u32| {
-            let course =
-                Course { now: SimTime::from_secs(f64::from(second)), position: place(f64::from(second)), wanted };
+            let (now, position) = (SimTime::from_secs(f64::from(second)), place(f64::from(second)));
+            let course = Course { now, position, velocity: Vec2::zeros(), by_words: false, wanted };
             escape.steer(&course, 3.0, speed_mps, Scale::FULL)
         };
         (0..seconds).map(&mut steer).collect()
@@ -152,6 +157,19 @@ mod tests {
         let flown = flown(40, WANTED, 5.0, place);
         let escapes = flown.iter().position(|velocity| *velocity != WANTED);
         assert_eq!(escapes, Some(30), "{flown:?}");
+    }
+
+    #[test]
+    fn a_drone_that_moves_in_steps_by_words_does_not_escape() {
+        let escapes = |by_words: bool| {
+            let mut escape = Escape::default();
+            (0..60).any(|second| {
+                let (now, velocity) = (SimTime::from_secs(f64::from(second)), Vec2::new(0.5, 0.0));
+                let course = Course { now, position: Vec2::zeros(), velocity, by_words, wanted: WANTED };
+                escape.steer(&course, 3.0, 5.0, Scale::FULL) != WANTED
+            })
+        };
+        assert!(escapes(false) && !escapes(true));
     }
 
     #[test]

@@ -427,7 +427,8 @@ impl SwarmPilot {
         let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
         let attempts = self.escape.attempts();
-        let course = Course { now: then.now, position: then.position(), wanted };
+        let by_words = self.params.apart_by_words;
+        let course = Course { now: then.now, position: then.position(), velocity: then.velocity(), by_words, wanted };
         let wanted = self.escape.steer(&course, patience_s, slow_mps, self.params.safety.scale);
         if self.escape.attempts() > attempts {
             self.give_up_first_place(senses.now, open);

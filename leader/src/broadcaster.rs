@@ -204,8 +204,8 @@ fn is_missed(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
     k.peers().direct(now).any(|(_, pose)| set.scope.contains(pose.group()) && pose.obeyed() < set.stamp)
 }
 
-/// Says which sets this drone has passed, until the swarm re-forms. In a formation of a part of the swarm, as long as it hears drones of
-/// another part: they do not know what the drones of this formation have passed.
+/// Says which sets this drone has passed, until the swarm re-forms. With a limited range, also in a formation of a part of the swarm, as
+/// long as it hears drones of another part: they do not know what the drones of this formation have passed.
 fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
     let mut passed = |set: &[ObstacleId]| {
         let (set, set_count) = set_array(set);
@@ -214,7 +214,8 @@ fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message
     let planned = k.ledger().sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m());
     planned.for_each(|set| passed(&set.ids));
     let formation = k.ledger().obeyed().filter(|bundle| bundle.plan.phase() == Phase::Reform);
-    if formation.is_some_and(|bundle| k.living_peers(now).any(|m| !bundle.parts.contains(m.id))) {
+    let limited_range = k.params().limited_range;
+    if formation.is_some_and(|bundle| limited_range && k.living_peers(now).any(|m| !bundle.parts.contains(m.id))) {
         let is_passed = |set: &&Vec<ObstacleId>| set.iter().all(|&id| k.obstacles().has_passed(k.me(), id));
         k.obstacles().sets().iter().filter(is_passed).for_each(|set| passed(set));
     }
