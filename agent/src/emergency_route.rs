@@ -2,26 +2,33 @@
 
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::routes::Routes;
-use skein_protocol::Vec2;
+use skein_protocol::{ObstacleId, Vec2};
 
 /// A set, the routes past it, and the one that is taken.
 #[derive(Clone, Debug)]
 pub struct EmergencyRoute {
+    ids: Vec<ObstacleId>,
     set: u32,
     routes: Routes,
     route: usize,
 }
 
 impl EmergencyRoute {
-    /// The shortest route past `routes` from `position` (world frame, m); `None` if the drone is past the set. `set`: tag
-    /// of the set.
+    /// The shortest route past `routes` from `position` (world frame, m); `None` if the drone is past the set. `ids`: the obstacles of the
+    /// set. `set`: its tag.
     #[must_use]
-    pub fn shortest(set: u32, routes: Routes, position: Vec2, flight: &Flight) -> Option<Self> {
+    pub fn shortest((ids, set): (&[ObstacleId], u32), routes: Routes, position: Vec2, flight: &Flight) -> Option<Self> {
         if position.x >= routes.exit_x_m() {
             return None;
         }
         let route = shortest(&trips(&[], &routes, position, flight));
-        Some(Self { set, routes, route })
+        Some(Self { ids: ids.to_vec(), set, routes, route })
+    }
+
+    /// Whether one of these obstacles is in the set.
+    #[must_use]
+    pub fn has_any_of(&self, ids: &[ObstacleId]) -> bool {
+        ids.iter().any(|id| self.ids.contains(id))
     }
 
     /// Tag of the set.

@@ -11,11 +11,22 @@ use skein_protocol::{SimTime, Vec2};
 /// Time between two looks for the last drone, s.
 const LOOK_S: f64 = 1.0;
 
+/// The other drones of a lone one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Others<'a> {
+    /// What it knows of them.
+    pub(crate) peers: &'a Peers,
+    /// Distance over which drones hear each other, m; `None` if all do.
+    pub(crate) reach_m: Option<f64>,
+}
+
 /// How far a drone flies on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LoneFlight {
-    /// Abscissa at which it waits, world frame, m; infinite without a goal.
-    limit_x_m: f64,
+    /// Abscissa of the goal, world frame, m; infinite without one.
+    goal_x_m: f64,
+    /// How far beyond the goal, and beyond what it passed last, it waits, m.
+    overshoot_m: f64,
     /// Greatest distance ahead of the last drone, m.
     lead_m: f64,
     /// When it looks for the last drone again.
@@ -36,7 +47,8 @@ impl LoneFlight {
             Destination::Hold { .. } => f64::INFINITY,
         };
         Self {
-            limit_x_m: goal_x_m + planner.speed_mps * (OVERSHOOT_S + file_s),
+            goal_x_m,
+            overshoot_m: planner.speed_mps * (OVERSHOOT_S + file_s),
             lead_m: planner.speed_mps * (LEAD_S + file_s),
             next_look: SimTime::ZERO,
             last_x_m: f64::INFINITY,
@@ -44,16 +56,17 @@ impl LoneFlight {
         }
     }
 
-    /// The speed along the course, m/s. It falls to zero where the drone has to wait. `reach_m`: distance over which drones hear each
-    /// other, m; `None` if all do.
+    /// The speed along the course, m/s. It falls to zero where the drone has to wait. `passed_x_m`: exit of the obstacle set that it left
+    /// last, world frame, m: it waits beyond it, too, because others still have to leave that set.
     pub(crate) fn speed_mps(
         &mut self,
         now: SimTime,
         position: Vec2,
-        peers: &Peers,
-        reach_m: Option<f64>,
+        passed_x_m: f64,
+        others: &Others<'_>,
         guidance: &GuidanceParams,
     ) -> f64 {
+        let &Others { peers, reach_m } = others;
         if now >= self.next_look {
             self.next_look = now.after(LOOK_S);
             let living = || peers.living(now).map(|(_, pose)| pose.extrapolated(now));
@@ -62,7 +75,8 @@ impl LoneFlight {
             let room_m = reach_m.zip(nearest_m).map(|(reach_m, nearest_m)| IN_REACH * reach_m - nearest_m);
             self.reached_x_m = room_m.map_or(f64::INFINITY, |room_m| position.x + room_m);
         }
-        let room_m = (self.last_x_m + self.lead_m).min(self.limit_x_m).min(self.reached_x_m) - position.x;
+        let limit_x_m = self.goal_x_m.max(passed_x_m) + self.overshoot_m;
+        let room_m = (self.last_x_m + self.lead_m).min(limit_x_m).min(self.reached_x_m) - position.x;
         (guidance.braking_mps2 * room_m.max(0.0)).sqrt().min(guidance.speed_mps)
     }
 }
@@ -81,27 +95,31 @@ mod tests {
         LoneFlight::new(2, &PlannerParams { destination, ..crate::test_params::planner() })
     }
 
+    /// The speed of a drone that has passed nothing, m/s.
+    fn speed_mps(flight: &mut LoneFlight, now: SimTime, x_m: f64, peers: &Peers, reach_m: Option<f64>) -> f64 {
+        flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &Others { peers, reach_m }, &GUIDANCE)
+    }
+
     #[test]
     fn a_drone_waits_beyond_the_goal() {
         let mut flight = flight(Destination::Goal { front_m: Vec2::new(500.0, 30.0) });
+        let peers = Peers::new(2, 1.0);
+        let others = Others { peers: &peers, reach_m: None };
         let mut speed_mps =
-            |x_m| flight.speed_mps(SimTime::ZERO, Vec2::new(x_m, 0.0), &Peers::new(2, 1.0), None, &GUIDANCE);
-        assert_eq!((speed_mps(500.0), speed_mps(900.0)), (10.0, 0.0));
+            |x_m, passed_x_m| flight.speed_mps(SimTime::ZERO, Vec2::new(x_m, 0.0), passed_x_m, &others, &GUIDANCE);
+        assert_eq!((speed_mps(500.0, 300.0), speed_mps(900.0, 300.0)), (10.0, 0.0));
+        assert_eq!(speed_mps(900.0, 890.0), 10.0, "others still have to leave the obstacle beside the goal");
     }
 
     #[test]
     fn a_drone_waits_for_the_last_one() {
         let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
         let mut peers = Peers::new(2, 1.0);
-        assert_eq!(
-            flight.speed_mps(SimTime::ZERO, Vec2::new(9e3, 0.0), &peers, None, &GUIDANCE),
-            10.0,
-            "no other drone lives"
-        );
+        assert_eq!(speed_mps(&mut flight, SimTime::ZERO, 9e3, &peers, None), 10.0, "no other drone lives");
         let now = SimTime::from_secs(2.0);
         peers.hear(now, DroneId(0), Pose { stamp: now, ..Pose::zeroed() });
-        assert_eq!(flight.speed_mps(now, Vec2::new(50.0, 0.0), &peers, None, &GUIDANCE), 10.0);
-        assert_eq!(flight.speed_mps(now, Vec2::new(9e3, 0.0), &peers, None, &GUIDANCE), 0.0);
+        assert_eq!(speed_mps(&mut flight, now, 50.0, &peers, None), 10.0);
+        assert_eq!(speed_mps(&mut flight, now, 9e3, &peers, None), 0.0);
     }
 
     #[test]
@@ -113,7 +131,7 @@ mod tests {
         }
         let speed_mps = |x_m: f64, reach_m| {
             let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
-            flight.speed_mps(now, Vec2::new(x_m, 0.0), &peers, reach_m, &GUIDANCE)
+            speed_mps(&mut flight, now, x_m, &peers, reach_m)
         };
         assert_eq!(speed_mps(130.0, Some(100.0)), 10.0);
         assert_eq!(speed_mps(180.0, Some(100.0)), 0.0);

@@ -85,7 +85,7 @@ impl RouteFollower {
         self.emergency.as_ref().map(EmergencyRoute::set)
     }
 
-    /// Takes a route of the drone's own, until it is past the set or has an assignment.
+    /// Takes a route of the drone's own, until it is past the set or has an assignment for one of its obstacles.
     pub fn set_emergency(&mut self, route: EmergencyRoute) {
         self.emergency = Some(route);
     }
@@ -109,7 +109,8 @@ impl RouteFollower {
     /// drones that hover. `position`: the drone's, world frame, m.
     pub fn update(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) {
         if self.emergency.as_ref().is_some_and(|own| {
-            position.x >= own.routes().exit_x_m() || ledger.sets().iter().any(|set| set.parts.contains(self.me))
+            let planned = |set: &PlannedSet| set.parts.contains(self.me) && own.has_any_of(&set.ids);
+            position.x >= own.routes().exit_x_m() || ledger.sets().iter().any(planned)
         }) {
             self.emergency = None;
         }

@@ -28,7 +28,7 @@ impl Straggler {
     pub(crate) fn hear(&mut self, message: MessageRef<'_>) {
         let MessageRef::Plan(plan) = message else { return };
         let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
-        if later && plan.phase() == Phase::Reform && plan.group == GroupId::ALL {
+        if later && plan.phase() != Phase::Avoid && plan.group == GroupId::ALL {
             self.formation = Some(*plan);
         }
     }

@@ -8,7 +8,7 @@ use crate::detour::{Detour, RouteView};
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::{Course, Escape};
 use crate::guidance::anchor;
-use crate::lone_flight::LoneFlight;
+use crate::lone_flight::{LoneFlight, Others};
 use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
@@ -239,7 +239,7 @@ impl SwarmPilot {
         let planner = &self.params.planner;
         let routes = Routes::new(&shapes, &planner.routes);
         let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: planner.course_y_m };
-        if let Some(route) = EmergencyRoute::shortest(tag, routes, senses.position(), &flight) {
+        if let Some(route) = EmergencyRoute::shortest((set, tag), routes, senses.position(), &flight) {
             self.route.set_emergency(route);
         }
     }
@@ -283,9 +283,12 @@ impl SwarmPilot {
                 self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity)
             }
             _ => {
-                let (peers, reach_m) = (self.leading.peers(), self.leading.reach_m());
+                let position = senses.position();
+                let others = Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
+                let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
+                let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
                 let flight = &mut self.lone_flight;
-                Vec2::new(flight.speed_mps(senses.now, senses.position(), peers, reach_m, &guidance), 0.0)
+                Vec2::new(flight.speed_mps(senses.now, position, passed_x_m, &others, &guidance), 0.0)
             }
         }
     }

@@ -160,7 +160,8 @@ impl VisibilityMap {
     }
 
     /// Corners at which a straight flight from `point` can touch an outline as a tangent. If `point` is the corner `at`, its own
-    /// outline contributes only the two adjacent corners.
+    /// outline contributes only the two adjacent corners. An outline that `point` is in has no tangents, and contributes all its corners: its
+    /// corners stick out, so that a point that keeps the distance may be in it.
     fn tangents(&self, point: Vec2, at: Option<Corner>) -> Vec<Corner> {
         let mut found = Vec::new();
         for (i, outline) in self.outlines.iter().enumerate() {
@@ -171,6 +172,7 @@ impl VisibilityMap {
                 found.extend([(i, (k + 1) % count), (i, (k + count - 1) % count)]);
                 continue;
             }
+            let first = found.len();
             for k in 0..count {
                 let (before, here, after) =
                     (outline.corners[(k + count - 1) % count], outline.corners[k], outline.corners[(k + 1) % count]);
@@ -179,6 +181,9 @@ impl VisibilityMap {
                 if a * b >= 0.0 {
                     found.push((i, k));
                 }
+            }
+            if found.len() == first {
+                found.extend((0..count).map(|k| (i, k)));
             }
         }
         found
@@ -225,6 +230,19 @@ mod tests {
 
     fn rectangle(x: f64, y: f64, hx: f64, hy: f64) -> ConvexShape {
         ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(hx, hy), 0.0).unwrap()
+    }
+
+    #[test]
+    fn a_drone_beside_a_slanted_wall_finds_its_way_round() {
+        let wall = ConvexShape::rectangle(Vec2::zeros(), Vec2::new(200.0, 5.0), 0.5).unwrap();
+        let map = map(15.0, &[wall]);
+        let (along, across) = (Vec2::new(0.5_f64.cos(), 0.5_f64.sin()), Vec2::new(-0.5_f64.sin(), 0.5_f64.cos()));
+        // The outline's corners stick out by 0.07 m.
+        for away_m in [20.001, 20.03, 20.06, 20.1, 25.0] {
+            let (from, to) = (along * 100.0 + across * away_m, along * 100.0 - across * 60.0);
+            let (corners, length_m) = map.path(from, to).unwrap();
+            assert!(corners.len() > 1 && (210.0..300.0).contains(&length_m), "{away_m} m away: {corners:?}");
+        }
     }
 
     fn map(keep_m: f64, shapes: &[ConvexShape]) -> VisibilityMap {

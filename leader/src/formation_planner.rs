@@ -73,9 +73,15 @@ impl FormationPlanner {
         self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
     }
 
-    /// Whether all members have been at rest for a while although one is not in its slot, or although the ranks are open.
+    /// Whether all members have been at rest for a while although one is not in its slot, or although the ranks are open. A formation that
+    /// cruises can be stuck once it has stopped.
     fn is_stuck(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> bool {
-        let anchor = Vec2::from(bundle.plan.anchor_m);
+        let (anchor, _) = bundle.plan.anchor_at(s.now);
+        let stands = match bundle.plan.phase() {
+            Phase::Reform => true,
+            Phase::Cruise => bundle.plan.anchor_stops().is_some_and(|stops| s.now >= stops),
+            Phase::Avoid => false,
+        };
         let error = |m: &Member| match bundle.parts.get(m.id) {
             Some(part) => (anchor + Vec2::from(part.slot_m) - m.position).norm(),
             None => 0.0,
@@ -83,7 +89,7 @@ impl FormationPlanner {
         let hold_mps = s.params.routes.scale.speed(HOLD_SPEED_MPS);
         let worst = s.members.iter().map(error).fold(0.0, f64::max);
         let still = s.members.iter().all(|m| m.speed_mps < hold_mps);
-        if !still || bundle.plan.phase() != Phase::Reform || (worst <= s.params.arrival_error_m && !self.open) {
+        if !still || !stands || (worst <= s.params.arrival_error_m && !self.open) {
             self.stalled = None;
             return false;
         }
@@ -100,14 +106,14 @@ impl FormationPlanner {
         let fresh = Self { pinned, shut_out, pace: self.pace, ..Self::default() };
         if !pinned && !self.open && !self.swapped {
             let swapped = Self { swapped: true, ..fresh };
-            let plan = swapped.assign(s, bundle.plan.phase());
+            let plan = swapped.assign(s, Phase::Reform);
             if plan.as_ref().is_some_and(|plan| takes_other_slots(plan, bundle)) {
                 *self = swapped;
                 return plan;
             }
         }
         *self = Self { open: !pinned && !self.open, ..fresh };
-        self.assign(s, bundle.plan.phase())
+        self.assign(s, Phase::Reform)
     }
 
     /// The plan that assigns the slots. `None` without a slot for every member.

@@ -104,13 +104,20 @@ fn half_hull(points: impl Iterator<Item = Vec2>) -> Vec<Vec2> {
     let mut kept: Vec<Vec2> = Vec::new();
     for point in points {
         while let [.., before, last] = kept[..]
-            && (last - before).perp(&(point - before)) <= FLAT_M2
+            && is_left_out(before, last, point)
         {
             kept.pop();
         }
         kept.push(point);
     }
     kept
+}
+
+/// Whether the path through three points does not turn left at the middle one, or hardly. A point far from two that nearly coincide cuts
+/// off little as well, but it is a corner.
+fn is_left_out(before: Vec2, last: Vec2, next: Vec2) -> bool {
+    let area_m2 = (last - before).perp(&(next - before));
+    area_m2 <= 0.0 || (area_m2 <= FLAT_M2 && (last - before).dot(&(next - last)) >= 0.0)
 }
 
 #[cfg(test)]
@@ -130,6 +137,17 @@ mod tests {
         assert_eq!(hull(&[Vec2::new(1.0, 1.0); 3]), vec![Vec2::new(1.0, 1.0)]);
         assert_eq!(hull(&[Vec2::new(1.0, 1.0), Vec2::new(0.0, 0.0)]).len(), 2);
         assert!(hull(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_corner_beside_two_points_that_nearly_coincide_is_kept() {
+        let (a, b) = (11.622_999_999_999_99, 11.622_999_999_999_998);
+        let points = [Vec2::new(a, 6.0), Vec2::new(28.0, 6.0), Vec2::new(b, 6.0), Vec2::new(b, -22.0)];
+        for mirror in [1.0, -1.0] {
+            let hull = hull(&points.map(|p| Vec2::new(p.x, mirror * p.y)));
+            let lowest = hull.iter().map(|p| mirror * p.y).fold(f64::INFINITY, f64::min);
+            assert!(hull.len() == 3 && lowest == -22.0, "{hull:?}");
+        }
     }
 
     #[test]

@@ -160,9 +160,11 @@ impl Knowledge {
     }
 
     /// Number of living drones of the scope that claim before this one: those closer to the destination, and healthy ones
-    /// while this one is impaired. The missing leader is not counted. 0 while there is a leader.
+    /// while this one is impaired. The missing leader is not counted. 0 while there is a leader. They are counted only until it is certain
+    /// that this drone's turn has not come yet: a large swarm does not fit into a cache.
     pub(crate) fn closer(&self, now: SimTime, own: &OwnState) -> usize {
-        if !self.election.seeks(now) {
+        let is_early = |closer: usize| now < self.election.next_deadline(closer, self.peers.delay_s());
+        if !self.election.seeks(now) || is_early(0) {
             return 0;
         }
         let mine = (self.impaired, self.claim_key(own.position, self.me));
@@ -170,7 +172,14 @@ impl Knowledge {
         let rivals = self
             .living_peers(now)
             .filter(|m| !(missing.is_some() && m.id == missing.claimant) && scope.contains(m.group));
-        rivals.filter(|m| (!self.is_healthy(m.id), self.claim_key(m.position, m.id)) < mine).count()
+        let mut closer = 0;
+        for _ in rivals.filter(|m| (!self.is_healthy(m.id), self.claim_key(m.position, m.id)) < mine) {
+            closer += 1;
+            if is_early(closer) {
+                break;
+            }
+        }
+        closer
     }
 
     /// Whether it leads and hears others, none of which follows it. If this persists, no other drone can hear this one.

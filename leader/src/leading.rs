@@ -179,12 +179,6 @@ impl Leading {
         self.knowledge.is_unfollowed(now)
     }
 
-    /// When the machine next needs [`Self::elect`], if it hears nothing until then.
-    #[must_use]
-    pub fn next_deadline(&self, now: SimTime, own: &OwnState) -> SimTime {
-        self.knowledge.election().next_deadline(self.knowledge.closer(now, own), self.peers().delay_s())
-    }
-
     /// The term in which this drone would lead all drones, had no drone led before.
     #[must_use]
     pub fn first_term(&self) -> Ballot {

@@ -334,6 +334,11 @@ impl Peers {
         self.beacons.stamps()
     }
 
+    /// All peers ever heard, ascending, in the order of [`Self::stamps`].
+    pub(crate) fn ids(&self) -> &[DroneId] {
+        &self.ids
+    }
+
     /// The changes of [`Self::stamps`].
     #[must_use]
     pub fn changes(&self) -> &Changes {

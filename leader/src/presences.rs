@@ -176,12 +176,15 @@ impl Presences {
     fn due(&self, k: &Knowledge, now: SimTime, first: u32) -> BTreeMap<Kind, Vec<Due>> {
         let period_s = self.period_s * self.thinning;
         let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();
-        for (told, id) in self.told.iter().zip((0..).map(DroneId)).filter(|(told, _)| told.known) {
+        for (id, stamp) in k.peers().ids().iter().copied().zip(k.peers().stamps()) {
+            let Some(told) = self.told.get(id.index()).filter(|told| told.known) else { continue };
             let silent_s = now.since(told.covered);
             let overdue = told.left > 0 || silent_s >= PRESENCE_OVERDUE * period_s;
-            if let Some(pose) = k.peers().last_of_living(id, now)
-                && (overdue || pose.stamp().since(told.said) >= period_s)
-            {
+            // Few are due, and what is known of a drone is looked up for those only: it is in memory that is not in the cache.
+            if !overdue && stamp.since(told.said) < period_s {
+                continue;
+            }
+            if let Some(pose) = k.peers().last_of_living(id, now) {
                 let waits = Reverse((silent_s * WAITS_PER_PERIOD / self.period_s) as u32);
                 let turn = (id.0 + self.drones - first) % self.drones;
                 let one = Due { waits, turn, drone: id };

@@ -40,22 +40,20 @@ pub struct Constraint {
     pub y_m: f64,
     /// The side on which the path passes.
     pub side: Side,
-    /// From this abscissa on, a drone is farther from the obstacle's rear than it has to be, m; at most `x_m`.
+    /// From this abscissa on, a drone that keeps the clearance is behind the obstacle, m; at most `x_m`.
     pub clear_x_m: f64,
-    /// Distance of the point from the obstacle, m.
-    pub reach_m: f64,
 }
 
 impl Constraint {
-    /// Whether a drone at `position` (world frame, m) has the obstacle beside and behind it, so that it need not pass the point any more:
-    /// it lies in the strip behind the obstacle that paths avoid and drones may enter.
+    /// Whether a drone at `position` (world frame, m) is behind the obstacle and on the wrong side of the point, so that it need not pass the
+    /// point any more: it is in the strip behind the obstacle that paths avoid and drones may enter. A path past the point would lead back.
     #[must_use]
     pub fn is_behind(&self, position: Vec2) -> bool {
         let off_m = match self.side {
             Side::Above => self.y_m - position.y,
             Side::Below => position.y - self.y_m,
         };
-        position.x >= self.clear_x_m && off_m > self.reach_m
+        position.x >= self.clear_x_m && off_m > 0.0
     }
 }
 
@@ -71,7 +69,7 @@ pub struct Body {
 impl Body {
     /// The body as a wall, for a path on this side of it.
     pub(crate) fn wall(&self, side: Side) -> Wall {
-        Wall { side, outline: inflate(&[self.centre_m], self.radius_m), reach_m: self.radius_m, strip_m: 0.0 }
+        Wall { side, outline: inflate(&[self.centre_m], self.radius_m), strip_m: 0.0 }
     }
 }
 
@@ -82,23 +80,21 @@ pub struct Wall {
     pub side: Side,
     /// The inflated obstacle: the area that no path may enter, m.
     pub outline: Vec<Vec2>,
-    /// By how much it is inflated, m.
-    pub reach_m: f64,
-    /// How much of that drones may enter, m.
+    /// How much of what it is inflated by drones may enter, m.
     pub strip_m: f64,
 }
 
 impl Wall {
     /// The corners on the path's side, by x.
     pub fn constraints(&self) -> impl Iterator<Item = Constraint> + use<> {
-        let (side, reach_m) = (self.side, self.reach_m);
+        let side = self.side;
         let rear_x_m = self.outline.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max) - self.strip_m;
         let chain = match side {
             Side::Above => upper_chain(&self.outline),
             Side::Below => lower_chain(&self.outline),
         };
         let clear_x_m = move |p: Vec2| p.x.min(rear_x_m);
-        chain.into_iter().map(move |p| Constraint { x_m: p.x, y_m: p.y, side, clear_x_m: clear_x_m(p), reach_m })
+        chain.into_iter().map(move |p| Constraint { x_m: p.x, y_m: p.y, side, clear_x_m: clear_x_m(p) })
     }
 
     /// Distance of a point to the outline, m; 0 inside.
@@ -373,8 +369,8 @@ fn walls(envelopes: &[Envelope], route: usize, params: &RouteParams) -> Vec<Wall
         let half_gap_m = across.iter().map(|other| envelope.gap(other).1 / 2.0).fold(f64::INFINITY, f64::min);
         let inscribed_m = (envelope.radius_m + half_gap_m) * inscribed() - envelope.radius_m;
         let reach_m = params.planning_distance_m.min(inscribed_m.max(params.half_gap_m));
-        let strip_m = reach_m - params.half_gap_m;
-        Wall { side, outline: inflate(&envelope.core, envelope.radius_m + reach_m), reach_m, strip_m }
+        let strip_m = reach_m - params.clearance_m;
+        Wall { side, outline: inflate(&envelope.core, envelope.radius_m + reach_m), strip_m }
     };
     let right_walls = right.iter().map(|envelope| wall(envelope, left, Side::Above));
     right_walls.chain(left.iter().map(|envelope| wall(envelope, right, Side::Below))).collect()

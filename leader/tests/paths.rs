@@ -131,13 +131,16 @@ fn tilted_neighbours_are_ordered_as_a_line_across_meets_them() {
 
 #[test]
 fn a_drone_in_the_strip_behind_a_wall_is_not_led_back_round_it() {
-    let routes = routes(&[rectangle(100.0, -100.0, 5.0, 100.0)]);
+    // Routes keep a little more than the clearance, which is all that drones keep.
+    let params = RouteParams { half_gap_m: 15.004, ..PARAMS };
+    let routes = Routes::new(&[(ObstacleId(0), rectangle(100.0, -100.0, 5.0, 100.0))], &params);
     let lane = lane(&routes, 1, &[]);
-    let towards = |x: f64| lane.pull(Vec2::new(x, -80.0), routes.gate_x_m()).direction;
-    // The rear is at 105 m, the clearance ends at 120 m, and the planning distance at 125 m.
-    assert!(towards(119.0).y > 0.99, "it still has the wall to pass: {:?}", towards(119.0));
-    for x in [120.1, 124.9, 125.1] {
-        assert!((towards(x) - (lane.target() - Vec2::new(x, -80.0)).normalize()).norm() < 1e-9, "{x}");
+    let towards = |x: f64, y: f64| lane.pull(Vec2::new(x, y), routes.gate_x_m()).direction;
+    // The rear is at 105 m, the clearance ends at 120 m, and the planning distance at 125 m. The wall's corner is at 0 m.
+    assert!(towards(119.0, -80.0).y > 0.99, "it still has the wall to pass: {:?}", towards(119.0, -80.0));
+    for (x, y) in [120.001, 120.1, 124.9, 125.1].into_iter().flat_map(|x| [-80.0, -5.0, -1.0].map(|y| (x, y))) {
+        let straight = (lane.target() - Vec2::new(x, y)).normalize();
+        assert!((towards(x, y) - straight).norm() < 1e-9, "{:?} at {x} m, {y} m", towards(x, y));
     }
 }
 

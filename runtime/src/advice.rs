@@ -62,7 +62,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
             ("sensors.clock_error_max_s", "s"),
         ),
     ];
-    Ok(found.into_iter().flatten().chain(outside_the_proof(scenario)).collect())
+    Ok(found.into_iter().flatten().chain(outside_the_proof(scenario)).chain(killed_by_words(scenario)).collect())
 }
 
 fn pilot(scenario: &Scenario) -> PilotParams {
@@ -214,6 +214,23 @@ fn outside_the_proof(scenario: &Scenario) -> impl Iterator<Item = String> {
     })
 }
 
+/// The faults that kill a drone for good where drones keep apart by words: nobody may pass into its half of the plane any more.
+fn killed_by_words(scenario: &Scenario) -> impl Iterator<Item = String> {
+    let by_words = pilot(scenario).apart_by_words;
+    let kills = scenario.fault_plan.iter().enumerate().filter(|(_, fault)| match fault.kind {
+        FaultKind::Kill => true,
+        FaultKind::HostDown => fault.for_s.is_none(),
+        _ => false,
+    });
+    kills.filter(move |_| by_words).map(|(number, fault)| {
+        format!(
+            "fault.{number} ({}): without ideal ranging, the others stay on their sides of their last lines to a killed drone. \
+             Distances are kept, but a mission that has to pass there does not arrive",
+            fault.kind.word()
+        )
+    })
+}
+
 fn enclosed(drones: &[u32], gap_m: f64) -> Option<String> {
     let ids: Vec<String> = drones.iter().map(u32::to_string).collect();
     (!ids.is_empty()).then(|| {
@@ -293,6 +310,15 @@ mod tests {
             "[formation]\ndrones = 8\n[[fault]]\nkind = \"ranging\"\nat_s = 5\ndrone = 1\nranging_dropout_share = 1\n";
         let scenario = Scenario::parse(text, ScenarioSource { name: "test", stem: "test" }, &[]).unwrap();
         assert!(kept_distances(&scenario).by_words);
+    }
+
+    #[test]
+    fn a_drone_that_is_killed_by_words_is_warned_of() {
+        let kill = "[[fault]]\nkind = \"kill\"\nat_s = 5\ndrone = 1\n";
+        assert_eq!(warned(kill), "");
+        assert!(
+            warned(&format!("[sensors]\nranging = false\n{kill}")).starts_with("fault.0 (kill): without ideal ranging")
+        );
     }
 
     #[test]

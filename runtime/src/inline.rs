@@ -1,9 +1,11 @@
 //! The inline runtime: it steps the same pilots and the same world by function calls in one thread, or the pilots in several. It is
 //! the reference for determinism, and the engine of large sweeps.
 
+use crate::clock::Clock;
 use crate::drone_factory::DroneFactory;
 use crate::error::RuntimeError;
 use crate::mission;
+use crate::pacer::Pacer;
 use crate::pilot_host::{PilotHost, StepScratch};
 use crate::pilot_registry::PilotRegistry;
 use crate::run_end::RunEnd;
@@ -34,15 +36,31 @@ pub fn run(
     sink: &mut dyn RecordSink,
     interrupted: impl FnMut() -> Option<i32>,
 ) -> Result<RunEnd, RuntimeError> {
-    run_on(NonZero::<usize>::MIN, scenario, pilots, sink, interrupted)
+    run_with(Settings::default(), scenario, pilots, sink, interrupted)
 }
 
-/// As [`run`], with the steps of the drones spread over this many threads. The digest does not depend on their number.
+/// How an inline run is flown. The digest does not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// In how many threads drones are stepped, at most. Each takes several drones at a time, so small swarms use fewer.
+    pub threads: NonZero<usize>,
+    /// What paces the ticks. No drone is ever late: a tick that takes longer than its period delays the next one.
+    pub clock: Clock,
+}
+
+impl Default for Settings {
+    /// One thread, as fast as possible.
+    fn default() -> Self {
+        Self { threads: NonZero::<usize>::MIN, clock: Clock::Lockstep }
+    }
+}
+
+/// As [`run`], with other settings.
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_on(
-    threads: NonZero<usize>,
+pub fn run_with(
+    Settings { threads, clock }: Settings,
     scenario: &Scenario,
     pilots: &PilotRegistry,
     sink: &mut dyn RecordSink,
@@ -53,13 +71,23 @@ pub fn run_on(
     let mut swarm = InlineSwarm::new(threads, scenario, pilots)?;
     end.startup_s = started.elapsed().as_secs_f64();
     let opened = Instant::now();
+    let mut pacer = match clock {
+        Clock::Lockstep => None,
+        Clock::Realtime { speed } => Some(Pacer::new(scenario.time.dt_s, speed)),
+    };
     while swarm.world.ended().is_none() {
+        if let Some(pacer) = &mut pacer {
+            pacer.open();
+        }
         swarm.tick();
         record(sink, &swarm.world, &mut end.sink_error);
-        end.signal = interrupted();
+        end.signal = interrupted().or_else(|| pacer.as_ref()?.pause_unless(&mut interrupted));
         if let Some(number) = end.signal {
             swarm.world.abort(&format!("interrupted by signal {number}"));
         }
+    }
+    if let Some(pacer) = &pacer {
+        swarm.world.note_lateness(pacer.lateness_s());
     }
     let wall_s = opened.elapsed().as_secs_f64();
     let stats = swarm.stats();
@@ -98,8 +126,9 @@ impl<'s> InlineSwarm<'s> {
         let factory = DroneFactory::new(scenario, pilots);
         let world = mission::world(scenario)?;
         let new_drone = |id| factory.pilot_host(DroneId(id), 1, SimTime::ZERO).map(InlineDrone::new);
-        let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<_, _>>()?;
-        let workers = (0..threads.get()).map(|_| Worker::default()).collect();
+        let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<Vec<_>, _>>()?;
+        let useful = drones.len().div_ceil(CHUNK).max(1);
+        let workers = (0..threads.get().min(useful)).map(|_| Worker::default()).collect();
         Ok(Self { factory, world, drones, workers })
     }
 
@@ -132,7 +161,7 @@ impl<'s> InlineSwarm<'s> {
     }
 }
 
-/// Steps all drones, in as many threads as there are workers. No drone sees what another one does in the same tick.
+/// Steps all drones, in as many threads as there are workers, or in those that the machine allows. No drone sees what another one does in the same tick.
 fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, workers: &mut [Worker]) {
     let Some((own, others)) = workers.split_first_mut() else { return };
     let chunks = Mutex::new(drones.chunks_mut(CHUNK));
@@ -146,9 +175,9 @@ fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, workers: &mut [
         return work(own);
     }
     std::thread::scope(|scope| {
-        for worker in others {
-            scope.spawn(|| work(worker));
-        }
+        // The threads that there are take all chunks.
+        let begun = |worker| std::thread::Builder::new().spawn_scoped(scope, || work(worker)).is_ok();
+        let _all = others.iter_mut().all(begun);
         work(own);
     });
 }

@@ -8,6 +8,9 @@ use std::time::{Duration, Instant};
 /// Bins of [`Lateness`].
 const LATENESS_BINS: usize = 20_000;
 
+/// Longest time between two looks for the end of a pause. 50 ms: nobody who interrupts a run notices it.
+const LOOK: Duration = Duration::from_millis(50);
+
 /// Opens ticks at a fixed period of wall time, and counts how late they open.
 #[derive(Clone, Debug)]
 pub(crate) struct Pacer {
@@ -49,6 +52,20 @@ impl Pacer {
     /// Sleeps until the next tick opens.
     pub(crate) fn pause(&self) {
         std::thread::sleep(self.next.saturating_duration_since(Instant::now()));
+    }
+
+    /// Sleeps until the next tick opens, or until this returns a value, which is looked for often.
+    pub(crate) fn pause_unless<T>(&self, mut ended: impl FnMut() -> Option<T>) -> Option<T> {
+        loop {
+            let left = self.next.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return None;
+            }
+            std::thread::sleep(left.min(LOOK));
+            if let Some(end) = ended() {
+                return Some(end);
+            }
+        }
     }
 }
 

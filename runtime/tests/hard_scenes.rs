@@ -79,14 +79,22 @@ fn scenes_of_other_sizes_and_speeds_are_reached() {
 #[test]
 fn scenes_of_an_independent_generator_are_reached() {
     for name in [
+        "beside-a-long-block",
+        "beside-a-slanted-wall",
+        "channel-of-just-enough-width",
         "chattering-first-in-queue",
+        "corner-in-a-narrow-gap",
         "deaf-at-the-goal",
+        "deaf-in-an-open-field",
         "end-of-an-outline",
         "greedy-ranks",
         "head-on-at-a-gap",
         "identity-in-a-corridor",
         "late-first-command",
         "lost-straggler",
+        "mute-in-an-open-field",
+        "outline-of-three-corners",
+        "own-route-behind-a-set",
         "part-of-an-outline",
         "shut-out",
         "slit-with-coarse-ticks",

@@ -195,6 +195,8 @@ impl Node {
         match &self.data {
             Data::Bool(flag) => flag.to_string(),
             Data::Integer(integer) => integer.to_string(),
+            // With its point: a whole number may be what was expected.
+            Data::Float(float) if float.fract() == 0.0 && float.abs() < 1e15 => format!("{float:.1}"),
             Data::Float(float) => number(*float),
             Data::Text(text) if text.chars().count() > 60 => {
                 format!("{:?}…", text.chars().take(60).collect::<String>())

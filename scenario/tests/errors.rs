@@ -73,7 +73,7 @@ fn wrong_types_and_ranges_are_rejected() {
             "[formation]\ndrones = 99999999999999999999999999999999999999999",
             &["formation.drones: found an integer of too"],
         ),
-        ("[formation]\ndrones = 8.0", &["found 8, expected a whole number"]),
+        ("[formation]\ndrones = 8.0", &["found 8.0, expected a whole number"]),
         ("seed = -1\n[formation]", &["seed: found -1", "9223372036854775807"]),
         (
             "[formation]\nspacing_m = -3",

@@ -241,7 +241,8 @@ fn fly(
     match args.runtime {
         RuntimeChoice::Inline => {
             on_ready(&[launcher]).map_err(RuntimeError::OnReady)?;
-            inline::run_on(args.threads, scenario, pilots, sink, || interrupt.signal())
+            let settings = inline::Settings { threads: args.threads, clock: args.clock };
+            inline::run_with(settings, scenario, pilots, sink, || interrupt.signal())
         }
         RuntimeChoice::Processes => {
             skein_bus::clean()?;

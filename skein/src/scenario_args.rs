@@ -14,7 +14,7 @@ pub(crate) struct ScenarioArgs {
     #[arg(long, value_name = "STRATEGY")]
     pub(crate) strategy: Option<String>,
     /// Seed of everything random
-    #[arg(long, value_name = "N")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     pub(crate) seed: Option<String>,
     /// Pilot of the drones that no table of the scenario names: paper, cruise or one of the program's own; the same as
     /// --set pilot.0.name=NAME
