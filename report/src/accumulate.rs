@@ -19,6 +19,9 @@ use crate::vicinity::Vicinity;
 use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
 use skein_protocol::{DroneId, Phase, UnfinishedDrone, Vec2, horizontal};
 
+/// Why a mission ended whose record has no end.
+const CUT_OFF: &str = "the record ends before the mission: the process of the world, or the launcher, has ended";
+
 /// Accumulates everything that the summary of a run contains.
 pub(crate) struct Accumulator {
     facts: RunFacts,
@@ -229,7 +232,7 @@ impl Accumulator {
             startup_s: completion.startup_s,
             report_s: None,
             outcome: self.end.as_ref().map_or(completion.fallback, |end| end.outcome),
-            reason: self.end.as_ref().map(|end| end.reason.clone()),
+            reason: Some(self.end.as_ref().map_or_else(|| CUT_OFF.to_owned(), |end| end.reason.clone())),
             stuck: self.end.as_ref().map_or(Vec::new(), |end| end.stuck.iter().map(|id| id.0).collect()),
             unfinished: self
                 .end

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "A hunt flies runs of the experiment (or seeds of the scenario), then missions that differ a little from \
 those that came nearest to a failure. It makes each kind of failure that it finds small and writes it as a scenario file.
+A mission that does not reach its goal counts unless its time limit is shorter than the default one, or `skein check` warns of it.
 
 Exit codes: 0 nothing found, 1 a mission that does not reach its goal, 4 a broken invariant.
 
