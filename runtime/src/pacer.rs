@@ -111,4 +111,15 @@ mod tests {
         let late = pacer.lateness_s();
         assert!(late.max.unwrap() > 4.0 && late.p99 == late.max && late.p50.unwrap() < 1.0, "{late:?}");
     }
+
+    #[test]
+    fn a_pause_ends_with_its_tick_or_when_it_is_told_to() {
+        let mut slow = Pacer::new(1000.0, 1.0);
+        slow.open();
+        assert_eq!(slow.pause_unless(|| Some("interrupted")), Some("interrupted"));
+        let mut fast = Pacer::new(0.02, 10.0);
+        let next = fast.open();
+        assert_eq!(fast.pause_unless(|| None::<()>), None);
+        assert!(Instant::now() >= next);
+    }
 }
