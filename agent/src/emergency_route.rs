@@ -2,6 +2,7 @@
 
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::routes::Routes;
+use skein_protocol::payload::set_tag;
 use skein_protocol::{ObstacleId, Vec2};
 
 /// A set, the routes past it, and the one that is taken.
@@ -15,14 +16,14 @@ pub struct EmergencyRoute {
 
 impl EmergencyRoute {
     /// The shortest route past `routes` from `position` (world frame, m); `None` if the drone is past the set. `ids`: the obstacles of the
-    /// set. `set`: its tag.
+    /// set.
     #[must_use]
-    pub fn shortest((ids, set): (&[ObstacleId], u32), routes: Routes, position: Vec2, flight: &Flight) -> Option<Self> {
+    pub fn shortest(ids: &[ObstacleId], routes: Routes, position: Vec2, flight: &Flight) -> Option<Self> {
         if position.x >= routes.exit_x_m() {
             return None;
         }
         let route = shortest(&trips(&[], &routes, position, flight));
-        Some(Self { ids: ids.to_vec(), set, routes, route })
+        Some(Self { ids: ids.to_vec(), set: set_tag(ids), routes, route })
     }
 
     /// Whether one of these obstacles is in the set.

@@ -231,15 +231,14 @@ impl SwarmPilot {
         let Some(id) = self.urgent_obstacle(senses) else { return };
         let obstacles = self.leading.obstacles();
         let Some(set) = obstacles.sets().iter().find(|set| set.contains(&id)) else { return };
-        let tag = set_tag(set);
-        if self.route.emergency_set() == Some(tag) {
+        if self.route.emergency_set() == Some(set_tag(set)) {
             return;
         }
         let Some(shapes) = obstacles.shapes(set) else { return };
         let planner = &self.params.planner;
         let routes = Routes::new(&shapes, &planner.routes);
         let flight = Flight { speed_mps: self.params.guidance.speed_mps, course_y_m: planner.course_y_m };
-        if let Some(route) = EmergencyRoute::shortest((set, tag), routes, senses.position(), &flight) {
+        if let Some(route) = EmergencyRoute::shortest(set, routes, senses.position(), &flight) {
             self.route.set_emergency(route);
         }
     }

@@ -161,7 +161,8 @@ impl<'s> InlineSwarm<'s> {
     }
 }
 
-/// Steps all drones, in as many threads as there are workers, or in those that the machine allows. No drone sees what another one does in the same tick.
+/// Steps all drones, in as many threads as there are workers, or in those that the machine allows. No drone sees what another one does in
+/// the same tick.
 fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, workers: &mut [Worker]) {
     let Some((own, others)) = workers.split_first_mut() else { return };
     let chunks = Mutex::new(drones.chunks_mut(CHUNK));
