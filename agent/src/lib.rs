@@ -36,6 +36,7 @@ mod peer_clocks;
 pub mod program;
 pub mod queue;
 mod reaction;
+mod reunion;
 pub mod rollout;
 pub mod route_follower;
 pub mod safety;

@@ -168,6 +168,7 @@ impl PilotParams {
             start_velocity: Vec2::new(self.guidance.speed_mps, 0.0),
             reaction_time_s: ReactionDelay::new(self.braking.reaction_time_s, self.dt_s).delay_s(),
             keep_m: self.braking_filter().keep_m() + 2.0 * self.sensing.position_m,
+            radio_range_m: self.planner.radio_range_m,
             braking_mps2: self.safety.braking_mps2,
             period_s: self.separation_period_s,
             dt_s: self.dt_s,

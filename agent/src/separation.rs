@@ -7,7 +7,7 @@ mod relayed_lines;
 pub mod separating_line;
 pub mod separation_pair;
 
-use crate::tuning::STILL_MPS;
+use crate::tuning::{IN_REACH, STILL_MPS};
 use own_path::OwnPath;
 use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
@@ -56,6 +56,8 @@ pub struct SeparationParams {
     pub reaction_time_s: f64,
     /// Distance that two drones keep, m.
     pub keep_m: f64,
+    /// Distance over which drones hear each other, m; infinite without a limit.
+    pub radio_range_m: f64,
     /// Deceleration of full braking, m/s².
     pub braking_mps2: f64,
     /// Time between two statements, s.
@@ -321,7 +323,8 @@ impl Separations {
                 // A drone that is out of reach may have been restarted: its state is passed on.
                 known.hear_incarnation(pose.incarnation);
                 let pose = known.seen.map_or(pose, |seen| seen.at(now, &pose));
-                self.params.propose(known, &pose, peers.delay_s(), path);
+                let lost = !peers.is_living(known.peer, now);
+                self.params.propose(known, &pose, lost, peers.delay_s(), path);
             }
             separators.extend(known.statement(self.ranges).map(|said| separator(known.peer, &said)));
         }
@@ -377,6 +380,11 @@ fn message(separators: &[Separator]) -> Message {
 struct Stop {
     at: Vec2,
     velocity: Vec2,
+    /// Where the drone would have stopped when it was heard last.
+    heard: Vec2,
+    /// How far from there it is given room, m. If a lost drone had room farther away, the two might wait on their sides of the line without
+    /// hearing each other, and the room would be lost to both.
+    reach_m: f64,
 }
 
 /// The side of drone `me` of its lines with another one.
@@ -429,13 +437,15 @@ impl SeparationParams {
         if speed > 0.0 { moving.arriving_at(way_m, braking * along.abs() / speed) } else { moving }
     }
 
-    /// Makes a new line, if it is this drone's turn and the new line is better than the present one.
-    fn propose(&self, known: &mut Known, pose: &Pose, delay_s: f64, path: &OwnPath) {
+    /// Makes a new line, if it is this drone's turn and the new line is better than the present one. `lost`: whether the other drone has been
+    /// silent for too long.
+    fn propose(&self, known: &mut Known, pose: &Pose, lost: bool, delay_s: f64, path: &OwnPath) {
         let now = path.now();
         let age_s = now.since(pose.stamp).max(0.0);
         let late_s = age_s.max(delay_s);
-        let peer = self.peer_stop(known, pose, age_s);
-        let own = Stop { at: path.end(), velocity: path.velocity() };
+        let reach_m = if lost { IN_REACH * self.radio_range_m } else { f64::INFINITY };
+        let peer = Stop { reach_m, ..self.peer_stop(known, pose, age_s) };
+        let own = Stop { at: path.end(), velocity: path.velocity(), heard: path.end(), reach_m: f64::INFINITY };
         let Some(towards_me) = (own.at - peer.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
             let first = if known.opens { self.line(None, known.pair.side(), &own, &peer, late_s, path) } else { None };
@@ -474,7 +484,7 @@ impl SeparationParams {
                 flown_s = flown_s.min((room_m / closing_mps).max(0.0));
             }
         }
-        Stop { at: at + velocity * flown_s, velocity }
+        Stop { at: at + velocity * flown_s, velocity, heard: at, reach_m: f64::INFINITY }
     }
 
     /// The best line between this drone and another one, to which this drone's path keeps; `None` if there is none. When the
@@ -513,7 +523,9 @@ impl SeparationParams {
             (true, Side::Front) => peer_m + half_m,
             (true, Side::Back) => own_m - half_m,
         };
-        let stop_m = aimed_m.max(peer_needs_m).min(own_m - half_m);
+        let present_m = present.filter(keeps).map_or(f64::NEG_INFINITY, |line| side.sign() * line.stop_m());
+        let room_m = n.dot(&peer.heard) + peer.reach_m - half_m;
+        let stop_m = aimed_m.max(peer_needs_m).min(room_m.max(present_m)).min(own_m - half_m);
         // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.
         let speed = own.velocity.norm();
         let spare_m = own_m - half_m - stop_m;

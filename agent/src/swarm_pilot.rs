@@ -8,13 +8,14 @@ use crate::detour::{Detour, RouteView};
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::{Course, Escape};
 use crate::guidance::anchor;
-use crate::lone_flight::{LoneFlight, Others};
+use crate::lone_flight::{self, LoneFlight};
 use crate::navigator::{Heading, Navigator};
 use crate::neighbour_table::{NeighbourTable, NeighbourView};
 use crate::params::PilotParams;
 use crate::peer_clocks::{PeerClocks, Restamped};
 use crate::queue::QueuePacer;
 use crate::reaction::ReactionDelay;
+use crate::reunion::{Others, Reunion};
 use crate::rollout::{Rollout, RolloutDrone, RolloutInput, RolloutPilot};
 use crate::route_follower::RouteFollower;
 use crate::safety::{NearObstacle, Neighbour, Safety};
@@ -70,6 +71,7 @@ pub struct SwarmPilot {
     straggler: Straggler,
     stale_formation: StaleFormation,
     lone_flight: LoneFlight,
+    reunion: Reunion,
     silent: SilentDrones,
     neighbours: NeighbourTable,
     clocks: PeerClocks,
@@ -109,6 +111,7 @@ impl SwarmPilot {
             straggler: Straggler::default(),
             stale_formation: StaleFormation::default(),
             lone_flight: LoneFlight::new(params.drones, &params.planner),
+            reunion: Reunion::new(params.drones, &params.planner),
             silent: SilentDrones::default(),
             neighbours: NeighbourTable::new(params.neighbours()),
             clocks: PeerClocks::new(params.sensing.clock_s),
@@ -283,7 +286,7 @@ impl SwarmPilot {
             }
             _ => {
                 let position = senses.position();
-                let others = Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
+                let others = lone_flight::Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
                 let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
                 let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
                 let flight = &mut self.lone_flight;
@@ -424,17 +427,10 @@ impl SwarmPilot {
         } else {
             *senses
         };
-        let wanted = self.wanted_velocity(&then, open);
-        let nominal_mps = self.params.guidance.speed_mps;
-        let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
-        let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
-        let attempts = self.escape.attempts();
-        let by_words = self.params.apart_by_words;
-        let course = Course { now: then.now, position: then.position(), velocity: then.velocity(), by_words, wanted };
-        let wanted = self.escape.steer(&course, patience_s, slow_mps, self.params.safety.scale);
-        if self.escape.attempts() > attempts {
-            self.give_up_first_place(senses.now, open);
-        }
+        let wanted = match self.lost_place(&then) {
+            Some(place) => self.velocity_to_slot(&then, place, Vec2::zeros()),
+            None => self.unstuck_velocity(senses.now, &then, open),
+        };
         self.neighbours.update(&NeighbourView {
             now: senses.now,
             senses: &then,
@@ -445,6 +441,35 @@ impl SwarmPilot {
         let safe = self.safe_acceleration(wanted, senses, &then);
         self.predictor = predictor;
         safe
+    }
+
+    /// Where the drone looks for another one that it has lost, world frame, m.
+    fn lost_place(&mut self, senses: &Senses<'_>) -> Option<Vec2> {
+        let by_words = self.separations.is_some();
+        if self.route.is_passing() && !by_words {
+            self.reunion.rest();
+        }
+        let starts_m: &[Vec2] = if self.params.apart_by_words { &self.params.starts_m } else { &[] };
+        let braking_mps2 = self.params.guidance.braking_mps2;
+        let others = Others { me: self.params.me, peers: self.leading.peers(), starts_m, braking_mps2, by_words };
+        self.reunion.place(senses, &others)
+    }
+
+    /// The velocity to fly if no other drone were near, or if the drone is stuck, the one by which it escapes, m/s. `then`: the senses,
+    /// predicted for the moment at which the command takes effect.
+    fn unstuck_velocity(&mut self, now: SimTime, then: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
+        let wanted = self.wanted_velocity(then, open);
+        let nominal_mps = self.params.guidance.speed_mps;
+        let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
+        let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
+        let attempts = self.escape.attempts();
+        let by_words = self.params.apart_by_words;
+        let course = Course { now: then.now, position: then.position(), velocity: then.velocity(), by_words, wanted };
+        let wanted = self.escape.steer(&course, patience_s, slow_mps, self.params.safety.scale);
+        if self.escape.attempts() > attempts {
+            self.give_up_first_place(now, open);
+        }
+        wanted
     }
 
     /// The path of this drone with the commands that it has given and full braking after them.

@@ -22,7 +22,7 @@ pub(crate) fn planner() -> PlannerParams {
         course_y_m: 0.0,
         destination: Destination::Goal { front_m: Vec2::new(100.0, 0.0) },
         between: Between::CloseUp,
-        limited_range: false,
+        radio_range_m: f64::INFINITY,
         debounce_s: 0.1,
     }
 }

@@ -50,9 +50,20 @@ pub(crate) const UNHEARD_S: f64 = 5.0;
 /// Chosen by hand: the paper's longest passage takes half of it. `skein sweep experiments/wide-scenes.toml`.
 pub(crate) const LEAD_S: f64 = 60.0;
 
-/// A drone without a task stays within this share of the distance over which drones hear each other from the nearest other one. Chosen by
-/// hand.
+/// A drone without a task stays within this share of the distance over which drones hear each other from the nearest other one. So does a
+/// drone that leads a lost one, and one that gives another one room by words. Chosen by hand.
 pub(crate) const IN_REACH: f64 = 0.75;
+
+/// A drone looks for a lost one after it has stayed in one place for this long, s; a headway per drone is added. Chosen by hand: longer
+/// than groups take to become one.
+pub(crate) const LOOK_FOR_LOST_S: f64 = 30.0;
+
+/// A drone counts as staying in one place while it moves at less than this share of its nominal speed on average. Chosen by hand: a drone
+/// that escapes from where it is stuck stays in this place.
+pub(crate) const LOST_PACE: f64 = 0.25;
+
+/// How long a drone stays with a lost one that it has found, s. Chosen by hand: twice as long as it waits before it looks for one.
+pub(crate) const LEAD_FOUND_S: f64 = 60.0;
 
 /// How far beyond the goal a drone without a task waits, as time at nominal speed, s; a headway per drone is added. Chosen by
 /// hand: the length of a formation. `skein sweep experiments/wide-scenes.toml`.

@@ -1,5 +1,6 @@
 //! What a drone broadcasts, and when: its beacon, its plan, and repetitions of what others may have missed.
 
+use crate::beacons::Beacon;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::obstacles::{Obstacles, set_array, set_ids};
@@ -7,7 +8,7 @@ use crate::own_state::OwnState;
 use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use crate::relays::Relays;
-use crate::tuning::{FAR_REPEATS, UNPACED};
+use crate::tuning::{FAR_REPEATS, NEWS_TURNS, UNPACED};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
@@ -21,7 +22,9 @@ pub(crate) struct Broadcaster {
     /// Time that one assignment takes in a leader's share of the bandwidth, s.
     part_s: f64,
     /// When each known obstacle is said again.
-    obstacles: BTreeMap<ObstacleId, Gossip>,
+    obstacles: BTreeMap<ObstacleId, Told>,
+    /// How often outlines had been learnt or had grown when that was last looked at.
+    outlines: usize,
     /// When the passed sets are said again.
     passed: Gossip,
     /// The term that this drone obeyed in the last tick.
@@ -33,6 +36,22 @@ pub(crate) struct Broadcaster {
     announced: PlanStamp,
     /// Number of repetitions of plans.
     repetitions: u32,
+}
+
+/// When an obstacle is said again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Told {
+    gossip: Gossip,
+    /// How often its outline had grown when the drone last looked.
+    growths: u32,
+}
+
+impl Told {
+    /// Whether drones may not know the obstacle as it is, although a plan covers it or this drone has passed it: its outline has grown not
+    /// long ago, or a drone is heard again that was out of reach and has still to pass it.
+    fn is_news(&self, k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
+        self.gossip.doublings() < NEWS_TURNS && (self.growths > 0 || is_ahead_of_near(k, now, id))
+    }
 }
 
 /// What is said of a bundle's assignments.
@@ -56,6 +75,7 @@ impl Broadcaster {
             repeat_s,
             part_s: params.leader_frame_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
+            outlines: 0,
             passed: Gossip::new(params.start, repeat_s, params.me),
             term: Ballot::NONE,
             spoken: false,
@@ -70,16 +90,18 @@ impl Broadcaster {
         self.next_repeat = SimTime::ZERO;
     }
 
-    /// Notes that another drone has said an obstacle.
-    pub(crate) fn hear_obstacle(&mut self, id: ObstacleId) {
-        if let Some(gossip) = self.obstacles.get_mut(&id) {
-            gossip.hear();
+    /// Notes that another drone has said an obstacle. `exceeded`: this drone knows more of the outline.
+    pub(crate) fn hear_obstacle(&mut self, now: SimTime, id: ObstacleId, exceeded: bool) {
+        match self.obstacles.get_mut(&id) {
+            Some(told) if exceeded => told.gossip.restart(now),
+            Some(told) => told.gossip.hear(),
+            None => {}
         }
     }
 
     /// Repeats all facts soon: a drone that may not know them can be heard (again).
     pub(crate) fn restart_gossip(&mut self, now: SimTime) {
-        self.obstacles.values_mut().for_each(|gossip| gossip.restart(now));
+        self.obstacles.values_mut().for_each(|told| told.gossip.restart(now));
         self.passed.restart(now);
     }
 
@@ -119,19 +141,24 @@ impl Broadcaster {
     /// Says the obstacles that are due and that no plan covers yet, so that the leader learns what any member senses. A drone
     /// says what it has sensed first at once.
     fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, wide: bool, say: &mut Vec<Message>) {
-        if self.obstacles.len() < k.obstacles().count() {
+        if std::mem::replace(&mut self.outlines, k.obstacles().changes()) != k.obstacles().changes() {
             for (id, known) in k.obstacles().iter() {
                 let (me, repeat_s) = (k.me(), self.repeat_s);
-                self.obstacles.entry(id).or_insert_with(|| {
+                let told = self.obstacles.entry(id).or_insert_with(|| {
                     if known.witness == me {
                         say.extend(obstacle(k.obstacles(), id));
                     }
-                    Gossip::new(now, repeat_s, me)
+                    Told { gossip: Gossip::new(now, repeat_s, me), growths: known.growths }
                 });
+                if std::mem::replace(&mut told.growths, known.growths) != known.growths {
+                    told.gossip.restart(now);
+                }
             }
         }
-        for (&id, gossip) in &mut self.obstacles {
-            if gossip.is_due(now) && (is_open(k, id) || (wide && is_missed(k, now, id))) {
+        for (&id, told) in &mut self.obstacles {
+            if told.gossip.is_due(now)
+                && (is_open(k, id) || told.is_news(k, now, id) || (wide && is_missed(k, now, id)))
+            {
                 say.extend(obstacle(k.obstacles(), id));
             }
         }
@@ -197,6 +224,14 @@ fn is_open(k: &Knowledge, id: ObstacleId) -> bool {
     !k.obstacles().has_passed(k.me(), id) && !k.ledger().sets().iter().any(|set| set.ids.contains(&id))
 }
 
+/// Whether radios have a limited range, and a drone that this one hears still has to pass an obstacle.
+fn is_ahead_of_near(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
+    let obstacles = k.obstacles();
+    let exit_x_m = obstacles.exit_x_m(&[id], k.params().routes.planning_distance_m);
+    let ahead = |(peer, pose): (DroneId, Beacon<'_>)| !obstacles.is_past(peer, pose.position().x, &[id], exit_x_m);
+    k.params().radio_range_m.is_finite() && k.peers().direct(now).any(ahead)
+}
+
 /// Whether an obstacle is in the plan that this drone obeys, and a neighbour may not obey that plan because it does not know
 /// the obstacle.
 fn is_missed(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
@@ -204,8 +239,8 @@ fn is_missed(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
     k.peers().direct(now).any(|(_, pose)| set.scope.contains(pose.group()) && pose.obeyed() < set.stamp)
 }
 
-/// Says which sets this drone has passed, until the swarm re-forms. With a limited range, also in a formation of a part of the swarm, as
-/// long as it hears drones of another part: they do not know what the drones of this formation have passed.
+/// Says which sets this drone has passed, until the swarm re-forms. In a part of the swarm, as long as it hears drones of another part,
+/// also later, if those may not know it: with a limited range, and if outlines are sensed in part.
 fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message>) {
     let mut passed = |set: &[ObstacleId]| {
         let (set, set_count) = set_array(set);
@@ -213,9 +248,15 @@ fn say_passed(k: &Knowledge, now: SimTime, own: &OwnState, say: &mut Vec<Message
     };
     let planned = k.ledger().sets().iter().filter(|set| own.position.x >= set.routes.exit_x_m());
     planned.for_each(|set| passed(&set.ids));
-    let formation = k.ledger().obeyed().filter(|bundle| bundle.plan.phase() == Phase::Reform);
-    let limited_range = k.params().limited_range;
-    if formation.is_some_and(|bundle| limited_range && k.living_peers(now).any(|m| !bundle.parts.contains(m.id))) {
+    let limited_range = k.params().radio_range_m.is_finite();
+    let others = |bundle: &PlanBundle| k.living_peers(now).any(|m| !bundle.parts.contains(m.id));
+    let unsure = k.ledger().obeyed().is_some_and(|bundle| match bundle.plan.phase() {
+        Phase::Reform => limited_range && others(bundle),
+        // Other drones may know by now that the outlines reach farther.
+        Phase::Cruise => k.obstacles().have_grown() && others(bundle),
+        Phase::Avoid => false,
+    });
+    if unsure {
         let is_passed = |set: &&Vec<ObstacleId>| set.iter().all(|&id| k.obstacles().has_passed(k.me(), id));
         k.obstacles().sets().iter().filter(is_passed).for_each(|set| passed(set));
     }

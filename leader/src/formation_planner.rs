@@ -161,7 +161,7 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     if phase != Phase::Reform {
         return Vec2::new(x, s.params.course_y_m);
     }
-    let misses = s.params.limited_range && !s.silent.is_empty();
+    let misses = s.params.radio_range_m.is_finite() && !s.silent.is_empty();
     let x = if misses { x.min(meeting_x_m(s, shape)) } else { x };
     moved_on(s, shape, Vec2::new(x, s.params.course_y_m))
 }

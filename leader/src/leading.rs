@@ -250,7 +250,8 @@ impl Leading {
             MessageRef::Obstacle(o) => {
                 self.knowledge.learn(now, o.id, o.shape, o.witness);
                 if !self.relays.is_wide() || self.relays.is_near(&self.knowledge, source) {
-                    self.broadcaster.hear_obstacle(o.id);
+                    let exceeded = self.knowledge.obstacles().exceed(o.id, &o.shape);
+                    self.broadcaster.hear_obstacle(now, o.id, exceeded);
                 }
             }
             MessageRef::Leadership(l) => {

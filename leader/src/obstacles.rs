@@ -20,6 +20,8 @@ pub struct Known {
     pub witness: DroneId,
     /// When this drone learnt of it.
     pub since: SimTime,
+    /// How often the outline has grown since then.
+    pub growths: u32,
 }
 
 /// The known obstacles, and which drones have passed them. Memory is bounded.
@@ -44,18 +46,33 @@ impl Obstacles {
 
     /// Learns of an obstacle, or that its outline reaches farther than was known. Returns whether that is new.
     pub fn learn(&mut self, now: SimTime, id: ObstacleId, shape: ConvexShape, witness: DroneId) -> bool {
+        let growth_m = self.growth_m();
         if let Some(known) = self.known.get_mut(&id) {
-            let growth_m = OUTLINE_GROWTH_M.min(OUTLINE_GROWTH * self.reach_m);
             let Some(grown) = grown(&known.shape, &shape, growth_m) else { return false };
-            known.shape = grown;
+            (known.shape, known.growths) = (grown, known.growths + 1);
         } else if self.known.len() < MAX_KNOWN {
-            self.known.insert(id, Known { shape, witness, since: now });
+            self.known.insert(id, Known { shape, witness, since: now, growths: 0 });
         } else {
             return false;
         }
         self.changes += 1;
         self.sets = self.cluster();
         true
+    }
+
+    /// Whether more of an obstacle is known than this outline of it.
+    pub(crate) fn exceed(&self, id: ObstacleId, shape: &ConvexShape) -> bool {
+        self.get(id).is_some_and(|known| grown(shape, &known.shape, self.growth_m()).is_some())
+    }
+
+    /// Whether an outline has grown since it was learnt.
+    pub(crate) fn have_grown(&self) -> bool {
+        self.known.values().any(|known| known.growths > 0)
+    }
+
+    /// By how much an outline has to reach beyond what is known of it until it counts as grown, m.
+    fn growth_m(&self) -> f64 {
+        OUTLINE_GROWTH_M.min(OUTLINE_GROWTH * self.reach_m)
     }
 
     /// How often an outline was learnt or has grown. Where it is the same, all outlines are.

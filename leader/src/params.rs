@@ -123,8 +123,8 @@ pub struct PlannerParams {
     pub destination: Destination,
     /// What groups do between two obstacle sets.
     pub between: Between,
-    /// Whether drones hear each other over a limited distance only, so that parts of the swarm may lose each other.
-    pub limited_range: bool,
+    /// Distance over which drones hear each other, m; infinite without a limit. Parts of the swarm may lose each other if it is finite.
+    pub radio_range_m: f64,
     /// Delay between learning an obstacle and planning for it, so that one plan covers obstacles that are learnt together;
     /// also between a change of the members and new slots, s.
     pub debounce_s: f64,

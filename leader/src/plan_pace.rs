@@ -74,7 +74,7 @@ mod tests {
             headway_s: 4.0,
             routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
             between: Between::CloseUp,
-            limited_range: false,
+            radio_range_m: f64::INFINITY,
             shape: Shape::V,
             spacing_m: 40.0,
             reformation: Reformation::Optimal,

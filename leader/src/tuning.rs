@@ -216,3 +216,6 @@ pub(crate) const OUTLINE_GROWTH_M: f64 = 2.0;
 /// The same as a part of the distance up to which obstacles are one set, twice the planning distance. The less of the two counts. No
 /// unit. 0.05: with the default planning distance, 2 m. By hand.
 pub(crate) const OUTLINE_GROWTH: f64 = 0.05;
+/// In how many intervals of the gossip a drone says an obstacle that a plan covers, or that it has passed, to drones that may not know it.
+/// No unit. 3: within 1.4 s by default. By hand.
+pub(crate) const NEWS_TURNS: u32 = 3;

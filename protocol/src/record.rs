@@ -144,7 +144,7 @@ pub enum Outcome {
     Reached,
     /// The time limit of the mission ran out.
     Timeout,
-    /// It is certain that the mission cannot reach its goal, because some drone has no way there.
+    /// It is certain that the mission cannot reach its goal: some drone has no way there, or no drone is left alive.
     Stuck,
     /// An invariant was broken.
     Unsafe,
@@ -377,7 +377,7 @@ pub enum EventKind {
         outcome: Outcome,
         /// Why it ended, for a human reader.
         reason: String,
-        /// The drones that have no way to the goal. Empty unless the outcome is [`Outcome::Stuck`].
+        /// The drones that cannot reach the goal. Empty unless the outcome is [`Outcome::Stuck`].
         #[serde(default)]
         stuck: Vec<DroneId>,
         /// Drones that kept the mission from its goal when its time was over: the first ones, at most

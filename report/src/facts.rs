@@ -68,6 +68,10 @@ pub enum MissionEnd {
         /// Position of the front slot, m.
         front_m: [f64; 2],
     },
+    /// After a while, wherever the drones are.
+    Time,
+    /// When the pilots say so.
+    Pilots,
 }
 
 /// Obstacles that the swarm passes together: one stage of the mission.

@@ -25,8 +25,8 @@ pub(crate) struct LeadershipSummary {
     pub elections: u32,
     /// Which drones became leaders.
     pub entries: Vec<LeaderEntry>,
-    /// Time in which two leaders were in radio range of each other although one had to follow the other, s: both lead
-    /// the same group, or the later term is for a group that contains the other leader's own group.
+    /// Time in which two leaders could hear each other although one had to follow the other, s: both lead the same group,
+    /// or the later term is for a group that contains the other leader's own group.
     pub split_brain_s: f64,
     /// For each death of a leader, the time until another drone led its group, s; `None` if none ever did.
     pub failover_s: Vec<Option<f64>>,
@@ -79,13 +79,12 @@ impl Leading {
             }
             !led
         });
-        let place = |drone: usize| horizontal(rows[drone].position_m);
-        let hear = |a: usize, b: usize| range_m.is_none_or(|range| (place(a) - place(b)).norm() <= range);
+        let contact = |a: usize, b: usize| in_contact(&rows[a], &rows[b], range_m);
         let term = |drone: usize| self.terms.get(&DroneId(drone as u32));
         let over = |(led, a): (GroupId, usize), b: usize| term(a) > term(b) && led.contains(rows[b].group);
         let rivals = |a: (GroupId, usize), b: (GroupId, usize)| a.0 == b.0 || over(a, b.1) || over(b, a.1);
         let mut pairs = leaders.iter().enumerate().flat_map(|(i, &a)| leaders[..i].iter().map(move |&b| (a, b)));
-        if pairs.any(|(a, b)| rivals(a, b) && hear(a.1, b.1)) {
+        if pairs.any(|(a, b)| rivals(a, b) && contact(a.1, b.1)) {
             self.split_brain_s += dt_s;
         }
     }
@@ -95,18 +94,27 @@ fn leads(row: &DroneRow) -> bool {
     row.alive() && row.leads()
 }
 
+/// Whether each of two drones can hear the other: they are in radio range, no fault of the links separates them, and
+/// neither is frozen. A message may still be lost.
+fn in_contact(a: &DroneRow, b: &DroneRow, range_m: Option<f64>) -> bool {
+    let distance_m = (horizontal(a.position_m) - horizontal(b.position_m)).norm();
+    let hears = |a: &DroneRow, b: &DroneRow| !a.is_frozen() && a.link_faults.drop_reason(b.link_faults).is_none();
+    range_m.is_none_or(|range_m| distance_m <= range_m) && hears(a, b) && hears(b, a)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::row;
-    use skein_protocol::record::{ROW_ALIVE, ROW_LEADS};
+    use skein_protocol::link_faults::LinkFaults;
+    use skein_protocol::record::{ROW_ALIVE, ROW_FROZEN, ROW_LEADS};
 
     fn leader(x_m: f64, group: GroupId) -> DroneRow {
         DroneRow { flags: ROW_ALIVE | ROW_LEADS, led: group, ..row(x_m, 0.0) }
     }
 
     #[test]
-    fn two_leaders_of_a_group_in_radio_range_are_a_split_brain() {
+    fn two_leaders_of_a_group_in_contact_are_a_split_brain() {
         let one = GroupId::ALL.child(1);
         let split = |range, rows: &[DroneRow]| {
             let mut leading = Leading::default();
@@ -134,6 +142,20 @@ mod tests {
         assert_eq!(nested(1, one), 0.5, "the subgroup of the former leader has a new leader");
         let dead = DroneRow { flags: ROW_LEADS, ..leader(60.0, one) };
         assert_eq!(split(None, &[leader(0.0, one), dead]), 0.0);
+        for link_faults in
+            [LinkFaults { deaf: 1, ..LinkFaults::default() }, LinkFaults { mute: 1, ..LinkFaults::default() }]
+        {
+            assert_eq!(split(None, &[leader(0.0, one), DroneRow { link_faults, ..leader(60.0, one) }]), 0.0);
+        }
+        let on_side = |x_m, side| {
+            let mut row = leader(x_m, one);
+            row.link_faults.partitions.join(0, side);
+            row
+        };
+        assert_eq!(split(None, &[on_side(0.0, 0), on_side(60.0, 1)]), 0.0);
+        assert_eq!(split(None, &[on_side(0.0, 1), on_side(60.0, 1)]), 0.5);
+        let frozen = DroneRow { flags: ROW_ALIVE | ROW_LEADS | ROW_FROZEN, ..leader(60.0, one) };
+        assert_eq!(split(None, &[leader(0.0, one), frozen]), 0.0);
     }
 
     #[test]

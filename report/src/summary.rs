@@ -52,7 +52,8 @@ pub struct Summary {
     pub outcome: Outcome,
     /// Why the mission ended, in words.
     pub reason: Option<String>,
-    /// The drones that have no way to the goal. Empty unless `outcome` is `stuck`.
+    /// The drones for which it is certain that they do not reach the goal: they have no way there, or no drone is left
+    /// alive. Empty unless `outcome` is `stuck`.
     #[serde(default)]
     pub stuck: Vec<u32>,
     /// The drones that kept the mission from its goal when its time was over, those in front of a queue first; at most 64. Empty unless
@@ -93,7 +94,7 @@ pub struct Summary {
     pub elections: u32,
     /// The drones that became leaders, in order of time.
     pub leaders: Vec<LeaderEntry>,
-    /// Total time in which two leaders of one group were in radio range of each other, s.
+    /// Total time in which two leaders of one group could hear each other, s.
     pub split_brain_s: f64,
     /// For each death of a leader, the time until another drone led its group, s; null if no drone ever did.
     pub failover_s: Vec<Option<f64>>,

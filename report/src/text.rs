@@ -57,7 +57,7 @@ pub(crate) fn outcome(summary: &Summary) -> String {
     let (word, why) = match summary.outcome {
         Outcome::Reached => ("reached", reached(summary)),
         Outcome::Timeout => ("timeout", "the goal was not reached".to_owned()),
-        Outcome::Stuck => ("stuck", "some drones have no way to the goal".to_owned()),
+        Outcome::Stuck => ("stuck", "some drones cannot reach the goal".to_owned()),
         Outcome::Unsafe => ("unsafe", violations(summary)),
         Outcome::Aborted => ("aborted", "the mission did not reach its end".to_owned()),
     };
@@ -203,7 +203,7 @@ fn leadership(summary: &Summary) -> String {
         count => format!("{count} elections"),
     };
     if summary.split_brain_s > 0.0 {
-        let _ = write!(text, ", two leaders of a group in radio range for {:.2} s", summary.split_brain_s);
+        let _ = write!(text, ", two leaders of a group in contact for {:.2} s", summary.split_brain_s);
     }
     let failovers =
         summary.failover_s.iter().map(|time| time.map_or("until the end".to_owned(), |s| format!("{s:.2} s")));

@@ -59,7 +59,11 @@ impl ReproduceError {
     /// Whether the caller's input is at fault (exit code 2), not the environment (exit code 3).
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Exists(_) | Self::NotAReport(_) | Self::Folder(_))
+        match self {
+            Self::Exists(_) | Self::NotAReport(_) => true,
+            Self::Folder(error) => error.is_usage(),
+            _ => false,
+        }
     }
 
     /// For `map_err`: an I/O error at `path`.

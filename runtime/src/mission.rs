@@ -263,7 +263,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
             BetweenKey::CloseUp => Between::CloseUp,
             BetweenKey::GoOn => Between::GoOn,
         },
-        limited_range: scenario.radio().beacon_range_m().is_finite(),
+        radio_range_m: scenario.radio().beacon_range_m(),
         debounce_s: scenario.protocol.debounce_s,
     }
 }

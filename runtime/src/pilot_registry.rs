@@ -133,11 +133,9 @@ impl PilotRegistry {
         let tables = scenario.pilot_tables();
         let json = Arc::new(serde_json::to_value(scenario).unwrap_or_default());
         for (number, table) in scenario.pilots.iter().enumerate() {
-            if table.command.is_some() {
-                if inline {
-                    let message = "a program of its own cannot fly inline: expected --runtime processes";
-                    return Err(PilotProblem::new(format!("pilot.{number}.command"), message));
-                }
+            if let Some(words) = &table.command {
+                check_command(words, inline)
+                    .map_err(|message| PilotProblem::new(format!("pilot.{number}.command"), message))?;
                 continue;
             }
             let drone = tables.iter().position(|of| *of == Some(number)).unwrap_or_default() as u32;
@@ -238,6 +236,18 @@ fn refused(name: &str, path: &str, error: &PilotError) -> PilotProblem {
         None => format!("{path}.params"),
     };
     PilotProblem::new(key, format!("{} (pilot {name:?})", error.problem()))
+}
+
+/// Whether a pilot's command can fly. `inline`: in this process.
+fn check_command(words: &[String], inline: bool) -> Result<(), String> {
+    if inline {
+        return Err("a program of its own cannot fly inline: expected --runtime processes".to_owned());
+    }
+    if Program::of_command(words).is_there() {
+        return Ok(());
+    }
+    let program = words.first().map_or("", String::as_str);
+    Err(format!("{program:?} is no program: expected a file, or the name of one in the search path"))
 }
 
 #[cfg(test)]

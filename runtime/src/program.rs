@@ -70,6 +70,11 @@ impl Program {
         Ok(self.hash.get_or_init(|| format!("{:016x}", digest.value())).clone())
     }
 
+    /// Whether its executable is a file: the one that its first word names, or one in the search path.
+    pub(crate) fn is_there(&self) -> bool {
+        self.words.first().is_some_and(|word| in_path(Path::new(word)).is_file())
+    }
+
     fn files(&self) -> Vec<PathBuf> {
         let behind = self.words.iter().skip(1).map(PathBuf::from).filter(|path| path.is_file());
         let files: Vec<PathBuf> = behind.collect();
@@ -134,7 +139,8 @@ mod tests {
         };
         assert_eq!(hash("a", "/bin/sh"), hash("a", "/bin/true"));
         assert_ne!(hash("a", "/bin/sh"), hash("b", "/bin/sh"));
-        assert!(Program::new(vec!["no-such-program".into()]).hash().is_err());
+        let absent = Program::new(vec!["no-such-program".into()]);
+        assert!(absent.hash().is_err() && !absent.is_there());
         assert_eq!(Program::new(vec!["sh".into()]).hash().unwrap().len(), 16);
     }
 }

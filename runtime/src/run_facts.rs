@@ -55,7 +55,9 @@ pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunF
         spacing_m: scenario.formation.spacing_m,
         end: match (scenario.mission.end, scenario.mission.goal_m) {
             (End::Goal, Some(front_m)) => MissionEnd::Goal { front_m },
-            _ => MissionEnd::Hold,
+            (End::Goal | End::Hold, _) => MissionEnd::Hold,
+            (End::Time, _) => MissionEnd::Time,
+            (End::Pilots, _) => MissionEnd::Pilots,
         },
         course_y_m: scenario.formation.start_m[1],
         safe_distance_m: scenario.drone.safe_distance_m,

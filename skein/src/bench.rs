@@ -17,7 +17,7 @@ use skein_bench::runtime::{BaselinePeer, RuntimeBench};
 use skein_bench::split::SplitBench;
 use skein_bench::{BenchError, Context};
 use skein_runtime::PilotRegistry;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 /// The benchmarks.
@@ -212,12 +212,17 @@ pub(crate) fn peer(peer: &BaselinePeer) -> Result<Exit, Failure> {
 }
 
 fn runtime(args: &RuntimeArgs, context: &Context<'_>) -> Result<Option<Exit>, Failure> {
+    let is_terminal = std::io::stderr().is_terminal();
     let report = args.bench.run(context, |progress| {
         let skein_bench::runtime::Progress { drones, round, rounds, case } = progress;
-        // Without a reader, there is no progress to show.
-        let _ = write!(std::io::stderr(), "\r{drones} drones, round {round} of {rounds}: {:<24}", case.name());
+        if is_terminal {
+            // Without a reader, there is no progress to show.
+            let _ = write!(std::io::stderr(), "\r{drones} drones, round {round} of {rounds}: {:<24}", case.name());
+        }
     });
-    let _ = writeln!(std::io::stderr());
+    if is_terminal {
+        let _ = writeln!(std::io::stderr());
+    }
     let Some(report) = report.map_err(failure)? else { return Ok(None) };
     let json = serde_json::to_string_pretty(&report).map_err(Failure::environment)?;
     if let Some(path) = &args.out {

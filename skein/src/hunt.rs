@@ -59,6 +59,9 @@ pub(crate) fn hunt(args: &HuntArgs, pilots: &PilotRegistry) -> Result<Exit, Fail
         return Err(Failure::usage(text));
     }
     let experiment = hunt::source(&args.source).map_err(Failure::usage)?;
+    if let Some(path) = args.out.as_deref().filter(|path| path.exists()) {
+        return Err(refused(path, &std::io::ErrorKind::AlreadyExists.into()));
+    }
     let grid = Grid::new(&experiment, &args.overrides);
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();

@@ -11,7 +11,7 @@ use skein_protocol::record::Outcome;
 use skein_report::{PilotEntry, Recorder, RunCompletion, Summary};
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{Clock, Launch, PATIENCE, PilotRegistry, ProcessInfo, RunEnd, RuntimeError, inline, supervisor};
-use skein_scenario::Scenario;
+use skein_scenario::{Scenario, ScenarioSource};
 use std::path::PathBuf;
 
 /// Arguments of `replay`.
@@ -38,9 +38,10 @@ pub(crate) fn replay(args: &ReplayArgs, pilots: &PilotRegistry) -> Result<Exit, 
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let recorded = folder.read_summary().map_err(Failure::report)?;
     let path = args.run_dir.join("manifest.json");
-    let scenario: Scenario = serde_json::from_value(manifest.scenario).map_err(|error| {
-        Failure::usage(format!("{}: expected the scenario of a run by this version of Skein: {error}", path.display()))
-    })?;
+    let name = path.display().to_string();
+    let source = ScenarioSource { name: &name, stem: "" };
+    let scenario = Scenario::from_json(&manifest.scenario, source)
+        .map_err(|error| Failure::usage(format!("expected the scenario of a run by this version of Skein: {error}")))?;
     let runtime = args.runtime.unwrap_or(match manifest.facts.runtime.as_str() {
         "inline" => RuntimeChoice::Inline,
         _ => RuntimeChoice::Processes,

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Writes the files of the run again, and prints the summary.
 pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
-    let folder = run_folder::open(&args.run_dir)?;
+    let folder = run_folder::open_recorded(&args.run_dir)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let stop = || interrupt.signal().is_some();
     let TableArgs { every, parquet } = args.tables;

@@ -22,6 +22,7 @@ use skein_runtime::{
     inline, supervisor,
 };
 use skein_scenario::Scenario;
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::time::Instant;
 
@@ -69,7 +70,8 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     }
     let manifest = manifest(&facts, &scenario)?;
     let flown = begin(args, &folder, &manifest, scenario.timeout_s()).and_then(|Begun { reserved, mut sink }| {
-        let end = fly(args, (&scenario, &shares), pilots, &folder, &interrupt, &mut sink).map_err(failure)?;
+        let end = fly(args, (&scenario, &shares), pilots, &folder, &interrupt, &mut sink);
+        let end = end.or_else(killed_early).map_err(failure)?;
         Ok((end, reserved, sink.finish()))
     });
     let (end, reserved, recorder) = match flown {
@@ -184,6 +186,16 @@ fn failure(error: RuntimeError) -> Failure {
         RuntimeError::EndedEarly { status, .. } if status.code() == Some(2) => Failure::usage(error),
         RuntimeError::Pilot(_) | RuntimeError::OtherVersion { .. } => Failure::usage(error),
         error => Failure::environment(error),
+    }
+}
+
+/// The end of a run one of whose processes was killed before the first tick.
+fn killed_early(error: RuntimeError) -> Result<RunEnd, RuntimeError> {
+    match &error {
+        RuntimeError::EndedEarly { status, .. } if status.signal().is_some() => {
+            Ok(RunEnd { failure: Some(error.to_string()), ..RunEnd::default() })
+        }
+        _ => Err(error),
     }
 }
 

@@ -43,6 +43,8 @@ pub(crate) struct Verdict {
     pub(crate) outcome: Outcome,
     /// Why, for a human reader.
     pub(crate) reason: String,
+    /// If the mission is stuck: the drones that keep it from its goal for certain.
+    pub(crate) stuck: Vec<DroneId>,
     /// If the time was over: drones that kept the mission from its goal.
     pub(crate) unfinished: Vec<UnfinishedDrone>,
     /// If the time was over and no living drone had moved for long: for how long, s.
@@ -51,7 +53,13 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     fn new(outcome: Outcome, reason: impl Into<String>) -> Self {
-        Self { outcome, reason: reason.into(), unfinished: Vec::new(), standstill_s: None }
+        let reason = reason.into();
+        Self { outcome, reason, stuck: Vec::new(), unfinished: Vec::new(), standstill_s: None }
+    }
+
+    /// It is certain that the mission will not reach its goal, because of these drones.
+    fn stuck(drones: Vec<DroneId>, reason: impl Into<String>) -> Self {
+        Self { stuck: drones, ..Self::new(Outcome::Stuck, reason) }
     }
 }
 
@@ -83,9 +91,10 @@ impl MissionJudge {
         let verdict = if let Some(reason) = self.reached(params, &state) {
             Verdict::new(Outcome::Reached, reason)
         } else if !state.bodies.iter().any(Body::is_alive) && !state.awaits_restarts {
-            Verdict::new(Outcome::Timeout, "no drone is left alive")
+            let all = (0..state.bodies.len() as u32).map(DroneId).collect();
+            Verdict::stuck(all, "no drone is left alive")
         } else if !params.without_way.is_empty() {
-            Verdict::new(Outcome::Stuck, without_way(&params.without_way))
+            Verdict::stuck(params.without_way.clone(), without_way(&params.without_way))
         } else if state.end >= SimTime::from_secs(params.timeout_s) {
             self.timed_out(params, &state)
         } else {
@@ -95,7 +104,7 @@ impl MissionJudge {
             0 => verdict,
             count => {
                 let reason = format!("{}, but invariants were broken {count} times", verdict.reason);
-                Verdict { outcome: Outcome::Unsafe, reason, ..verdict }
+                Verdict { outcome: Outcome::Unsafe, reason, stuck: Vec::new(), ..verdict }
             }
         });
     }

@@ -258,10 +258,9 @@ impl World {
     /// digest of the tick that ended last. `stats` are the merged link counters of all drones. `wall_s` is the wall time
     /// from the opening of the first tick to the end of the last one, s. A mission that has not ended is aborted.
     pub fn finish(&mut self, stats: &LinkStats, wall_s: f64) {
-        let Verdict { outcome, reason, unfinished, standstill_s } = self.judge.abort("the mission was stopped");
+        let Verdict { outcome, reason, stuck, unfinished, standstill_s } = self.judge.abort("the mission was stopped");
         let parts = matches!(self.params.parts, PartsRule::Each { .. }).then(|| self.parts.count() as u32);
         let totals = Box::new(Totals { parts, ..self.counters.close(stats, self.params.dt_s(), wall_s) });
-        let stuck = if outcome == Outcome::Stuck { self.params.without_way.clone() } else { Vec::new() };
         self.log.push(self.now(), EventKind::End { outcome, reason, stuck, unfinished, standstill_s, totals });
         self.log.end_tick();
         self.record.close_mission(self.digest(), self.log.ended().len());

@@ -22,6 +22,7 @@ fn separations(me: u32, incarnation: u32) -> Separations {
         start_velocity: Vec2::zeros(),
         reaction_time_s: 0.0,
         keep_m: FILTER.keep_m(),
+        radio_range_m: f64::INFINITY,
         braking_mps2: FILTER.braking_mps2,
         period_s: 0.1,
         dt_s: FILTER.dt_s,
@@ -232,4 +233,26 @@ fn of_two_drones_that_block_each_other_the_one_with_the_lower_id_has_the_room_be
         lines.map(|line| here.distance_m(&line.line, side) - FILTER.keep_m() / 2.0).fold(f64::INFINITY, f64::min)
     });
     assert!((room_m[0] - (40.0 - FILTER.keep_m())).abs() < 0.01 && room_m[1].abs() < 0.01, "{room_m:?}");
+}
+
+#[test]
+fn a_drone_gives_a_lost_one_no_more_room_than_up_to_where_the_two_hear_each_other() {
+    let edge_m = |radio_range_m: f64, silent_s: f64| {
+        let params = SeparationParams { radio_range_m, ..separations(0, 1).params };
+        let mut leader = Separations::new(params, SimTime::ZERO);
+        let mut peers = Peers::new(3, 2.0);
+        let heard = SimTime::from_secs(1.0);
+        peers.hear(heard, DroneId(1), pose(heard, Vec2::new(-60.0, 0.0), Vec2::zeros()));
+        let tick = ((1.0 + silent_s) / FILTER.dt_s).round() as u64;
+        leader.speak(&peers, &path(tick, Vec2::new(700.0, 0.0), Vec2::zeros()), &mut Vec::new());
+        let (line, _) = leader.lines().next().unwrap();
+        line.normal().x * line.stop_m() + FILTER.keep_m() / 2.0
+    };
+    let middle_m = 320.0 + FILTER.keep_m() / 2.0;
+    for (range_m, silent_s, wanted_m) in
+        [(200.0, 1.0, middle_m), (f64::INFINITY, 4.0, middle_m), (200.0, 4.0, -60.0 + 0.75 * 200.0)]
+    {
+        let edge_m = edge_m(range_m, silent_s);
+        assert!((edge_m - wanted_m).abs() < 1e-3, "range {range_m} m, silent for {silent_s} s: {edge_m} m");
+    }
 }

@@ -53,6 +53,7 @@ impl Crowd {
             start_velocity: Vec2::zeros(),
             reaction_time_s: 0.0,
             keep_m: self.params.keep_m(),
+            radio_range_m: f64::INFINITY,
             braking_mps2: self.params.braking_mps2,
             period_s: BEACON_S,
             dt_s: self.params.dt_s,

@@ -182,6 +182,7 @@ impl Talk {
             start_velocity: self.start_velocity,
             reaction_time_s: crowd.reaction_time_s(),
             keep_m: crowd.params.keep_m() + 2.0 * self.errors.allowed.position_m,
+            radio_range_m: f64::INFINITY,
             braking_mps2: crowd.params.braking_mps2,
             period_s: BEACON_S,
             dt_s: crowd.params.dt_s,

@@ -73,6 +73,7 @@ impl Antipodal {
             start_velocity: Vec2::new(drone.speed_mps, 0.0),
             reaction_time_s: 0.0,
             keep_m: filter.params().keep_m(),
+            radio_range_m: scenario.radio().beacon_range_m(),
             braking_mps2: scenario.braking_mps2(),
             period_s: scenario.separation_period_s(messages(starts.len())),
             dt_s: birth.dt_s,

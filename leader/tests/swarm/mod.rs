@@ -73,7 +73,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             course_y_m: 0.0,
             destination: Destination::Hold { stop_x_m: f64::INFINITY },
             between: Between::CloseUp,
-            limited_range: false,
+            radio_range_m: f64::INFINITY,
             debounce_s: p.debounce_s,
         },
         beacon_period_s: p.beacon_s,

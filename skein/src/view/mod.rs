@@ -82,7 +82,7 @@ pub(crate) fn view(args: &ViewArgs) -> Result<Exit, Failure> {
 }
 
 fn recorded(path: &std::path::Path) -> Result<String, Failure> {
-    let folder = run_folder::open(path)?;
+    let folder = run_folder::open_recorded(path)?;
     let manifest = folder.read_manifest().map_err(Failure::report)?;
     let summary = folder.read_summary().map_err(Failure::report)?;
     page::report(&folder, &manifest, &summary, &Interrupted::never()).map_err(Failure::report)

@@ -94,6 +94,6 @@ fn a_mission_without_living_drones_is_never_a_success() {
         let mut world = world(end);
         (0..8).for_each(|id| world.mark_dead(DroneId(id), FaultKind::Kill, false, ""));
         tick(&mut world, &Slot { flags: SLOT_DONE, ..Slot::default() });
-        assert_eq!(world.ended(), Some(Outcome::Timeout));
+        assert_eq!(world.ended(), Some(Outcome::Stuck));
     }
 }

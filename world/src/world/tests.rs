@@ -223,10 +223,10 @@ fn without_living_drones_the_mission_is_over() {
         world.mark_dead(DroneId(id), FaultKind::Kill, false, "exit 1");
     }
     world.advance();
-    assert_eq!(world.ended(), Some(Outcome::Timeout));
+    assert_eq!(world.ended(), Some(Outcome::Stuck));
     world.finish(&LinkStats::default(), 0.0);
-    let Some(EventKind::End { reason, .. }) = event_kinds(events(&world)).pop() else { panic!("no end") };
-    assert_eq!(reason, "no drone is left alive");
+    let Some(EventKind::End { reason, stuck, .. }) = event_kinds(events(&world)).pop() else { panic!("no end") };
+    assert_eq!((reason.as_str(), stuck.len()), ("no drone is left alive", 8));
 }
 
 #[test]

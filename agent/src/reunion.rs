@@ -1,0 +1,280 @@
+//! Return of a drone that waits in vain for others that it has lost: where radios do not reach far, it flies back to where it heard them
+//! last. Drones that keep apart by words cannot go on past each other's lines until they hear each other again (docs/safety.md). Drones that
+//! range each other can, but parts of a swarm that settled out of each other's reach would stay apart.
+
+use crate::tuning::{IN_REACH, LEAD_FOUND_S, LOOK_FOR_LOST_S, LOST_PACE};
+use skein_leader::beacons::Beacon;
+use skein_leader::params::PlannerParams;
+use skein_leader::peers::Peers;
+use skein_protocol::downlink::Senses;
+use skein_protocol::{DroneId, SimTime, Vec2};
+use std::cmp::Reverse;
+
+/// The patience is doubled at most this many times.
+const MOST_DOUBLINGS: u32 = 2;
+/// By words, a drone waits where it looks for a lost one for this many times its patience. So it is there when the lost one comes, which
+/// looks for it after the same time.
+const WAITS: f64 = 2.0;
+/// By ranging, a drone waits there for this long, s: it would range the lost one.
+const LOOK_S: f64 = 10.0;
+/// By ranging, a drone has this many times the patience: the others can go on.
+const RANGING_PATIENCE: f64 = 3.0;
+/// A flight back may take this many times as long as a straight flight would.
+const DETOUR_FACTOR: f64 = 3.0;
+
+/// The other drones.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Others<'a> {
+    /// This drone.
+    pub(crate) me: DroneId,
+    /// What it has heard of the others.
+    pub(crate) peers: &'a Peers,
+    /// Where each drone started, by id, world frame, m; none if a drone does not know that.
+    pub(crate) starts_m: &'a [Vec2],
+    /// Deceleration of full braking, m/s².
+    pub(crate) braking_mps2: f64,
+    /// Whether it keeps apart from them by words.
+    pub(crate) by_words: bool,
+}
+
+impl Others<'_> {
+    /// The drones that are lost: neither heard nor ranged.
+    fn lost(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
+        let silent = self.peers.silent(senses.now);
+        let stop = |pose: &Beacon<'_>| {
+            pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2))
+        };
+        let heard = silent.map(move |(drone, pose)| Lost { drone, since: pose.stamp(), place: stop(&pose) });
+        let started = (0..).map(DroneId).zip(self.starts_m).filter(|(drone, _)| *drone != self.me);
+        let unheard = started.filter(|(drone, _)| self.peers.last(*drone).is_none());
+        let unheard = unheard.map(|(drone, &place)| Lost { drone, since: SimTime::ZERO, place });
+        heard.chain(unheard).filter(|lost| !senses.neighbours.iter().any(|seen| seen.drone == lost.drone))
+    }
+}
+
+/// A lost drone.
+#[derive(Clone, Copy, Debug)]
+struct Lost {
+    drone: DroneId,
+    /// When it was heard last.
+    since: SimTime,
+    /// Where it would have stopped then, world frame, m.
+    place: Vec2,
+}
+
+/// Looks for lost drones.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reunion {
+    /// Nominal speed, m/s.
+    speed_mps: f64,
+    /// Distance over which drones hear each other, m; infinite without a limit. Then none is lost.
+    range_m: f64,
+    /// How long the drone waits in one place before it looks for a lost one for the first time, s.
+    patience_s: f64,
+    task: Task,
+    /// Number of flights that found no drone since the last that did.
+    failed: u32,
+}
+
+/// What a drone does about lost ones.
+#[derive(Clone, Copy, Debug)]
+enum Task {
+    /// Nothing: the drone goes its own way. Where it has been since when, world frame, m.
+    Own { stay: Option<(SimTime, Vec2)> },
+    /// It flies to where a lost drone was heard last, world frame, m.
+    Look { lost: DroneId, place: Vec2, until: SimTime },
+    /// It goes its own way no faster than the drone that it has found.
+    Lead { found: DroneId, until: SimTime },
+}
+
+impl Reunion {
+    /// That of one drone in a swarm of `drones`.
+    pub(crate) fn new(drones: u32, planner: &PlannerParams) -> Self {
+        // If all drones wait one behind another, the last one has passed.
+        let file_s = f64::from(drones) * planner.headway_s;
+        Self {
+            speed_mps: planner.speed_mps,
+            range_m: planner.radio_range_m,
+            patience_s: LOOK_FOR_LOST_S + file_s,
+            task: Task::Own { stay: None },
+            failed: 0,
+        }
+    }
+
+    /// The place to fly back to, world frame, m. `None` while the drone goes its own way.
+    pub(crate) fn place(&mut self, senses: &Senses<'_>, others: &Others<'_>) -> Option<Vec2> {
+        if self.range_m.is_infinite() {
+            return None;
+        }
+        let (now, position) = (senses.now, senses.position());
+        match self.task {
+            Task::Own { stay } => self.wait(senses, others, stay),
+            Task::Look { lost, place, until } => {
+                let mut all = others.lost(senses);
+                if all.all(|one| one.drone != lost) {
+                    (self.task, self.failed) = (Task::Lead { found: lost, until: now.after(LEAD_FOUND_S) }, 0);
+                } else if now < until {
+                    return Some(place);
+                } else {
+                    (self.task, self.failed) = (Task::Own { stay: None }, self.failed + 1);
+                }
+                None
+            }
+            Task::Lead { found, until } => {
+                if let Some(lost) = others.lost(senses).find(|lost| lost.drone == found) {
+                    return Some(self.look_for(&lost, now, position, others.by_words));
+                }
+                if now >= until {
+                    self.task = Task::Own { stay: None };
+                }
+                let place = others.peers.last_of_living(found, now)?.extrapolated(now);
+                Some(place).filter(|place| (place - position).norm() > IN_REACH * self.range_m)
+            }
+        }
+    }
+
+    /// Waits for a while in one place before it looks for a lost drone: the one heard last first, and another one each time.
+    fn wait(&mut self, senses: &Senses<'_>, others: &Others<'_>, stay: Option<(SimTime, Vec2)>) -> Option<Vec2> {
+        let (now, position) = (senses.now, senses.position());
+        let near_m = LOST_PACE * self.speed_mps * LOOK_FOR_LOST_S;
+        let stay = stay.filter(|(_, place)| (position - place).norm() <= near_m).unwrap_or((now, position));
+        self.task = Task::Own { stay: Some(stay) };
+        if now.since(stay.0) < self.patience_s(others.by_words) {
+            return None;
+        }
+        let mut lost: Vec<Lost> = others.lost(senses).collect();
+        lost.sort_by_key(|lost| (Reverse(lost.since), lost.drone));
+        let next = lost.get(self.failed as usize % lost.len().max(1));
+        if next.is_none() {
+            self.task = Task::Own { stay: None };
+        }
+        next.map(|next| self.look_for(next, now, position, others.by_words))
+    }
+
+    /// Waits no longer: the drone is in a queue that moves without word from others.
+    pub(crate) fn rest(&mut self) {
+        self.task = Task::Own { stay: None };
+    }
+
+    /// How long the drone waits in one place before it looks for a lost one, s.
+    fn patience_s(&self, by_words: bool) -> f64 {
+        let times = if by_words { 1.0 } else { RANGING_PATIENCE };
+        times * self.patience_s * f64::from(1 << self.failed.min(MOST_DOUBLINGS))
+    }
+
+    /// Begins to fly to where a lost drone may be.
+    fn look_for(&mut self, lost: &Lost, now: SimTime, position: Vec2, by_words: bool) -> Vec2 {
+        let flight_s = DETOUR_FACTOR * (lost.place - position).norm() / self.speed_mps;
+        let look_s = if by_words { WAITS * self.patience_s(true) } else { LOOK_S };
+        self.task = Task::Look { lost: lost.drone, place: lost.place, until: now.after(flight_s + look_s) };
+        lost.place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use skein_protocol::payload::Pose;
+
+    const RANGE_M: f64 = 100.0;
+
+    /// Drone 1 of two.
+    struct Searcher {
+        reunion: Reunion,
+        peers: Peers,
+        starts_m: Vec<Vec2>,
+        by_words: bool,
+    }
+
+    impl Searcher {
+        fn new(radio_range_m: f64) -> Self {
+            let planner = PlannerParams { radio_range_m, ..crate::test_params::planner() };
+            Self { reunion: Reunion::new(2, &planner), peers: Peers::new(2, 1.0), starts_m: Vec::new(), by_words: true }
+        }
+
+        /// Hears drone 0 at this abscissa, m, at this speed, m/s.
+        fn hear(&mut self, now_s: f64, x_m: f64, speed_mps: f64) {
+            let now = SimTime::from_secs(now_s);
+            let (position_m, velocity_mps) = ([x_m, 0.0, 0.0], [speed_mps, 0.0, 0.0]);
+            self.peers.hear(now, DroneId(0), Pose { stamp: now, position_m, velocity_mps, ..Pose::zeroed() });
+        }
+
+        /// Where it looks for drone 0, if it is at this abscissa, m.
+        fn looks_at(&mut self, now_s: f64, x_m: f64) -> Option<f64> {
+            let at = ([x_m, 0.0, 0.0], [0.0; 3]);
+            let senses = Senses::new((0, SimTime::from_secs(now_s)), at, &[], &[], &[]);
+            let others = Others {
+                me: DroneId(1),
+                peers: &self.peers,
+                starts_m: &self.starts_m,
+                braking_mps2: 5.0,
+                by_words: self.by_words,
+            };
+            self.reunion.place(&senses, &others).map(|place| place.x)
+        }
+    }
+
+    /// The times from 1 s to 59 s at which a drone at these places looks for the other one, which it heard last at 0 s.
+    fn times(range_m: f64, place: impl Fn(f64) -> f64) -> Vec<u32> {
+        let mut searcher = Searcher::new(range_m);
+        searcher.hear(0.0, -50.0, 0.0);
+        (1..60).filter(|&second| searcher.looks_at(second.into(), place(second.into())).is_some()).collect()
+    }
+
+    #[test]
+    fn a_drone_that_waits_flies_to_where_it_heard_a_lost_one_last() {
+        // It waits for 30 s and a headway of 4 s for each drone.
+        assert_eq!(times(RANGE_M, |_| 0.0), (39..60).collect::<Vec<_>>());
+        assert_eq!(times(f64::INFINITY, |_| 0.0), [0; 0], "all drones hear each other");
+        assert_eq!(times(RANGE_M, |second| 5.0 * second), [0; 0], "it is on its way");
+    }
+
+    #[test]
+    fn a_drone_looks_where_the_lost_one_would_have_stopped_or_where_it_started() {
+        let mut searcher = Searcher::new(RANGE_M);
+        searcher.hear(0.0, -50.0, 10.0);
+        assert_eq!(searcher.looks_at(1.0, 0.0), None);
+        assert_eq!(searcher.looks_at(40.0, 0.0), Some(-40.0));
+        let mut searcher = Searcher { starts_m: vec![Vec2::new(-70.0, 0.0), Vec2::zeros()], ..Searcher::new(RANGE_M) };
+        assert_eq!(searcher.looks_at(1.0, 0.0), None);
+        assert_eq!(searcher.looks_at(40.0, 0.0), Some(-70.0));
+    }
+
+    #[test]
+    fn a_drone_that_found_a_lost_one_stays_in_its_reach() {
+        let mut searcher = Searcher::new(RANGE_M);
+        searcher.hear(0.0, -50.0, 0.0);
+        searcher.looks_at(1.0, 0.0);
+        assert_eq!(searcher.looks_at(40.0, 0.0), Some(-50.0));
+        searcher.hear(41.0, -60.0, 0.0);
+        assert_eq!(searcher.looks_at(41.0, 0.0), None);
+        assert_eq!(searcher.looks_at(41.1, 0.0), None, "60 m away");
+        assert_eq!(searcher.looks_at(41.2, 20.0), Some(-60.0), "80 m away");
+        assert_eq!(searcher.looks_at(45.0, 0.0), Some(-60.0), "it is lost again");
+    }
+
+    #[test]
+    fn a_drone_that_finds_nobody_waits_longer_than_the_other_one_before_it_gives_up() {
+        let mut searcher = Searcher::new(RANGE_M);
+        searcher.hear(0.0, -50.0, 0.0);
+        let looks: Vec<bool> = (1..400).map(|second| searcher.looks_at(second.into(), 0.0).is_some()).collect();
+        let stretches: Vec<(bool, usize)> = looks.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).collect();
+        assert_eq!(stretches, [(false, 38), (true, 91), (false, 77), (true, 167), (false, 26)]);
+    }
+
+    #[test]
+    fn a_drone_that_ranges_has_more_patience_and_looks_once() {
+        let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
+        searcher.hear(0.0, -50.0, 0.0);
+        let looks: Vec<i32> = (1..200).filter(|&second| searcher.looks_at(second.into(), 0.0).is_some()).collect();
+        assert_eq!(looks, (115..140).collect::<Vec<_>>());
+        let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
+        searcher.hear(0.0, -50.0, 0.0);
+        let queues = (1..200).filter(|&second| {
+            searcher.reunion.rest();
+            searcher.looks_at(second.into(), 0.0).is_some()
+        });
+        assert_eq!(queues.count(), 0);
+    }
+}
