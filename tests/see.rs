@@ -44,6 +44,7 @@ fn a_running_swarm_shows_in_the_terminal() {
     let topics = "pilot.0={ name = \"paper\", topics = [\"gossip\"] }";
     let mut flight = place.take_off("s2-right", &["--clock", "realtime:8", "--set", topics]);
     flight.wait_until(0.5);
+    let to_the_end = ["air", "record"].map(|topic| place.start(&["topic", "hz", topic]));
     let list = place.run(&["topic", "list"]);
     let listed: Vec<Value> = list.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let names: Vec<&str> = listed.iter().map(|line| line["topic"].as_str().unwrap()).collect();
@@ -64,6 +65,10 @@ fn a_running_swarm_shows_in_the_terminal() {
     assert_eq!((members.count(), swarm["rows"].as_array().map(Vec::len)), (8, Some(8)), "{top}");
     assert!(place.run(&["top"]).stderr.contains("not a terminal"));
     flight.finish();
+    for observer in to_the_end {
+        let done = observer.finish();
+        assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{done:?}");
+    }
 }
 
 #[test]

@@ -132,7 +132,10 @@ impl Services {
     /// As [`Services::open`]; [`BusError::Folder`] if the run has ended.
     pub fn visit(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
         let _held = hold(domain.path())?;
-        Ok(Self { visited: Some(domain.path().to_owned()), ..Self::open(domain, drones, name)? })
+        let opened = Self::open(domain, drones, name)?;
+        // An observer that outlives the run closes ports whose files are gone. iceoryx2 would warn of each.
+        set_log_level_from_env_or(LogLevel::Error);
+        Ok(Self { visited: Some(domain.path().to_owned()), ..opened })
     }
 
     /// Reserves all memory that the services have now. Call it before the first tick, when all ports are made: from then on,

@@ -257,6 +257,7 @@ fn scenarios(written: OneOrMany, folder: &Path) -> Result<Vec<Mission>, Problem>
         let expected = "a scenario file, \"random\" or \"wide\"";
         return Err(Problem::EmptyList { key: "scenario".to_owned(), expected });
     }
+    unique("scenario", &names)?;
     let mission = |name: &String| {
         if name == "random" {
             return Ok(Mission::Random);
@@ -459,6 +460,8 @@ mod tests {
         assert!(absent.contains("e.toml:1:12: scenario: no/such.toml"), "{absent}");
         assert!(parse("scenario = \"random\"\nseeds = 0").unwrap_err().contains("expected 1 to"));
         assert!(parse("scenario = \"random\"\nseeds = [1, 1]").unwrap_err().contains("twice"));
+        let twice = parse("scenario = [\"random\", \"wide\", \"random\"]\nseeds = 1").unwrap_err();
+        assert!(twice.contains("e.toml:1:12: scenario: \"random\" is there twice"), "{twice}");
     }
 
     #[test]

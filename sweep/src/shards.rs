@@ -81,7 +81,7 @@ impl Shards {
             store.keep(row)?;
         }
         let report = SweepReport::new(grid, rows);
-        write(store.folder(), &report, parquet)?;
+        write(&store, &report, parquet)?;
         Ok(report)
     }
 }

@@ -116,6 +116,16 @@ impl Store {
         Ok(self.folder.write(MISSIONS, &serde_json::to_vec_pretty(missions)?)?)
     }
 
+    /// Replaces the rows by those of the complete sweep in the order of the runs, whichever were done first.
+    pub(crate) fn arrange(&self, rows: &[Row]) -> Result<(), SweepError> {
+        let mut lines = Vec::new();
+        for row in rows {
+            serde_json::to_writer(&mut lines, row)?;
+            lines.push(b'\n');
+        }
+        Ok(self.folder.write(ROWS, &lines)?)
+    }
+
     /// Appends a row. When this returns, the line is in the file even if the process is killed right after.
     pub(crate) fn keep(&mut self, row: &Row) -> Result<(), SweepError> {
         let mut line = serde_json::to_vec(row)?;
@@ -209,6 +219,17 @@ mod tests {
         drop(store);
         let (_, rows) = Store::open(&folder, &identity("1")).unwrap();
         assert_eq!(rows, [row(2), row(0), row(1)], "a row that is kept after a torn line has a line of its own");
+    }
+
+    #[test]
+    fn the_rows_of_a_complete_sweep_are_in_the_order_of_their_runs() {
+        let root = tempfile::tempdir().unwrap();
+        let (mut store, _) = Store::open(root.path(), &identity("1")).unwrap();
+        [2, 0, 1].into_iter().for_each(|job| store.keep(&row(job)).unwrap());
+        store.arrange(&[row(0), row(1), row(2)]).unwrap();
+        drop(store);
+        let (_, rows) = Store::open(root.path(), &identity("1")).unwrap();
+        assert_eq!(rows, [row(0), row(1), row(2)]);
     }
 
     #[test]

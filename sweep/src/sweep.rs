@@ -12,7 +12,6 @@ use crate::store::{Identity, Store};
 use crate::worker_pool::WorkerPool;
 use skein_bus::{PinMode, pin_to_core};
 use skein_protocol::digest::Digest;
-use skein_report::WorkFolder;
 use skein_runtime::PilotRegistry;
 use std::path::Path;
 
@@ -130,7 +129,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
         ended?;
         let end = self.end(rows)?;
         if let SweepEnd::Complete(report) = &end {
-            write(store.folder(), report, self.parquet)?;
+            write(&store, report, self.parquet)?;
         }
         Ok(end)
     }
@@ -226,7 +225,9 @@ pub(crate) fn identity(grid: &Grid<'_>) -> Identity {
 }
 
 /// Writes the results of a complete sweep into its folder.
-pub(crate) fn write(folder: &WorkFolder, report: &SweepReport<'_>, parquet: bool) -> Result<(), SweepError> {
+pub(crate) fn write(store: &Store, report: &SweepReport<'_>, parquet: bool) -> Result<(), SweepError> {
+    store.arrange(report.rows())?;
+    let folder = store.folder();
     folder.write("runs.csv", &report.csv())?;
     folder.write("summary.json", &serde_json::to_vec_pretty(&report.summary())?)?;
     let plots = folder.subfolder("plots")?;
