@@ -35,6 +35,8 @@ pub(crate) struct LoneFlight {
     last_x_m: f64,
     /// Abscissa up to which it stays in reach of the nearest other drone, world frame, m; infinite if all drones hear each other.
     reached_x_m: f64,
+    /// The ordinate along which it flies, world frame, m, and when it last did.
+    lane: Option<(f64, SimTime)>,
 }
 
 impl LoneFlight {
@@ -53,7 +55,16 @@ impl LoneFlight {
             next_look: SimTime::ZERO,
             last_x_m: f64::INFINITY,
             reached_x_m: f64::INFINITY,
+            lane: None,
         }
+    }
+
+    /// The direction of flight of a drone that keeps apart by words: along the ordinate at which it began. A drone that only flew ahead would
+    /// slide along the line of another one, farther and farther away. `ahead_m`: how far ahead it comes back to that ordinate, m.
+    pub(crate) fn direction(&mut self, now: SimTime, position: Vec2, ahead_m: f64) -> Vec2 {
+        let known = self.lane.filter(|(_, last)| now.since(*last) <= LOOK_S);
+        let (y_m, _) = *self.lane.insert((known.map_or(position.y, |(y_m, _)| y_m), now));
+        Vec2::new(ahead_m, y_m - position.y).try_normalize(1e-9).unwrap_or(Vec2::x())
     }
 
     /// The speed along the course, m/s. It falls to zero where the drone has to wait. `passed_x_m`: exit of the obstacle set that it left
@@ -120,6 +131,15 @@ mod tests {
         peers.hear(now, DroneId(0), Pose { stamp: now, ..Pose::zeroed() });
         assert_eq!(speed_mps(&mut flight, now, 50.0, &peers, None), 10.0);
         assert_eq!(speed_mps(&mut flight, now, 9e3, &peers, None), 0.0);
+    }
+
+    #[test]
+    fn a_drone_that_is_pushed_aside_comes_back() {
+        let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
+        let mut direction = |now_s, y_m| flight.direction(SimTime::from_secs(now_s), Vec2::new(20.0, y_m), 40.0);
+        assert_eq!(direction(5.0, 7.0), Vec2::x());
+        assert_eq!(direction(5.5, 37.0), Vec2::new(0.8, -0.6));
+        assert_eq!(direction(9.0, 37.0), Vec2::x(), "it has done something else in between");
     }
 
     #[test]

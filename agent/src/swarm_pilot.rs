@@ -290,7 +290,14 @@ impl SwarmPilot {
                 let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
                 let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
                 let flight = &mut self.lone_flight;
-                Vec2::new(flight.speed_mps(senses.now, position, passed_x_m, &others, &guidance), 0.0)
+                let speed_mps = flight.speed_mps(senses.now, position, passed_x_m, &others, &guidance);
+                let by_words = self.separations.is_some();
+                let ahead_m = self.params.planner.spacing_m;
+                if by_words {
+                    flight.direction(senses.now, position, ahead_m) * speed_mps
+                } else {
+                    Vec2::new(speed_mps, 0.0)
+                }
             }
         }
     }
