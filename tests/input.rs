@@ -354,4 +354,41 @@ fn without_a_record_only_the_summary_is_written() {
     std::fs::write(place.join("short.toml"), SHORT).unwrap();
     place.run(&["run", "short.toml", "--no-record", "--quiet", "--out", "out"]);
     assert_eq!(names(place.join("out")), ["manifest.json", "processes.json", "summary.json"]);
+    for command in ["report", "view"] {
+        let done = place.run(&[command, "out"]);
+        assert_eq!(done.code, Some(2), "{done:?}");
+        assert!(
+            done.stderr.contains("out: has no trace.csv; expected a run that was flown without --no-record"),
+            "{done:?}"
+        );
+    }
+    let hunt = place.run(&["hunt", "short.toml", "--flights", "1", "--out", "out"]);
+    assert!(hunt.code == Some(2) && hunt.stderr.contains("out: exists"), "{hunt:?}");
+    let manifest = std::fs::read_to_string(place.join("out/manifest.json")).unwrap();
+    assert_eq!(read_json(place.join("out/manifest.json"))["facts"]["end"], "hold");
+    let broken = manifest.replacen("\"spacing_m\": 60.0", "\"spacing_m\": -60.0", 1);
+    assert_ne!(broken, manifest);
+    std::fs::write(place.join("out/manifest.json"), broken).unwrap();
+    let replay = place.run(&["replay", "out"]);
+    assert_eq!(replay.code, Some(2), "{replay:?}");
+    assert!(replay.stderr.contains("out/manifest.json") && replay.stderr.contains("formation.spacing_m"), "{replay:?}");
+}
+
+#[test]
+fn a_pilots_program_that_is_not_there_is_refused() {
+    let pilot = "[[pilot]]\ncommand = [\"no-such-program\", \"x\"]\n";
+    refused(format!("{SHORT}{pilot}").as_bytes(), &["bad.toml:8:11: pilot.0.command: \"no-such-program\"", "expected"]);
+}
+
+#[test]
+fn a_process_that_is_killed_before_the_first_tick_leaves_a_summary() {
+    let place = Place::new();
+    let pilot = "[[pilot]]\ncommand = [\"sh\", \"-c\", \"kill -9 $$\"]\n";
+    std::fs::write(place.join("killed.toml"), format!("{SHORT}{pilot}")).unwrap();
+    let done = place.run(&["run", "killed.toml", "--json", "--out", "out"]);
+    assert_eq!(done.code, Some(3), "{done:?}");
+    assert_eq!((&done.summary()["outcome"], &done.summary()["ticks"]), (&json!("aborted"), &json!(0)));
+    assert_eq!(read_json(place.join("out/summary.json"))["outcome"], "aborted");
+    let nowhere = place.run(&["reproduce", "--quick", "--out", "/proc/paper"]);
+    assert_eq!(nowhere.code, Some(3), "{nowhere:?}");
 }

@@ -43,7 +43,7 @@ impl LoneFlight {
     /// The flight of one drone in a swarm of `drones`.
     pub(crate) fn new(drones: u32, planner: &PlannerParams) -> Self {
         // If all drones wait one behind another, the last one still has left the goal.
-        let file_s = f64::from(drones) * planner.headway_s;
+        let file_s = planner.file_s(drones);
         let goal_x_m = match planner.destination {
             Destination::Goal { front_m } => front_m.x,
             Destination::Hold { .. } => f64::INFINITY,

@@ -41,10 +41,8 @@ impl Others<'_> {
     /// The drones that are lost: neither heard nor ranged.
     fn lost(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
         let silent = self.peers.silent(senses.now);
-        let stop = |pose: &Beacon<'_>| {
-            pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2))
-        };
-        let heard = silent.map(move |(drone, pose)| Lost { drone, since: pose.stamp(), place: stop(&pose) });
+        let stopped = move |pose: Beacon<'_>| pose.stopped(self.braking_mps2);
+        let heard = silent.map(move |(drone, pose)| Lost { drone, since: pose.stamp(), place: stopped(pose) });
         let started = (0..).map(DroneId).zip(self.starts_m).filter(|(drone, _)| *drone != self.me);
         let unheard = started.filter(|(drone, _)| self.peers.last(*drone).is_none());
         let unheard = unheard.map(|(drone, &place)| Lost { drone, since: SimTime::ZERO, place });
@@ -90,12 +88,11 @@ enum Task {
 impl Reunion {
     /// That of one drone in a swarm of `drones`.
     pub(crate) fn new(drones: u32, planner: &PlannerParams) -> Self {
-        // If all drones wait one behind another, the last one has passed.
-        let file_s = f64::from(drones) * planner.headway_s;
         Self {
             speed_mps: planner.speed_mps,
             range_m: planner.radio_range_m,
-            patience_s: LOOK_FOR_LOST_S + file_s,
+            // If all drones wait one behind another, the last one has passed.
+            patience_s: LOOK_FOR_LOST_S + planner.file_s(drones),
             task: Task::Own { stay: None },
             failed: 0,
         }

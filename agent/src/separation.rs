@@ -380,11 +380,15 @@ fn message(separators: &[Separator]) -> Message {
 struct Stop {
     at: Vec2,
     velocity: Vec2,
-    /// Where the drone would have stopped when it was heard last.
-    heard: Vec2,
-    /// How far from there it is given room, m. If a lost drone had room farther away, the two might wait on their sides of the line without
-    /// hearing each other, and the room would be lost to both.
-    reach_m: f64,
+}
+
+/// Another drone, as far as this drone knows.
+#[derive(Clone, Copy, Debug)]
+struct Other {
+    stop: Stop,
+    /// Where it would have stopped when it was heard last, m, if it is lost. It is given room within reach of that place only. Farther away, the
+    /// two might wait on their sides of the line without hearing each other, and the room would be lost to both.
+    lost_at: Option<Vec2>,
 }
 
 /// The side of drone `me` of its lines with another one.
@@ -443,10 +447,11 @@ impl SeparationParams {
         let now = path.now();
         let age_s = now.since(pose.stamp).max(0.0);
         let late_s = age_s.max(delay_s);
-        let reach_m = if lost { IN_REACH * self.radio_range_m } else { f64::INFINITY };
-        let peer = Stop { reach_m, ..self.peer_stop(known, pose, age_s) };
-        let own = Stop { at: path.end(), velocity: path.velocity(), heard: path.end(), reach_m: f64::INFINITY };
-        let Some(towards_me) = (own.at - peer.at).try_normalize(1e-9) else { return };
+        let stopped = pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2));
+        let stop = self.peer_stop(known, stopped, pose.velocity(), age_s);
+        let peer = Other { stop, lost_at: lost.then_some(stopped) };
+        let own = Stop { at: path.end(), velocity: path.velocity() };
+        let Some(towards_me) = (own.at - stop.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
             let first = if known.opens { self.line(None, known.pair.side(), &own, &peer, late_s, path) } else { None };
             if first.is_some_and(|line| known.pair.open(line)) {
@@ -455,7 +460,7 @@ impl SeparationParams {
             return;
         };
         let side = known.pair.side();
-        let along_mps = towards_me.dot(&(own.velocity + peer.velocity)) / 2.0;
+        let along_mps = towards_me.dot(&(own.velocity + stop.velocity)) / 2.0;
         let abreast_mps = self.scale().speed(ABREAST_MPS);
         let ahead = along_mps > abreast_mps || (along_mps >= -abreast_mps && side == Side::Front);
         let patience_s = PATIENCE_S + PATIENCE_ROUND_TRIPS * 2.0 * late_s + self.period_s;
@@ -470,11 +475,9 @@ impl SeparationParams {
         }
     }
 
-    /// Where the other drone would stop now. It is taken to have flown on since its beacon, as far as the line allows that it
-    /// stated last.
-    fn peer_stop(&self, known: &Known, pose: &Pose, age_s: f64) -> Stop {
-        let velocity = pose.velocity();
-        let at = pose.position() + velocity * (velocity.norm() / (2.0 * self.braking_mps2));
+    /// Where the other drone would stop now. It is taken to have flown on since its beacon, by which it would have stopped `at` this place, as
+    /// far as the line allows that it stated last.
+    fn peer_stop(&self, known: &Known, at: Vec2, velocity: Vec2, age_s: f64) -> Stop {
         let mut flown_s = age_s;
         if let Some(NumberedLine { line, .. }) = known.heard.or(known.pair.statement().map(|said| said.bound_to)) {
             let side = known.pair.side().opposite().sign();
@@ -484,7 +487,7 @@ impl SeparationParams {
                 flown_s = flown_s.min((room_m / closing_mps).max(0.0));
             }
         }
-        Stop { at: at + velocity * flown_s, velocity, heard: at, reach_m: f64::INFINITY }
+        Stop { at: at + velocity * flown_s, velocity }
     }
 
     /// The best line between this drone and another one, to which this drone's path keeps; `None` if there is none. When the
@@ -495,11 +498,11 @@ impl SeparationParams {
         present: Option<&SeparatingLine>,
         side: Side,
         own: &Stop,
-        peer: &Stop,
+        other: &Other,
         late_s: f64,
         path: &OwnPath,
     ) -> Option<SeparatingLine> {
-        let now = path.now();
+        let (now, peer) = (path.now(), &other.stop);
         let half_m = self.keep_m / 2.0;
         let wanted = (own.at - peer.at).try_normalize(1e-9)? * side.sign();
         let keeps =
@@ -524,7 +527,8 @@ impl SeparationParams {
             (true, Side::Back) => own_m - half_m,
         };
         let present_m = present.filter(keeps).map_or(f64::NEG_INFINITY, |line| side.sign() * line.stop_m());
-        let room_m = n.dot(&peer.heard) + peer.reach_m - half_m;
+        let reach_m = |at: Vec2| n.dot(&at) + IN_REACH * self.radio_range_m - half_m;
+        let room_m = other.lost_at.map_or(f64::INFINITY, reach_m);
         let stop_m = aimed_m.max(peer_needs_m).min(room_m.max(present_m)).min(own_m - half_m);
         // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.
         let speed = own.velocity.norm();

@@ -16,13 +16,11 @@ impl SilentDrones {
     /// Finds the silent drones. A ranged one is where it is ranged, whether it was ever heard or not. Another one is where
     /// it has come to rest since its last beacon, braking at `braking_mps2`.
     pub(crate) fn update(&mut self, senses: &Senses<'_>, peers: &Peers, braking_mps2: f64) {
-        let braking = 2.0 * braking_mps2;
         let ranged = senses.neighbours.iter().filter(|n| !peers.is_living(n.drone, senses.now));
         self.positions.clear();
         self.positions.extend(ranged.map(|n| senses.position() + n.position()));
         for (_, pose) in peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id)) {
-            let velocity = pose.velocity();
-            self.positions.push(pose.position() + velocity * (velocity.norm() / braking));
+            self.positions.push(pose.stopped(braking_mps2));
         }
     }
 

@@ -284,21 +284,20 @@ impl SwarmPilot {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity)
             }
-            _ => {
-                let position = senses.position();
-                let others = lone_flight::Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
-                let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
-                let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
-                let flight = &mut self.lone_flight;
-                let speed_mps = flight.speed_mps(senses.now, position, passed_x_m, &others, &guidance);
-                let by_words = self.separations.is_some();
-                let ahead_m = self.params.planner.spacing_m;
-                if by_words {
-                    flight.direction(senses.now, position, ahead_m) * speed_mps
-                } else {
-                    Vec2::new(speed_mps, 0.0)
-                }
-            }
+            _ => self.lone_velocity(senses),
+        }
+    }
+
+    /// The velocity of a drone that has nothing left to pass and no formation to join, m/s.
+    fn lone_velocity(&mut self, senses: &Senses<'_>) -> Vec2 {
+        let (now, position) = (senses.now, senses.position());
+        let others = lone_flight::Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
+        let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
+        let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
+        let speed_mps = self.lone_flight.speed_mps(now, position, passed_x_m, &others, &self.params.guidance);
+        match self.separations {
+            Some(_) => self.lone_flight.direction(now, position, self.params.planner.spacing_m) * speed_mps,
+            None => Vec2::new(speed_mps, 0.0),
         }
     }
 

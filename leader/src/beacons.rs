@@ -260,6 +260,13 @@ impl Beacon<'_> {
         self.position() + self.velocity() * now.since(self.stamp())
     }
 
+    /// Where the drone is at rest if it has braked at `braking_mps2` since this beacon, world frame, m.
+    #[must_use]
+    pub fn stopped(&self, braking_mps2: f64) -> Vec2 {
+        let velocity = self.velocity();
+        self.position() + velocity * (velocity.norm() / (2.0 * braking_mps2))
+    }
+
     /// All of it.
     #[must_use]
     pub fn pose(&self) -> Pose {

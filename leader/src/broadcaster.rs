@@ -22,7 +22,7 @@ pub(crate) struct Broadcaster {
     /// Time that one assignment takes in a leader's share of the bandwidth, s.
     part_s: f64,
     /// When each known obstacle is said again.
-    obstacles: BTreeMap<ObstacleId, Told>,
+    obstacles: BTreeMap<ObstacleId, Retelling>,
     /// How often outlines had been learnt or had grown when that was last looked at.
     outlines: usize,
     /// When the passed sets are said again.
@@ -40,13 +40,13 @@ pub(crate) struct Broadcaster {
 
 /// When an obstacle is said again.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Told {
+struct Retelling {
     gossip: Gossip,
     /// How often its outline had grown when the drone last looked.
     growths: u32,
 }
 
-impl Told {
+impl Retelling {
     /// Whether drones may not know the obstacle as it is, although a plan covers it or this drone has passed it: its outline has grown not
     /// long ago, or a drone is heard again that was out of reach and has still to pass it.
     fn is_news(&self, k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
@@ -148,7 +148,7 @@ impl Broadcaster {
                     if known.witness == me {
                         say.extend(obstacle(k.obstacles(), id));
                     }
-                    Told { gossip: Gossip::new(now, repeat_s, me), growths: known.growths }
+                    Retelling { gossip: Gossip::new(now, repeat_s, me), growths: known.growths }
                 });
                 if std::mem::replace(&mut told.growths, known.growths) != known.growths {
                     told.gossip.restart(now);
@@ -226,10 +226,13 @@ fn is_open(k: &Knowledge, id: ObstacleId) -> bool {
 
 /// Whether radios have a limited range, and a drone that this one hears still has to pass an obstacle.
 fn is_ahead_of_near(k: &Knowledge, now: SimTime, id: ObstacleId) -> bool {
+    if k.params().radio_range_m.is_infinite() {
+        return false;
+    }
     let obstacles = k.obstacles();
     let exit_x_m = obstacles.exit_x_m(&[id], k.params().routes.planning_distance_m);
     let ahead = |(peer, pose): (DroneId, Beacon<'_>)| !obstacles.is_past(peer, pose.position().x, &[id], exit_x_m);
-    k.params().radio_range_m.is_finite() && k.peers().direct(now).any(ahead)
+    k.peers().direct(now).any(ahead)
 }
 
 /// Whether an obstacle is in the plan that this drone obeys, and a neighbour may not obey that plan because it does not know

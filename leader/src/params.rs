@@ -130,6 +130,14 @@ pub struct PlannerParams {
     pub debounce_s: f64,
 }
 
+impl PlannerParams {
+    /// How long so many drones take to pass one behind another, s.
+    #[must_use]
+    pub fn file_s(&self, drones: u32) -> f64 {
+        f64::from(drones) * self.headway_s
+    }
+}
+
 /// What `Leading` needs to know before it starts.
 #[derive(Clone, Debug)]
 pub struct LeadingParams {
