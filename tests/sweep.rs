@@ -92,6 +92,18 @@ fn a_resumed_sweep_gives_the_same_files_as_an_undisturbed_one() {
     assert_eq!(names(folder.join("plots")), names(place.join("whole/plots")));
     let again = place.run(&["sweep", &file, "--out", "torn"]);
     assert_eq!((again.code, rows(&folder)), (Some(0), 24), "a complete sweep flies nothing");
+
+    // As if a process of one run had been killed from outside.
+    let all = read(&place, "torn/rows.jsonl");
+    let cut_short = all.replacen("\"outcome\":\"reached\"", "\"outcome\":\"aborted\"", 1);
+    assert_ne!(cut_short, all);
+    fs::write(folder.join("rows.jsonl"), cut_short).unwrap();
+    let again = place.run(&["sweep", &file, "--out", "torn"]);
+    assert_eq!(
+        (again.code, read(&place, "torn/rows.jsonl")),
+        (Some(0), all),
+        "a run that was cut short is flown again"
+    );
 }
 
 #[test]

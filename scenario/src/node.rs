@@ -44,12 +44,19 @@ pub(crate) struct Entry {
     pub(crate) node: Node,
 }
 
+/// The most steps of an override's path. Readers of TOML and JSON refuse what is nested deeper than 80 and 128 levels, and the manifest of
+/// a run holds this path with a value of TOML at its end.
+const MAX_STEPS: usize = 32;
+
 /// Why an override has no place in the scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub(crate) enum OverrideError {
     /// The path has an empty step.
     #[error("expected a key's path such as time.dt_s, found {0:?}")]
     Path(String),
+    /// The path has too many steps.
+    #[error("expected a key's path of at most {MAX_STEPS} steps, found {0}")]
+    Deep(usize),
     /// The index is no number, or it is behind the end of the list.
     #[error("found index {index:?}, expected a number up to {len}: {list} has {len} entries, and {len} adds one")]
     Index {
@@ -157,6 +164,10 @@ impl Node {
 
     /// The node at `path`. A node that is missing in a table, or is the next one of a list, is made.
     fn make(&mut self, path: &str, number: usize) -> Result<&mut Self, OverrideError> {
+        let depth = path.split('.').count();
+        if depth > MAX_STEPS {
+            return Err(OverrideError::Deep(depth));
+        }
         let mut node = self;
         let mut steps = path.split('.').peekable();
         let mut at = String::new();

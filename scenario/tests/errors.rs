@@ -188,6 +188,10 @@ fn overrides_are_checked_like_keys_and_named_in_their_errors() {
         let message = errors(&file, &[(key, value)]);
         assert!(message.contains(wanted), "{key}={value}: no {wanted:?} in\n{message}");
     }
+    let deep = format!("user{}", ".a".repeat(20_000));
+    let message = errors(&file, &[(&deep, "1")]);
+    assert!(message.ends_with("expected a key's path of at most 32 steps, found 20001"), "{message}");
+    assert!(parse("[formation]", &[(&deep[..66], "1")]).is_ok());
     let offsets = "[formation]\noffsets_m = [[0,0],[-40,0]]";
     assert_eq!(parse(offsets, &[]).unwrap().formation.drones, 2);
     let message = errors(offsets, &[("formation.drones", "3")]);

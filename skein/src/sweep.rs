@@ -212,7 +212,13 @@ fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Fa
             }
             Ok(Exit::Reached)
         }
-        SweepEnd::Complete(report) => show(&report, &folder, &args.results),
+        SweepEnd::Complete(report) => {
+            let cut_short = report.rows().iter().filter(|row| row.is_cut_short()).count();
+            if cut_short > 0 {
+                complain(format!("{cut_short} runs were aborted or failed; the same command flies them again"));
+            }
+            show(&report, &folder, &args.results)
+        }
     }
 }
 

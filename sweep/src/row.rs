@@ -72,6 +72,13 @@ impl Row {
         }
     }
 
+    /// Whether the run did not come to its own end: a process of it was killed from outside, or it could not be flown. A sweep that is
+    /// resumed flies it again.
+    #[must_use]
+    pub fn is_cut_short(&self) -> bool {
+        self.outcome == "aborted" || self.outcome == "failed"
+    }
+
     /// A statistic of a figure that pilots reported; `None` if they did not.
     pub(crate) fn own(&self, column: OwnColumn<'_>) -> Option<f64> {
         self.metrics_own.get(column.figure).map(|figure| column.statistic.of(figure))

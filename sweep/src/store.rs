@@ -97,7 +97,8 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// Opens the folder, or makes it. Returns the rows that it already holds; an incomplete last line is dropped.
+    /// Opens the folder, or makes it. Returns the rows that it already holds. An incomplete last line is dropped, and so are the rows of
+    /// runs that were cut short.
     pub(crate) fn open(path: &Path, identity: &Identity) -> Result<(Self, Vec<Row>), SweepError> {
         check_identity(path, identity)?;
         let (folder, _) = WorkFolder::make(path)?;
@@ -106,8 +107,13 @@ impl Store {
             folder.write(IDENTITY, &serde_json::to_vec_pretty(identity)?)?;
         }
         let mut file = folder.append(ROWS)?;
-        let (rows, complete) = read(&mut file, &folder.path().join(ROWS), identity.runs)?;
+        let (mut rows, complete) = read(&mut file, &folder.path().join(ROWS), identity.runs)?;
         file.set_len(complete).map_err(SweepError::io(&folder.path().join(ROWS)))?;
+        if rows.iter().any(Row::is_cut_short) {
+            rows.retain(|row| !row.is_cut_short());
+            write_rows(&folder, &rows)?;
+            file = folder.append(ROWS)?;
+        }
         Ok((Self { folder, rows: file }, rows))
     }
 
@@ -118,12 +124,7 @@ impl Store {
 
     /// Replaces the rows by those of the complete sweep in the order of the runs, whichever were done first.
     pub(crate) fn arrange(&self, rows: &[Row]) -> Result<(), SweepError> {
-        let mut lines = Vec::new();
-        for row in rows {
-            serde_json::to_writer(&mut lines, row)?;
-            lines.push(b'\n');
-        }
-        Ok(self.folder.write(ROWS, &lines)?)
+        write_rows(&self.folder, rows)
     }
 
     /// Appends a row. When this returns, the line is in the file even if the process is killed right after.
@@ -137,6 +138,16 @@ impl Store {
     pub(crate) fn folder(&self) -> &WorkFolder {
         &self.folder
     }
+}
+
+/// Replaces the rows of a folder.
+fn write_rows(folder: &WorkFolder, rows: &[Row]) -> Result<(), SweepError> {
+    let mut lines = Vec::new();
+    for row in rows {
+        serde_json::to_writer(&mut lines, row)?;
+        lines.push(b'\n');
+    }
+    Ok(folder.write(ROWS, &lines)?)
 }
 
 /// Makes sure that the folder belongs to this experiment, or to none. Returns whether it says so.
@@ -200,7 +211,7 @@ mod tests {
     }
 
     fn row(job: usize) -> Row {
-        Row { metrics: vec![Some(0.1), None], ..Row::unflown(job, "failed", "a\nb") }
+        Row { metrics: vec![Some(0.1), None], ..Row::unflown(job, "invalid", "a\nb") }
     }
 
     #[test]
@@ -219,6 +230,21 @@ mod tests {
         drop(store);
         let (_, rows) = Store::open(&folder, &identity("1")).unwrap();
         assert_eq!(rows, [row(2), row(0), row(1)], "a row that is kept after a torn line has a line of its own");
+    }
+
+    #[test]
+    fn runs_that_were_cut_short_are_flown_again() {
+        let root = tempfile::tempdir().unwrap();
+        let (mut store, _) = Store::open(root.path(), &identity("1")).unwrap();
+        let aborted = Row { outcome: "aborted".to_owned(), ..row(1) };
+        [row(2), aborted, Row::unflown(0, "failed", "no summary")].iter().for_each(|row| store.keep(row).unwrap());
+        drop(store);
+        let (mut store, rows) = Store::open(root.path(), &identity("1")).unwrap();
+        assert_eq!(rows, [row(2)]);
+        store.keep(&row(1)).unwrap();
+        drop(store);
+        let (_, rows) = Store::open(root.path(), &identity("1")).unwrap();
+        assert_eq!(rows, [row(2), row(1)]);
     }
 
     #[test]

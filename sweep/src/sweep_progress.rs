@@ -107,7 +107,7 @@ mod tests {
             shard: Some(shard.parse().unwrap()),
         };
         let (mut store, _) = Store::open(&folder, &identity).unwrap();
-        done.iter().for_each(|&job| store.keep(&Row::unflown(job, "failed", "why")).unwrap());
+        done.iter().for_each(|&job| store.keep(&Row::unflown(job, "invalid", "why")).unwrap());
         folder
     }
 
@@ -120,7 +120,7 @@ mod tests {
         let counts: Vec<_> = found.folders.iter().map(|folder| (folder.done, folder.runs)).collect();
         assert_eq!(counts, [(0, 3), (2, 3)], "sorted by shard");
         assert_eq!(found.absent, ["3/3".parse().unwrap()]);
-        assert_eq!(found.outcomes.get("failed"), Some(&2));
+        assert_eq!(found.outcomes.get("invalid"), Some(&2));
         assert!(found.folders[0].idle_s.is_none() && found.folders[1].idle_s.is_some_and(|idle_s| idle_s < 60.0));
         let last = shard(root.path(), "c", "3/3", &[2, 5]);
         let all = [folders[0].clone(), shard(root.path(), "d", "1/3", &[0, 3, 6, 1]), last, folders[0].clone()];
