@@ -12,14 +12,16 @@
 //! // Paths keep 5 m from obstacles, and at least 3 m where they must.
 //! let mut navigator = Navigator::new(3.0, 5.0);
 //! let tree = ConvexShape::circle(Vec2::new(50.0, 1.0), 4.0)?;
-//! navigator.learn(1, [&tree].into_iter());
+//! navigator.learn(1, [&tree].into_iter(), &[]);
 //! let goal = Vec2::new(100.0, 0.0);
 //! let Heading::Via(corner) = navigator.head(0, Vec2::zeros(), goal) else { panic!("the tree is in the way") };
 //! assert!(corner.y < -2.0, "the shorter way is on the right");
 //! # Ok::<(), skein_protocol::shape::ShapeError>(())
 //! ```
 
+use crate::silent_drones::have_moved;
 use crate::visibility::VisibilityMap;
+use skein_leader::routes::Body;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 
@@ -70,6 +72,8 @@ pub struct Navigator {
     retry_at: u64,
     /// How often the obstacles had changed when they were learnt.
     changes: usize,
+    /// The bodies in the maps.
+    bodies: Vec<Body>,
 }
 
 impl Navigator {
@@ -82,23 +86,34 @@ impl Navigator {
             tight: VisibilityMap::new(clearance_m + TIGHT_M),
             moved_m: MOVED_M.min(MOVED * planning_m),
             changes: 0,
+            bodies: Vec::new(),
             path: None,
             retry_at: 0,
         }
     }
 
-    /// Replaces the known obstacles by `shapes` (world frame) if `changes`, how often they have changed, is another number than
-    /// before. Returns whether it is.
-    pub fn learn<'a>(&mut self, changes: usize, shapes: impl Iterator<Item = &'a ConvexShape>) -> bool {
-        if changes == self.changes {
+    /// Replaces the known obstacles by `shapes` (world frame) and the dead drones that hang still by `bodies`, if `changes`, how often the
+    /// obstacles have changed, is another number than before, or the bodies have moved. Returns whether that is so.
+    pub fn learn<'a>(
+        &mut self,
+        changes: usize,
+        shapes: impl Iterator<Item = &'a ConvexShape>,
+        bodies: &[Body],
+    ) -> bool {
+        if changes == self.changes && !have_moved(&self.bodies, bodies) {
             return false;
         }
         self.changes = changes;
+        self.bodies = bodies.to_vec();
         self.wide.clear();
         self.tight.clear();
         for shape in shapes {
             self.wide.add(shape);
             self.tight.add(shape);
+        }
+        for body in bodies {
+            self.wide.add_body(body.centre_m, body.radius_m);
+            self.tight.add_body(body.centre_m, body.radius_m);
         }
         (self.path, self.retry_at) = (None, 0);
         true
@@ -193,7 +208,7 @@ mod tests {
             |x: f64, y: f64, hx: f64, hy: f64| ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(hx, hy), 0.0).unwrap();
         let walls = [wall(300.0, 70.0, 150.0, 10.0), wall(300.0, -70.0, 150.0, 10.0), wall(440.0, 0.0, 10.0, 80.0)];
         let mut navigator = Navigator::new(15.0, 20.0);
-        navigator.learn(walls.len(), walls.iter());
+        navigator.learn(walls.len(), walls.iter(), &[]);
         let (mut position, target) = (Vec2::new(390.0, 0.0), Vec2::new(700.0, 0.0));
         let mut flown_m = 0.0;
         for tick in 0..20_000 {
@@ -236,7 +251,7 @@ mod tests {
         let wall = ConvexShape::rectangle(Vec2::new(249.09, 21.76), Vec2::new(1.31, 31.31), 0.0).unwrap();
         let (from, to) = (Vec2::new(246.47, 50.0), Vec2::new(386.9, 0.0));
         let mut navigator = Navigator::new(1.26, 1.32);
-        navigator.learn(1, [&wall].into_iter());
+        navigator.learn(1, [&wall].into_iter(), &[]);
         assert!(flown_m(&mut navigator, from, to) < 160.0);
     }
 
@@ -244,7 +259,7 @@ mod tests {
     fn paths_with_the_planning_distance_keep_the_least_distance() {
         let wall = ConvexShape::rectangle(Vec2::new(249.09, 21.76), Vec2::new(1.31, 31.31), 0.0).unwrap();
         let mut navigator = Navigator::new(1.26, 1.26);
-        navigator.learn(1, [&wall].into_iter());
+        navigator.learn(1, [&wall].into_iter(), &[]);
         assert!(flown_m(&mut navigator, Vec2::new(200.0, 50.0), Vec2::new(386.9, 0.0)) < 210.0);
     }
 
@@ -252,7 +267,7 @@ mod tests {
     fn a_route_through_the_narrowest_gap_is_free_beside_its_middle() {
         let wall = |y: f64| ConvexShape::rectangle(Vec2::new(100.0, y), Vec2::new(10.0, 60.0), 0.0).unwrap();
         let mut navigator = Navigator::new(15.0, 20.0);
-        navigator.learn(1, [&wall(75.0041), &wall(-75.0041)].into_iter());
+        navigator.learn(1, [&wall(75.0041), &wall(-75.0041)].into_iter(), &[]);
         for y_m in [-0.002, 0.0, 0.002] {
             let (before, behind) = (Vec2::new(50.0, y_m), Vec2::new(200.0, y_m));
             assert_eq!(navigator.head(0, before, behind), Heading::Straight, "{y_m} m beside the middle");
@@ -260,10 +275,26 @@ mod tests {
     }
 
     #[test]
+    fn a_path_leads_round_a_dead_drone_that_closes_the_gap_to_an_obstacle() {
+        let tree = ConvexShape::circle(Vec2::new(100.0, -80.0), 50.0).unwrap();
+        let dead = [Body { centre_m: Vec2::new(100.0, 0.0), radius_m: 30.0 }];
+        let (from, to) = (Vec2::new(60.0, -14.0), Vec2::new(300.0, -14.0));
+        let mut navigator = Navigator::new(15.0, 20.0);
+        navigator.learn(1, [&tree].into_iter(), &[]);
+        assert_eq!(navigator.head(0, from, to), Heading::Straight, "it passes above the tree");
+        assert!(navigator.learn(1, [&tree].into_iter(), &dead));
+        let Heading::Via(corner) = navigator.head(1, from, to) else { panic!("the dead drone is in the way") };
+        assert!(corner.y > 0.0, "{corner}");
+        assert!(!navigator.learn(1, [&tree].into_iter(), &dead), "it hangs still");
+        assert!(navigator.learn(1, [&tree].into_iter(), &[]), "it has landed");
+        assert_eq!(navigator.head(2, from, to), Heading::Straight);
+    }
+
+    #[test]
     fn the_way_along_a_wall_is_short_and_the_way_round_it_is_not() {
         let wall = ConvexShape::rectangle(Vec2::new(144.0, -115.0), Vec2::new(5.0, 80.0), 0.0).unwrap();
         let mut navigator = Navigator::new(15.0, 20.0);
-        navigator.learn(1, [&wall].into_iter());
+        navigator.learn(1, [&wall].into_iter(), &[]);
         let beside = Vec2::new(123.95, -156.0);
         assert!(!navigator.is_free(beside, Vec2::new(127.0, -229.0)));
         assert!(navigator.is_short_way(beside, Vec2::new(127.0, -229.0)));

@@ -10,10 +10,12 @@ use crate::rollout::RolloutParams;
 use crate::safety::SafetyParams;
 use crate::sensing_errors::SensingErrors;
 use crate::separation::SeparationParams;
+use crate::silent_drones::SilenceParams;
 use skein_leader::channel_params::ChannelParams;
 use skein_leader::election::ElectionParams;
 use skein_leader::params::LeadingParams;
 use skein_leader::params::PlannerParams;
+use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use std::iter;
 use std::sync::Arc;
@@ -172,6 +174,14 @@ impl PilotParams {
             braking_mps2: self.safety.braking_mps2,
             period_s: self.separation_period_s,
             dt_s: self.dt_s,
+        }
+    }
+
+    pub(crate) fn silence(&self) -> SilenceParams {
+        SilenceParams {
+            braking_mps2: self.safety.braking_mps2,
+            still_mps: self.safety.scale.speed(HOLD_SPEED_MPS),
+            ranging_m: self.ranging_m,
         }
     }
 

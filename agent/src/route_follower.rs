@@ -1,7 +1,7 @@
 //! Follows a drone's routes past the obstacle sets ahead: the shortest path through them, and the places in their queues.
 
 use crate::emergency_route::EmergencyRoute;
-use crate::tuning::{REDRAW_DRIFT, REDRAW_DRIFT_M};
+use crate::silent_drones::have_moved;
 use skein_leader::cost::{Flight, shortest, trips};
 use skein_leader::funnel::{Corridor, Steering};
 use skein_leader::ledger::Ledger;
@@ -114,8 +114,7 @@ impl RouteFollower {
         }) {
             self.emergency = None;
         }
-        let moved =
-            self.bodies.len() != bodies.len() || self.bodies.iter().zip(bodies).any(|(old, new)| has_drifted(old, new));
+        let moved = have_moved(&self.bodies, bodies);
         let key = self.drawing_key(ledger, position);
         if self.drawn_for.is_none_or(|drawn| drawn.stamp != key.stamp) {
             self.detours.clear();
@@ -313,9 +312,4 @@ fn open_route(routes: &Routes, course_y_m: f64, position: Vec2, bodies: &[Body])
         }
     }
     shortest(&trips)
-}
-
-/// Whether a silent drone has drifted so far that the corridor has to be drawn again.
-fn has_drifted(old: &Body, new: &Body) -> bool {
-    (old.centre_m - new.centre_m).norm() > REDRAW_DRIFT_M.min(REDRAW_DRIFT * new.radius_m)
 }

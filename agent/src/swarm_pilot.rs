@@ -27,7 +27,7 @@ use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::{OwnPlan, Straggler};
 use crate::tuning::{
-    BACK_OUT_SPEED, LEAST_ESCAPE_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S,
+    BACK_OUT_SPEED, HANGING_RADIUS, LEAST_ESCAPE_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S,
     SILENT_DRONE_RADIUS,
 };
 use bytemuck::Zeroable;
@@ -112,7 +112,7 @@ impl SwarmPilot {
             stale_formation: StaleFormation::default(),
             lone_flight: LoneFlight::new(params.drones, &params.planner),
             reunion: Reunion::new(params.drones, &params.planner),
-            silent: SilentDrones::default(),
+            silent: SilentDrones::new(params.silence()),
             neighbours: NeighbourTable::new(params.neighbours()),
             clocks: PeerClocks::new(params.sensing.clock_s),
             separations: params.apart_by_words.then(|| Box::new(Separations::new(params.separation(), params.start))),
@@ -342,7 +342,8 @@ impl SwarmPilot {
     /// Gives the navigator the obstacles that are known by now; true if there are new ones.
     fn update_map(&mut self) -> bool {
         let known = self.leading.obstacles();
-        self.navigator.learn(known.changes(), known.iter().map(|(_, known)| &known.shape))
+        let bodies = self.silent.hanging(HANGING_RADIUS * self.params.safety.safe_distance_m);
+        self.navigator.learn(known.changes(), known.iter().map(|(_, known)| &known.shape), &bodies)
     }
 
     /// A drone that cannot move would hold up the queue if it stayed first.
@@ -585,7 +586,7 @@ impl SwarmPilot {
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
         let safety = self.params.safety;
-        self.silent.update(senses, self.leading.peers(), safety.braking_mps2);
+        self.silent.update(senses, self.leading.peers());
         self.lead(senses, &own, say);
         self.emergency_avoidance(senses);
         let bodies = self.silent.bodies(SILENT_DRONE_RADIUS * safety.safe_distance_m);

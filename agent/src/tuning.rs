@@ -69,6 +69,20 @@ pub(crate) const LEAD_FOUND_S: f64 = 60.0;
 /// hand: the length of a formation. `skein sweep experiments/wide-scenes.toml`.
 pub(crate) const OVERSHOOT_S: f64 = 10.0;
 
+/// Radius of the disc that a drone's own path keeps around a dead drone that hangs still, in safe distances. No unit. 1.04: slots are farther
+/// away ([`SLOT_BERTH`](skein_protocol::formation::SLOT_BERTH)), and the safety filter keeps less. By calculation.
+pub(crate) const HANGING_RADIUS: f64 = 1.04;
+
+/// A silent drone that has hung still for this long is dead, as far as paths are concerned, s. 10. By hand: longer than a living drone is
+/// silent in most missions over the radio preset `jammed`.
+pub(crate) const HANGS_S: f64 = 10.0;
+
+/// A drone closer than this part of the ranging distance is ranged, unless something is between. No unit. 0.5. By hand.
+pub(crate) const NEAR_RANGING: f64 = 0.5;
+
+/// A dead drone that is near and was not ranged for this long has landed, s. 1. By hand: longer than a sensor drops out.
+pub(crate) const UNSEEN_S: f64 = 1.0;
+
 /// Drift of a silent drone after which the corridor is drawn again, m. Chosen by hand.
 pub(crate) const REDRAW_DRIFT_M: f64 = 1.0;
 

@@ -76,6 +76,14 @@ impl VisibilityMap {
         });
     }
 
+    /// Adds a body that is no obstacle, such as a dead drone that hangs still: paths keep `keep_m` from `centre`, but no less than from an
+    /// obstacle. World frame, m.
+    pub fn add_body(&mut self, centre: Vec2, keep_m: f64) {
+        if let Ok(shape) = ConvexShape::circle(centre, (keep_m - self.keep_m).max(LEAST_M)) {
+            self.add(&shape);
+        }
+    }
+
     /// Removes all obstacles.
     pub fn clear(&mut self) {
         self.outlines.clear();

@@ -8,8 +8,8 @@ use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, SLOT_BERTH, STALLED_S};
-use skein_protocol::formation::HOLD_SPEED_MPS;
+use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, STALLED_S};
+use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{GroupId, Phase, SimTime, Vec2};
@@ -59,6 +59,9 @@ impl FormationPlanner {
             if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
                 return self.assign(s, Phase::Reform);
             }
+            if let Some(plan) = obeyed.and_then(|bundle| self.avoid_dead(s, bundle)) {
+                return Some(plan);
+            }
             return obeyed.filter(|bundle| self.is_stuck(s, bundle)).and_then(|bundle| self.loosen(s, bundle));
         }
         let changed = *self.changed.get_or_insert(s.now);
@@ -71,6 +74,20 @@ impl FormationPlanner {
         let parted = |plan: &Plan| plan.group != GroupId::ALL;
         let avoided = s.ledger.obeyed().is_some_and(|b| b.plan.phase() != Phase::Cruise || parted(&b.plan));
         self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
+    }
+
+    /// The plan with other slots, if a dead drone has come to rest beside a slot at the goal, or not as near to one as it seemed.
+    fn avoid_dead(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
+        let fixed = matches!(s.params.destination, Destination::Goal { .. }) && !self.open;
+        if !fixed || s.silent.is_empty() || bundle.plan.phase() != Phase::Reform || !self.pace.allows(s) {
+            return None;
+        }
+        let planned: Vec<Vec2> = bundle.parts.iter().map(|part| part.slot_m.into()).collect();
+        if slots_of(s, Phase::Reform).iter().all(|slot| planned.contains(slot)) {
+            return None;
+        }
+        self.pace.note(s);
+        self.assign(s, Phase::Reform).filter(|plan| takes_other_slots(plan, bundle))
     }
 
     /// Whether all members have been at rest for a while although one is not in its slot, or although the ranks are open. A formation that
@@ -118,7 +135,7 @@ impl FormationPlanner {
 
     /// The plan that assigns the slots. `None` without a slot for every member.
     fn assign(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
-        let close = s.params.shape.slots(s.members.len(), s.params.spacing_m);
+        let close = slots_of(s, phase);
         let (anchor, pin) = match s.members.iter().position(|m| self.pinned && is_alone(m, s)) {
             Some(member) => anchor_for(s, &close, phase, member),
             None => (anchor(s, &close, phase), None),
@@ -145,6 +162,19 @@ impl FormationPlanner {
             reserved: 0,
         };
         Some(PlanBundle { plan, parts: s.members.iter().enumerate().map(part).collect() })
+    }
+}
+
+/// The slots of the members, relative to the front slot, m. At the goal, slots beside which a dead drone hangs are left free. A drone that
+/// hears no other flies to the front slot: if the others live, they leave that slot to it.
+fn slots_of(s: &Situation<'_>, phase: Phase) -> Vec<Vec2> {
+    let (shape, spacing_m) = (&s.params.shape, s.params.spacing_m);
+    match s.params.destination {
+        Destination::Goal { front_m } if phase == Phase::Reform && s.members.len() > 1 => {
+            let dead: Vec<Vec2> = s.silent.iter().map(|place| place - front_m).collect();
+            shape.free_slots(s.members.len(), spacing_m, &dead, SLOT_BERTH * s.params.safe_distance_m)
+        }
+        _ => shape.slots(s.members.len(), spacing_m),
     }
 }
 

@@ -173,9 +173,6 @@ pub(crate) const FAR_REPEATS: u32 = 4;
 
 // ---- Formation (`formation_planner.rs`) ----
 
-/// Distance of slots from drones that hover dead, in safe distances. No unit. 1.05. By hand. The pilot's own paths keep
-/// a wider berth.
-pub(crate) const SLOT_BERTH: f64 = 1.05;
 /// Step by which the anchor moves on while a slot is blocked, m. 5. By hand.
 pub(crate) const ANCHOR_STEP_M: f64 = 5.0;
 /// A formation in which a drone cannot reach its slot is widened by this factor. No unit. 1.6. By hand.

@@ -8,6 +8,13 @@ use serde::{Deserialize, Serialize};
 /// Maximum speed of a drone relative to its formation while the formation counts as held, m/s.
 pub const HOLD_SPEED_MPS: f64 = 1.0;
 
+/// Distance of slots from drones that hang dead, in safe distances. No unit. A drone keeps the safe distance with all margins, and stands within
+/// the arrival error of its slot.
+pub const SLOT_BERTH: f64 = 1.05;
+
+/// A drone that hangs dead is within [`SLOT_BERTH`] of at most as many slots: they are at least a safe distance apart.
+pub const MOST_BLOCKED: usize = 7;
+
 /// The shape of a formation. It has slots for any number of drones, except for [`Shape::Offsets`]. `spacing_m` below is the
 /// argument of [`Shape::slots`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,6 +61,16 @@ impl Shape {
             Self::Wedge => wedge(count, spacing_m),
             Self::Offsets(offsets) => offsets.iter().take(count).map(|&o| Vec2::from(o)).collect(),
         }
+    }
+
+    /// The slots of `count` drones as in [`Self::slots`] where drones hang dead at the places `dead`, relative to the front slot, m: the
+    /// first slots of the smallest formation that has enough of them at least `keep_m` away from those. [`Self::slots`] if none has.
+    #[must_use]
+    pub fn free_slots(&self, count: usize, spacing_m: f64, dead: &[Vec2], keep_m: f64) -> Vec<Vec2> {
+        let is_free = |slot: &Vec2| dead.iter().all(|place| (slot - place).norm() >= keep_m);
+        let free = |size| self.slots(size, spacing_m).into_iter().filter(is_free).take(count).collect::<Vec<_>>();
+        let largest = count + MOST_BLOCKED * dead.len();
+        (count..=largest).map(free).find(|free| free.len() == count).unwrap_or_else(|| self.slots(count, spacing_m))
     }
 }
 
@@ -109,6 +126,18 @@ mod tests {
         for (slot, (row, y)) in Shape::Wedge.slots(6, 10.0).iter().zip(expected) {
             assert!((slot - Vec2::new(row * depth, y)).norm() < 1e-9, "{slot} should be in row {row} at y = {y} m");
         }
+    }
+
+    #[test]
+    fn a_blocked_slot_is_left_free() {
+        let xs = |shape: &Shape, count, x: f64, y: f64| -> Vec<f64> {
+            shape.free_slots(count, 20.0, &[Vec2::new(x, y)], 12.0).iter().map(|slot| slot.x).collect()
+        };
+        assert_eq!(xs(&Shape::Column, 4, -20.0, 13.0), [0.0, -20.0, -40.0, -60.0]);
+        assert_eq!(xs(&Shape::Column, 4, -30.0, 0.0), [0.0, -60.0, -80.0, -100.0]);
+        assert_eq!(xs(&Shape::Column, 4, 0.0, 5.0), [-20.0, -40.0, -60.0, -80.0]);
+        let two = Shape::Offsets(vec![[0.0, 0.0], [-20.0, 0.0]]);
+        assert_eq!(xs(&two, 2, 0.0, 0.0), [0.0, -20.0], "it has no third slot");
     }
 
     #[test]

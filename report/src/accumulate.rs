@@ -43,6 +43,8 @@ pub(crate) struct Accumulator {
     last: Vec<DroneRow>,
     /// Positions of the living drones in the last tick, m.
     positions: Vec<Vec2>,
+    /// Where drones hang dead, m.
+    dead: Vec<Vec2>,
     /// Their velocities, m/s.
     velocities: Vec<Vec2>,
 }
@@ -89,6 +91,7 @@ impl Accumulator {
             counts: Counts::default(),
             last: Vec::new(),
             positions: Vec::new(),
+            dead: Vec::new(),
             velocities: Vec::new(),
             facts,
         }
@@ -192,9 +195,14 @@ impl Accumulator {
     fn gather_living(&mut self, rows: &[DroneRow]) {
         self.positions.clear();
         self.velocities.clear();
-        for row in rows.iter().filter(|row| row.alive()) {
-            self.positions.push(horizontal(row.position_m));
-            self.velocities.push(horizontal(row.velocity_mps));
+        self.dead.clear();
+        for row in rows {
+            if row.alive() {
+                self.positions.push(horizontal(row.position_m));
+                self.velocities.push(horizontal(row.velocity_mps));
+            } else if row.position_m[2] > 0.0 {
+                self.dead.push(horizontal(row.position_m));
+            }
         }
     }
 
@@ -205,7 +213,7 @@ impl Accumulator {
             self.reform_start_s = Some(t_s);
         }
         if self.reform_start_s.is_some() && living.all(reforms) {
-            self.closing.take(&self.facts, t_s, &self.positions);
+            self.closing.take(&self.facts, t_s, &self.positions, &self.dead);
         } else {
             self.closing.reopen();
         }
@@ -213,7 +221,7 @@ impl Accumulator {
 
     /// The summary of all records taken.
     pub(crate) fn finish(self, completion: &RunCompletion) -> Summary {
-        let error = formation::error(&self.facts, &self.positions);
+        let error = formation::error(&self.facts, &self.positions, &self.dead);
         let (ticks, sim_s) = (self.counts.tick.map_or(0, |tick| tick.saturating_add(1)), self.counts.t_s);
         let wall_s =
             self.end.as_ref().map(|end| end.totals.wall_s).or(completion.wall_s).filter(|wall_s| *wall_s > 0.0);

@@ -55,12 +55,12 @@ impl DeviationSampler {
 
     fn measure(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> Option<ShapeDeviation> {
         if self.plate.as_ref().is_none_or(|(slots, _)| slots.len() != positions.len()) {
-            let slots = slots(facts, positions.len())?;
+            let slots = slots(facts, positions.len(), &[])?;
             let plate = ThinPlate::new(&slots, 0.0)?;
             self.plate = Some((slots, plate));
         }
         let (slots, plate) = self.plate.as_ref()?;
-        let found = error(facts, positions)?;
+        let found = error(facts, positions, &[])?;
         let positions = centred(positions.to_vec());
         let mut images = vec![Vec2::zeros(); slots.len()];
         for (position, &slot) in positions.iter().zip(&found.slot_of) {

@@ -1,8 +1,9 @@
 //! How far the living drones are from the target shape, after the best translation and assignment.
 
-use crate::facts::RunFacts;
+use crate::facts::{MissionEnd, RunFacts};
 use crate::tuning::{SOLVE_ALWAYS_DRONES_MAX, SOLVE_PERIOD_S};
 use skein_protocol::Vec2;
+use skein_protocol::formation::SLOT_BERTH;
 use skein_protocol::matching::least_cost;
 
 /// The error of a formation after the best translation and assignment.
@@ -19,9 +20,10 @@ pub(crate) struct FormationError {
     pub slot_of: Vec<usize>,
 }
 
-/// The error of drones at these positions, m. `None` without drones, or if the shape has too few slots.
-pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationError> {
-    let slots = slots(facts, positions.len())?;
+/// The error of drones at these positions, m, while others hang dead at the places `dead`, m. `None` without drones, or if the shape has too
+/// few slots.
+pub(crate) fn error(facts: &RunFacts, positions: &[Vec2], dead: &[Vec2]) -> Option<FormationError> {
+    let slots = slots(facts, positions.len(), dead)?;
     let positions = centred(positions.to_vec());
     let slot_of = assign(&positions, &slots);
     let offsets = offsets(&positions, &slots, &slot_of);
@@ -35,10 +37,18 @@ pub(crate) fn error(facts: &RunFacts, positions: &[Vec2]) -> Option<FormationErr
 }
 
 /// The slots of `count` drones relative to their mean, m. The best translation in the least-squares sense maps the mean
-/// of the drones to the mean of the slots, whatever the assignment.
-pub(crate) fn slots(facts: &RunFacts, count: usize) -> Option<Vec<Vec2>> {
-    let slots = facts.shape.slots(count, facts.spacing_m);
+/// of the drones to the mean of the slots, whatever the assignment. `dead`: where others hang dead, m.
+pub(crate) fn slots(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Option<Vec<Vec2>> {
+    let slots = around_dead(facts, count, dead);
     (count > 0 && slots.len() == count).then(|| centred(slots))
+}
+
+/// The slots of `count` drones relative to the front slot, m. At the goal, slots beside which drones hang dead at the places `dead`, m, stay
+/// free.
+pub(crate) fn around_dead(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Vec<Vec2> {
+    let MissionEnd::Goal { front_m } = facts.end else { return facts.shape.slots(count, facts.spacing_m) };
+    let dead: Vec<Vec2> = dead.iter().map(|place| place - Vec2::from(front_m)).collect();
+    facts.shape.free_slots(count, facts.spacing_m, &dead, SLOT_BERTH * facts.safe_distance_m)
 }
 
 /// The points relative to their mean.
@@ -65,6 +75,8 @@ pub(crate) fn mean_distance(points: &[Vec2]) -> f64 {
 #[derive(Default)]
 pub(crate) struct Closing {
     since_s: Option<f64>,
+    /// Where drones hang dead, m.
+    dead: Vec<Vec2>,
     /// Slots of the living drones, relative to their mean, m.
     slots: Vec<Vec2>,
     /// The last assignment.
@@ -84,8 +96,12 @@ impl Closing {
         self.since_s = None;
     }
 
-    /// Takes the positions of the living drones in a tick in which all of them reform.
-    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) {
+    /// Takes the positions of the living drones in a tick in which all of them reform, and the places where others hang dead, m.
+    pub(crate) fn take(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2], dead: &[Vec2]) {
+        if self.dead != dead {
+            self.dead = dead.to_vec();
+            self.slots.clear();
+        }
         if self.closed(facts, t_s, positions) {
             self.since_s.get_or_insert(t_s);
         } else {
@@ -96,7 +112,7 @@ impl Closing {
     /// Whether each drone is close enough to its slot. Tries the last assignment before it solves a new one.
     fn closed(&mut self, facts: &RunFacts, t_s: f64, positions: &[Vec2]) -> bool {
         if self.slots.len() != positions.len() {
-            self.slots = slots(facts, positions.len()).unwrap_or_default();
+            self.slots = slots(facts, positions.len(), &self.dead).unwrap_or_default();
             (self.slot_of, self.solved_s) = (Vec::new(), None);
         }
         if self.slots.is_empty() {
@@ -137,26 +153,41 @@ mod tests {
 
     #[test]
     fn a_moved_and_permuted_formation_has_no_error() {
-        let error = error(&facts(8), &near_slots(8, |_| Vec2::zeros())).unwrap();
+        let error = error(&facts(8), &near_slots(8, |_| Vec2::zeros()), &[]).unwrap();
         assert!(error.largest_m < 1e-9 && error.rmse_m < 1e-9 && error.mean_distance_m.unwrap() < 1e-9, "{error:?}");
     }
 
     #[test]
     fn one_displaced_drone_moves_the_mean_too() {
-        let error = error(&facts(8), &near_slots(8, |i| Vec2::new(if i == 2 { 8.0 } else { 0.0 }, 0.0))).unwrap();
+        let error = error(&facts(8), &near_slots(8, |i| Vec2::new(if i == 2 { 8.0 } else { 0.0 }, 0.0)), &[]).unwrap();
         assert!((error.largest_m - 7.0).abs() < 1e-9, "{error:?}");
         assert!((error.rmse_m - (56.0f64 / 8.0).sqrt()).abs() < 1e-9, "{error:?}");
     }
 
     #[test]
     fn the_error_is_defined_for_any_number_of_living_drones() {
-        assert!(error(&facts(8), &[]).is_none());
-        let alone = error(&facts(8), &[Vec2::new(3.0, 3.0)]).unwrap();
+        assert!(error(&facts(8), &[], &[]).is_none());
+        let alone = error(&facts(8), &[Vec2::new(3.0, 3.0)], &[]).unwrap();
         assert_eq!((alone.largest_m, alone.mean_distance_m), (0.0, None));
-        let pair = error(&facts(8), &[Vec2::zeros(), Vec2::new(0.0, 36.0)]).unwrap();
+        let pair = error(&facts(8), &[Vec2::zeros(), Vec2::new(0.0, 36.0)], &[]).unwrap();
         assert!((pair.mean_distance_m.unwrap() - 1.0).abs() < 1e-9, "{pair:?}");
         let offsets = skein_protocol::formation::Shape::Offsets(vec![[0.0, 0.0]]);
-        assert!(error(&RunFacts { shape: offsets, ..facts(8) }, &[Vec2::zeros(); 2]).is_none());
+        assert!(error(&RunFacts { shape: offsets, ..facts(8) }, &[Vec2::zeros(); 2], &[]).is_none());
+    }
+
+    #[test]
+    fn a_slot_at_the_goal_beside_a_dead_drone_is_no_error() {
+        let front = Vec2::new(900.0, -40.0);
+        let facts = RunFacts { end: MissionEnd::Goal { front_m: front.into() }, ..facts(8) };
+        let mut places: Vec<Vec2> = facts.shape.slots(8, 35.0).into_iter().map(|slot| slot + front).collect();
+        let dead = places.remove(3);
+        assert!(error(&facts, &places, &[dead]).unwrap().largest_m < 1e-9);
+        assert!(error(&facts, &places, &[]).unwrap().largest_m > 1.0);
+        let mut closing = Closing::default();
+        closing.take(&facts, 1.0, &places, &[dead]);
+        assert_eq!(closing.since_s(), Some(1.0));
+        closing.take(&facts, 2.0, &places, &[]);
+        assert_eq!(closing.since_s(), None, "it has landed, and a drone can take its slot");
     }
 
     #[test]
@@ -165,12 +196,12 @@ mod tests {
             let facts = facts(count as u32);
             let mut closing = Closing::default();
             let wide = |i: usize| Vec2::new(if i == 0 { 3.0 } else { 0.0 }, 0.0);
-            closing.take(&facts, 1.0, &near_slots(count, |_| Vec2::zeros()));
+            closing.take(&facts, 1.0, &near_slots(count, |_| Vec2::zeros()), &[]);
             assert_eq!(closing.since_s(), Some(1.0));
-            closing.take(&facts, 2.0, &near_slots(count, wide));
+            closing.take(&facts, 2.0, &near_slots(count, wide), &[]);
             assert_eq!(closing.since_s(), None);
-            closing.take(&facts, 3.0, &near_slots(count, |_| Vec2::zeros()));
-            closing.take(&facts, 4.0, &near_slots(count, |_| Vec2::zeros()));
+            closing.take(&facts, 3.0, &near_slots(count, |_| Vec2::zeros()), &[]);
+            closing.take(&facts, 4.0, &near_slots(count, |_| Vec2::zeros()), &[]);
             assert_eq!(closing.since_s(), Some(3.0));
         }
     }

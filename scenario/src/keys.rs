@@ -275,7 +275,7 @@ pub enum End {
     /// All obstacles are passed and the formation is restored around its anchor. An obstacle that no drone ever senses does not have to
     /// be passed.
     Hold,
-    /// Every drone is in a slot of the formation at `goal_m`.
+    /// Every drone is in a slot of the formation at `goal_m`. A slot beside which a dead drone hangs stays free.
     Goal,
     /// The mission has lasted `duration_s`, and a drone lives. It is a success if no invariant was broken.
     Time,

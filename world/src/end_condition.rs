@@ -2,10 +2,12 @@
 //! from above: the altitudes of the drones do not matter.
 
 use crate::body::Body;
+use crate::goal_slots;
 use crate::grid::Grid;
 use crate::params::{End, WorldParams};
 use crate::stages::Stages;
 use skein_protocol::Vec2;
+use skein_protocol::formation::MOST_BLOCKED;
 
 /// Whether the living drones stand in their formation.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +25,8 @@ pub(crate) struct EndCondition {
     past_x_m: f64,
     /// Memory for the places of the drones, world frame, m.
     places: Vec<Vec2>,
+    /// Where dead drones hang, world frame, m.
+    dead: Vec<Vec2>,
 }
 
 impl EndCondition {
@@ -62,6 +66,8 @@ impl EndCondition {
         let mut places = std::mem::take(&mut self.places);
         places.clear();
         places.extend(part.iter().map(|&drone| bodies[drone].position().xy()));
+        self.dead.clear();
+        self.dead.extend(goal_slots::dead(bodies));
         let closed = self.are_closed(params, &places);
         self.places = places;
         closed
@@ -69,13 +75,16 @@ impl EndCondition {
 
     /// Whether the drones at these places stand in their formation.
     fn are_closed(&mut self, params: &WorldParams, places: &[Vec2]) -> bool {
-        self.form(places.len(), params);
         match params.end {
             End::Hold { stop_x_m } => {
+                self.form(places.len(), params);
                 let anchor = self.anchor(places);
                 anchor.x >= stop_x_m - params.arrival_error_m && self.filled(places, anchor, params.arrival_error_m)
             }
-            End::Goal { front_m } => self.filled(places, front_m, params.arrival_error_m),
+            End::Goal { front_m } => {
+                let largest = places.len() + MOST_BLOCKED * self.dead.len();
+                (places.len()..=largest).any(|size| self.fill_at_goal(params, places, front_m, size))
+            }
             // These ends do not depend on the formation.
             End::Time { .. } | End::Pilots => false,
         }
@@ -104,6 +113,18 @@ impl EndCondition {
         self.middle = self.slots.iter().sum::<Vec2>() / self.slots.len().max(1) as f64;
         let cell_m = params.spacing_m.max(params.arrival_error_m);
         self.grid.fill(cell_m, self.slots.iter().enumerate().map(|(i, &slot)| (i as u32, slot)));
+    }
+
+    /// Whether the drones at these places stand in slots of a formation of this size with its front slot at the goal, and no slot before
+    /// the last one that is taken is free, except beside dead drones.
+    fn fill_at_goal(&mut self, params: &WorldParams, places: &[Vec2], front_m: Vec2, size: usize) -> bool {
+        self.form(size, params);
+        if !self.filled(places, front_m, params.arrival_error_m) {
+            return false;
+        }
+        let last = self.taken.iter().rposition(|&taken| taken).unwrap_or_default();
+        let slots = self.slots.iter().zip(&self.taken).take(last);
+        slots.filter(|(_, taken)| !**taken).all(|(slot, _)| goal_slots::may_be_free(params, front_m + slot, &self.dead))
     }
 
     /// Where the front slot is when the formation fits the drones at these places best (least squares), m.
@@ -272,6 +293,21 @@ mod tests {
         assert!(!is_met(&goal(424.0), &all, &open()));
         let behind = Stages::new(&[Outline::new(&rectangle(500.0, 0.0, 5.0, 5.0))], 40.0);
         assert!(is_met(&goal(425.0), &all, &behind), "an obstacle behind the goal does not have to be passed");
+    }
+
+    #[test]
+    fn a_slot_at_the_goal_is_left_free_beside_a_dead_drone_only() {
+        let goal = WorldParams { end: End::Goal { front_m: Vec2::zeros() }, ..params() };
+        let without_fourth = |moved_m: f64| {
+            let mut all = formed(Vec2::zeros());
+            all[3] = moved(all[3], moved_m);
+            all[3].kill();
+            all
+        };
+        assert!(is_met(&goal, &without_fourth(0.0), &open()), "it hangs in its slot");
+        assert!(is_met(&goal, &without_fourth(0.9 * params().safe_distance_m), &open()));
+        assert!(!is_met(&goal, &without_fourth(500.0), &open()), "the last drone could take its slot");
+        assert!(!is_met(&hold(0.0), &without_fourth(0.0), &open()), "a formation that is held moves on");
     }
 
     #[test]

@@ -84,6 +84,7 @@ mod event_log;
 mod fault_plan;
 pub mod faults;
 mod geometry;
+mod goal_slots;
 mod grid;
 mod invariants;
 mod judge;

@@ -1,5 +1,6 @@
 //! How far drones are from the slots that are left for them, when a mission is judged that did not reach its goal.
 
+use crate::goal_slots;
 use crate::params::{End, WorldParams};
 use crate::tuning::FIT_MAX_DRONES;
 use skein_protocol::Vec2;
@@ -7,9 +8,9 @@ use skein_protocol::matching::least_cost;
 
 /// For each of the drones at these places, its distance from the slot that is left for it, m. A drone in a slot that no other one takes
 /// has that slot; the others share the slots that are left so that the sum of their distances is least. `None` if the goal has no
-/// slots, or too few.
-pub(crate) fn slot_gaps(params: &WorldParams, places: &[Vec2]) -> Option<Vec<f64>> {
-    let slots = params.shape.slots(places.len(), params.spacing_m);
+/// slots, or too few. `dead`: where dead drones hang. World frame, m.
+pub(crate) fn slot_gaps(params: &WorldParams, places: &[Vec2], dead: &[Vec2]) -> Option<Vec<f64>> {
+    let slots = goal_slots::slots(params, places.len(), dead);
     if slots.len() < places.len() || places.is_empty() {
         return None;
     }
@@ -77,7 +78,7 @@ mod tests {
     }
 
     fn rounded(end: End) -> Option<Vec<f64>> {
-        let gaps = slot_gaps(&WorldParams { end, ..params() }, &one_away(Vec2::new(500.0, 20.0)));
+        let gaps = slot_gaps(&WorldParams { end, ..params() }, &one_away(Vec2::new(500.0, 20.0)), &[]);
         gaps.map(|gaps| gaps.into_iter().map(f64::round).collect())
     }
 
@@ -94,7 +95,8 @@ mod tests {
     fn two_drones_in_one_slot_do_not_both_have_it() {
         let mut places = one_away(Vec2::zeros());
         places[7] = places[0];
-        let gaps = slot_gaps(&WorldParams { end: End::Goal { front_m: Vec2::zeros() }, ..params() }, &places).unwrap();
+        let gaps =
+            slot_gaps(&WorldParams { end: End::Goal { front_m: Vec2::zeros() }, ..params() }, &places, &[]).unwrap();
         assert_eq!(gaps.iter().filter(|&&gap| gap > 1.0).count(), 1, "{gaps:?}");
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::body::Body;
 use crate::end_condition::EndCondition;
+use crate::goal_slots;
 use crate::params::{End, WorldParams};
 use crate::process::Process;
 use crate::slot_gaps::slot_gaps;
@@ -35,7 +36,8 @@ impl Unfinished<'_> {
 
     fn of_part(&self, part: &[usize]) -> Vec<UnfinishedDrone> {
         let places: Vec<_> = part.iter().map(|&drone| self.bodies[drone].position().xy()).collect();
-        let gaps = slot_gaps(self.params, &places);
+        let dead: Vec<_> = goal_slots::dead(self.bodies).collect();
+        let gaps = slot_gaps(self.params, &places, &dead);
         let gap = |place: usize| gaps.as_ref().map(|gaps| gaps[place]);
         let drones = part.iter().enumerate().map(|(place, &drone)| (drone, gap(place)));
         drones.filter_map(|(drone, gap_m)| Some(self.describe(drone, self.lack(drone, gap_m)?, gap_m))).collect()

@@ -196,7 +196,8 @@ impl Samples {
             let distances = (0..positions.len()).flat_map(pair).map(|(i, other)| (positions[i] - other).norm());
             band(t_s, distances).into_iter().for_each(|band| self.distance.push(band));
             band(t_s, rows.iter().map(|row| row.energy_j)).into_iter().for_each(|band| self.energy.push(band));
-            if let Some(error) = formation::error(facts, positions).filter(|_| rows.len() <= PLOT_SLOT_ERROR_DRONES_MAX)
+            if let Some(error) =
+                formation::error(facts, positions, &[]).filter(|_| rows.len() <= PLOT_SLOT_ERROR_DRONES_MAX)
             {
                 self.formation.push((t_s, error.largest_m));
             }

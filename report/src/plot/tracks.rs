@@ -1,11 +1,12 @@
 //! The tracks of the drones past the obstacles, seen from above, at true aspect ratio.
 
-use super::samples::Samples;
+use super::samples::{Samples, Track};
 use super::style::{
     Axes, Canvas, Chart, EDGE, GREY, Heading, LEFT, Sign, WIDTH, end, goal, lost, plot, px, rgb, start,
 };
 use crate::error::DrawError;
 use crate::facts::{MissionEnd, RunFacts};
+use crate::formation::around_dead;
 use crate::geometry::outline;
 use crate::group_order::GroupOrder;
 use plotters::prelude::*;
@@ -91,8 +92,9 @@ pub(super) fn frame(samples: &Samples, facts: &RunFacts, width: f64) -> (Vec2, V
 /// The slots of the living drones at the goal, m.
 fn goal_slots(samples: &Samples, facts: &RunFacts) -> Vec<Vec2> {
     let MissionEnd::Goal { front_m } = facts.end else { return Vec::new() };
-    let living = samples.tracks.values().filter(|track| !samples.is_lost(track)).count();
-    facts.shape.slots(living, facts.spacing_m).into_iter().map(|slot| slot + Vec2::from(front_m)).collect()
+    let (dead, living): (Vec<&Track>, Vec<&Track>) = samples.tracks.values().partition(|track| samples.is_lost(track));
+    let dead: Vec<Vec2> = dead.into_iter().filter_map(|track| track.points.last()).map(|point| point.at_m).collect();
+    around_dead(facts, living.len(), &dead).into_iter().map(|slot| slot + Vec2::from(front_m)).collect()
 }
 
 fn draw_tracks(chart: &mut Chart, canvas: &Canvas, samples: &Samples, colours: &[RGBColor]) -> Result<(), DrawError> {
@@ -119,7 +121,7 @@ fn draw_tracks(chart: &mut Chart, canvas: &Canvas, samples: &Samples, colours: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::samples::{Track, TrackPoint};
+    use crate::plot::samples::TrackPoint;
     use crate::testing::facts;
 
     #[test]

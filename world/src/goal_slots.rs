@@ -1,0 +1,25 @@
+//! The slots at the goal where dead drones hang.
+
+use crate::body::Body;
+use crate::params::{End, WorldParams};
+use skein_protocol::Vec2;
+use skein_protocol::formation::SLOT_BERTH;
+
+/// The slots of a formation of so many drones, relative to its front slot, m. A slot at the goal is left free if one of these dead drones
+/// (world frame, m) hangs so close to it that no other drone may come there.
+pub(crate) fn slots(params: &WorldParams, drones: usize, dead: &[Vec2]) -> Vec<Vec2> {
+    let End::Goal { front_m } = params.end else { return params.shape.slots(drones, params.spacing_m) };
+    let dead: Vec<Vec2> = dead.iter().map(|place| place - front_m).collect();
+    params.shape.free_slots(drones, params.spacing_m, &dead, SLOT_BERTH * params.safe_distance_m)
+}
+
+/// Whether a slot at this place may be left free: a dead drone hangs so close to it that a leader may take it for blocked. World frame, m.
+pub(crate) fn may_be_free(params: &WorldParams, slot: Vec2, dead: &[Vec2]) -> bool {
+    let keep_m = SLOT_BERTH * params.safe_distance_m + params.arrival_error_m;
+    dead.iter().any(|place| (slot - place).norm() < keep_m)
+}
+
+/// Where dead drones hang, world frame, m.
+pub(crate) fn dead(bodies: &[Body]) -> impl Iterator<Item = Vec2> {
+    bodies.iter().filter(|body| !body.is_alive() && body.flies()).map(|body| body.position().xy())
+}
