@@ -342,7 +342,10 @@ impl SwarmPilot {
     /// Gives the navigator the obstacles that are known by now; true if there are new ones.
     fn update_map(&mut self) -> bool {
         let known = self.leading.obstacles();
-        let bodies = self.silent.hanging(HANGING_RADIUS * self.params.safety.safe_distance_m);
+        // On the way to a slot there are many drones, and each would fly another way round a dead one.
+        let passing = self.route.is_passing();
+        let bodies = passing.then(|| self.silent.hanging(HANGING_RADIUS * self.params.safety.safe_distance_m));
+        let bodies = bodies.unwrap_or_default();
         self.navigator.learn(known.changes(), known.iter().map(|(_, known)| &known.shape), &bodies)
     }
 
