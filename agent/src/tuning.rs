@@ -73,8 +73,8 @@ pub(crate) const OVERSHOOT_S: f64 = 10.0;
 /// away ([`SLOT_BERTH`](skein_protocol::formation::SLOT_BERTH)), and the safety filter keeps less. By calculation.
 pub(crate) const HANGING_RADIUS: f64 = 1.04;
 
-/// A silent drone that has hung still for this long is dead, as far as paths are concerned, s. 10. By hand: longer than a living drone is
-/// silent in most missions over the radio preset `jammed`.
+/// A silent drone that has hung still for this long is dead, as far as paths are concerned, s. 10. By hand: long, because
+/// a living drone that waits in a queue may be silent for a while on a bad link.
 pub(crate) const HANGS_S: f64 = 10.0;
 
 /// A drone closer than this part of the ranging distance is ranged, unless something is between. No unit. 0.5. By hand.

@@ -171,8 +171,7 @@ fn slots_of(s: &Situation<'_>, phase: Phase) -> Vec<Vec2> {
     let (shape, spacing_m) = (&s.params.shape, s.params.spacing_m);
     match s.params.destination {
         Destination::Goal { front_m } if phase == Phase::Reform && s.members.len() > 1 => {
-            let dead: Vec<Vec2> = s.silent.iter().map(|place| place - front_m).collect();
-            shape.free_slots(s.members.len(), spacing_m, &dead, SLOT_BERTH * s.params.safe_distance_m)
+            shape.free_slots(s.members.len(), spacing_m, front_m, s.silent, s.params.safe_distance_m)
         }
         _ => shape.slots(s.members.len(), spacing_m),
     }

@@ -63,11 +63,20 @@ impl Shape {
         }
     }
 
-    /// The slots of `count` drones as in [`Self::slots`] where drones hang dead at the places `dead`, relative to the front slot, m: the
-    /// first slots of the smallest formation that has enough of them at least `keep_m` away from those. [`Self::slots`] if none has.
+    /// The slots of `count` drones as in [`Self::slots`] with the front slot at `front`, where drones hang dead at the places `dead` (both
+    /// world frame, m): the first slots of the smallest formation that has enough of them at least [`SLOT_BERTH`] safe distances away
+    /// from those. [`Self::slots`] if none has.
     #[must_use]
-    pub fn free_slots(&self, count: usize, spacing_m: f64, dead: &[Vec2], keep_m: f64) -> Vec<Vec2> {
-        let is_free = |slot: &Vec2| dead.iter().all(|place| (slot - place).norm() >= keep_m);
+    pub fn free_slots(
+        &self,
+        count: usize,
+        spacing_m: f64,
+        front: Vec2,
+        dead: &[Vec2],
+        safe_distance_m: f64,
+    ) -> Vec<Vec2> {
+        let keep_m = SLOT_BERTH * safe_distance_m;
+        let is_free = |slot: &Vec2| dead.iter().all(|place| (slot - (place - front)).norm() >= keep_m);
         let free = |size| self.slots(size, spacing_m).into_iter().filter(is_free).take(count).collect::<Vec<_>>();
         let largest = count + MOST_BLOCKED * dead.len();
         (count..=largest).map(free).find(|free| free.len() == count).unwrap_or_else(|| self.slots(count, spacing_m))
@@ -131,7 +140,8 @@ mod tests {
     #[test]
     fn a_blocked_slot_is_left_free() {
         let xs = |shape: &Shape, count, x: f64, y: f64| -> Vec<f64> {
-            shape.free_slots(count, 20.0, &[Vec2::new(x, y)], 12.0).iter().map(|slot| slot.x).collect()
+            let (front, dead) = (Vec2::new(500.0, 30.0), Vec2::new(500.0 + x, 30.0 + y));
+            shape.free_slots(count, 20.0, front, &[dead], 12.0 / SLOT_BERTH).iter().map(|slot| slot.x).collect()
         };
         assert_eq!(xs(&Shape::Column, 4, -20.0, 13.0), [0.0, -20.0, -40.0, -60.0]);
         assert_eq!(xs(&Shape::Column, 4, -30.0, 0.0), [0.0, -60.0, -80.0, -100.0]);

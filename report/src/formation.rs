@@ -3,7 +3,6 @@
 use crate::facts::{MissionEnd, RunFacts};
 use crate::tuning::{SOLVE_ALWAYS_DRONES_MAX, SOLVE_PERIOD_S};
 use skein_protocol::Vec2;
-use skein_protocol::formation::SLOT_BERTH;
 use skein_protocol::matching::least_cost;
 
 /// The error of a formation after the best translation and assignment.
@@ -47,8 +46,7 @@ pub(crate) fn slots(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Option<Vec
 /// free.
 pub(crate) fn around_dead(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Vec<Vec2> {
     let MissionEnd::Goal { front_m } = facts.end else { return facts.shape.slots(count, facts.spacing_m) };
-    let dead: Vec<Vec2> = dead.iter().map(|place| place - Vec2::from(front_m)).collect();
-    facts.shape.free_slots(count, facts.spacing_m, &dead, SLOT_BERTH * facts.safe_distance_m)
+    facts.shape.free_slots(count, facts.spacing_m, front_m.into(), dead, facts.safe_distance_m)
 }
 
 /// The points relative to their mean.

@@ -9,8 +9,7 @@ use skein_protocol::formation::SLOT_BERTH;
 /// (world frame, m) hangs so close to it that no other drone may come there.
 pub(crate) fn slots(params: &WorldParams, drones: usize, dead: &[Vec2]) -> Vec<Vec2> {
     let End::Goal { front_m } = params.end else { return params.shape.slots(drones, params.spacing_m) };
-    let dead: Vec<Vec2> = dead.iter().map(|place| place - front_m).collect();
-    params.shape.free_slots(drones, params.spacing_m, &dead, SLOT_BERTH * params.safe_distance_m)
+    params.shape.free_slots(drones, params.spacing_m, front_m, dead, params.safe_distance_m)
 }
 
 /// Whether a slot at this place may be left free: a dead drone hangs so close to it that a leader may take it for blocked. World frame, m.
