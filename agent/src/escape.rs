@@ -20,6 +20,9 @@ const FREE_S: f64 = 20.0;
 /// A drone is stuck if it has not left the place where it is for this many times the patience. The place is as large as a still drone
 /// flies in that time: a drone that swings to and fro over some metres is stuck as well, but is given more time.
 const WINDOWS: [f64; 2] = [1.0, 10.0];
+/// A drone is stuck as well if it has been pushed back for this many times the patience. Without this, of two drones that meet in a channel
+/// too narrow for both, one pushes the other along it, faster than a still drone and slower than either would fly alone.
+const PUSHED_WINDOW: f64 = 10.0;
 /// Directions of the attempts, relative to the blocked direction, rad, in the order in which they are tried.
 const TURNS: [f64; 5] = [
     std::f64::consts::PI,
@@ -34,6 +37,7 @@ const TURNS: [f64; 5] = [
 pub struct Escape {
     /// For each of [`WINDOWS`].
     stays: [Option<Stay>; WINDOWS.len()],
+    pushed: Option<Pushed>,
     until: Option<SimTime>,
     direction: Vec2,
     attempts: usize,
@@ -61,6 +65,16 @@ struct Stay {
     position: Vec2,
 }
 
+/// How far a drone has been pushed back since when.
+#[derive(Clone, Copy, Debug)]
+struct Pushed {
+    since: SimTime,
+    /// Where it is now, m.
+    position: Vec2,
+    /// How far it has come since then in the direction that it wanted, m. Negative.
+    gained_m: f64,
+}
+
 impl Escape {
     /// Number of attempts since the drone was last free.
     #[must_use]
@@ -72,9 +86,9 @@ impl Escape {
     /// it is a velocity of magnitude `speed_mps` in another direction, for 6 to 16 s. `scale`: how small the swarm is.
     ///
     /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone, or not for ten
-    /// times as long. By words, it has to be still as well, and the longer time does not count.
+    /// times as long, or if it has been pushed back for that long. By words, it has to be still as well, and the longer time does not count.
     pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
-        let Course { now, position, velocity, by_words, wanted } = *course;
+        let &Course { now, position, velocity, by_words, wanted } = course;
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
@@ -83,6 +97,7 @@ impl Escape {
         }
         if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
             self.stays = Default::default();
+            self.pushed = None;
             return wanted;
         }
         let still_mps = scale.speed(STILL_MPS);
@@ -95,6 +110,7 @@ impl Escape {
             *stay = stay.filter(is_here).or_else(|| (!steps).then_some(Stay { since: now, position }));
             is_stuck |= !steps && stay.is_some_and(|stay| now.since(stay.since) >= window_s);
         }
+        is_stuck |= !by_words && self.is_pushed_back(course, PUSHED_WINDOW * patience_s, still_mps);
         if !is_stuck {
             return wanted;
         }
@@ -103,7 +119,18 @@ impl Escape {
         self.until = Some(now.after((FIRST_S + LONGER_S * self.attempts as f64).min(LONGEST_S)));
         self.attempts += 1;
         self.stays = Default::default();
+        self.pushed = None;
         self.direction * speed_mps
+    }
+
+    /// Whether the drone has been pushed back for so long, farther than a still drone moves in that time, and has never made up for it.
+    fn is_pushed_back(&mut self, course: &Course, window_s: f64, still_mps: f64) -> bool {
+        let &Course { now, position, wanted, .. } = course;
+        let before = self.pushed.unwrap_or(Pushed { since: now, position, gained_m: 0.0 });
+        let gained_m = before.gained_m + (position - before.position).dot(&wanted.normalize());
+        let since = if gained_m < 0.0 { before.since } else { now };
+        self.pushed = Some(Pushed { since, position, gained_m: gained_m.min(0.0) });
+        now.since(since) >= window_s && gained_m <= -still_mps * window_s
     }
 }
 
@@ -157,6 +184,25 @@ mod tests {
         let flown = flown(40, WANTED, 5.0, place);
         let escapes = flown.iter().position(|velocity| *velocity != WANTED);
         assert_eq!(escapes, Some(30), "{flown:?}");
+    }
+
+    #[test]
+    fn a_drone_that_is_pushed_back_escapes_backwards_and_one_that_is_pushed_aside_flies_on() {
+        let pushed = |push: Vec2| flown(40, WANTED, 5.0, |second| push * second);
+        let back = pushed(Vec2::new(-0.4, 0.0));
+        let escapes = back.iter().position(|velocity| *velocity != WANTED);
+        assert_eq!(escapes, Some(30), "{back:?}");
+        assert!((back[30] - Vec2::new(-5.0, 0.0)).norm() < 1e-9, "{back:?}");
+        assert!(pushed(Vec2::new(0.0, 0.4)).iter().all(|velocity| *velocity == WANTED));
+    }
+
+    #[test]
+    fn a_drone_that_makes_up_for_where_it_was_pushed_does_not_escape() {
+        // It is pushed back for 20 s, gains more in the next 10 s, and so on.
+        let place = |second: f64| {
+            Vec2::new(-(second % 30.0).min(20.0) + 2.1 * (second % 30.0 - 20.0).max(0.0) + (second / 30.0).floor(), 0.0)
+        };
+        assert!(flown(300, WANTED, 5.0, place).iter().all(|velocity| *velocity == WANTED));
     }
 
     #[test]

@@ -102,6 +102,7 @@ fn scenes_of_an_independent_generator_are_reached() {
         "own-route-behind-a-set",
         "part-of-an-outline",
         "parts-with-different-obstacles",
+        "pushed-along-a-channel",
         "restarted-and-left-behind",
         "restarts-in-a-corridor",
         "shut-out",
