@@ -88,7 +88,7 @@ impl Escape {
     /// A drone is stuck if for `patience_s` it has not been farther away than it would be at the speed of a still drone, or not for ten
     /// times as long, or if it has been pushed back for that long. By words, it has to be still as well, and the longer time does not count.
     pub fn steer(&mut self, course: &Course, patience_s: f64, speed_mps: f64, scale: Scale) -> Vec2 {
-        let &Course { now, position, velocity, by_words, wanted } = course;
+        let Course { now, position, velocity, by_words, wanted } = *course;
         if self.until.is_some_and(|until| now < until) {
             return self.direction * speed_mps;
         }
@@ -125,7 +125,7 @@ impl Escape {
 
     /// Whether the drone has been pushed back for so long, farther than a still drone moves in that time, and has never made up for it.
     fn is_pushed_back(&mut self, course: &Course, window_s: f64, still_mps: f64) -> bool {
-        let &Course { now, position, wanted, .. } = course;
+        let Course { now, position, wanted, .. } = *course;
         let before = self.pushed.unwrap_or(Pushed { since: now, position, gained_m: 0.0 });
         let gained_m = before.gained_m + (position - before.position).dot(&wanted.normalize());
         let since = if gained_m < 0.0 { before.since } else { now };
