@@ -8,6 +8,7 @@ use skein_leader::peers::Peers;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
+use smallvec::SmallVec;
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,26 +36,29 @@ pub(crate) struct NeighbourView<'a> {
     pub(crate) places: &'a [QueuePlace],
 }
 
-/// The neighbours of a drone.
+/// The neighbours of a drone. As many as most drones have are on the stack, whose memory stays in the cache while one thread steps many
+/// drones in turn.
+pub(crate) type Neighbours = SmallVec<[Neighbour; 32]>;
+
+/// Finds the neighbours of a drone.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourTable {
     params: NeighbourParams,
-    neighbours: Vec<Neighbour>,
     distant: DistantPeers,
 }
 
 impl NeighbourTable {
-    /// An empty table.
+    /// A table that has seen no peers.
     pub(crate) fn new(params: NeighbourParams) -> Self {
-        Self { params, neighbours: Vec::new(), distant: DistantPeers::default() }
+        Self { params, distant: DistantPeers::default() }
     }
 
-    /// Fills the table: first the neighbours that are ranged, then those known by beacon alone.
-    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) {
+    /// The neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
+    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) -> Neighbours {
         let senses = view.senses;
-        self.neighbours.clear();
+        let mut neighbours = Neighbours::new();
         for sensed in senses.neighbours {
-            self.neighbours.push(Neighbour {
+            neighbours.push(Neighbour {
                 id: sensed.drone,
                 position_m: sensed.position(),
                 velocity_mps: sensed.velocity(),
@@ -78,25 +82,22 @@ impl NeighbourTable {
             distant(&pose, away_m(&pose))
         });
         peers.visit(|index| {
-            if !view.peers.is_living_at(index, view.now) {
+            let (id, pose) = view.peers.at(index);
+            // Of a drone that is ranged, the beacon is not read: in a large swarm it is not in the cache.
+            if !view.peers.is_living_at(index, view.now) || senses.neighbours.iter().any(|n| n.drone == id) {
                 return None;
             }
-            let (id, pose) = view.peers.at(index);
             let position_m = away_m(&pose);
             let far = distant(&pose, position_m);
-            if far.is_none() && !senses.neighbours.iter().any(|n| n.drone == id) {
+            if far.is_none() {
                 let velocity_mps = pose.velocity() - senses.velocity();
                 let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
-                self.neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
+                neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
             }
             far
         });
         self.distant = peers;
-    }
-
-    /// The neighbours that were found.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = Neighbour> {
-        self.neighbours.iter().copied()
+        neighbours
     }
 
     /// This drone's share of an evasion, 0 to 1. It is 1 if the other drone is silent, and one half between drones that do
@@ -149,8 +150,7 @@ mod tests {
         places[0] = mine.map_or_else(QueuePlace::default, place);
         let mut table = NeighbourTable::new(PARAMS);
         let obeyed = PlanStamp::default();
-        table.update(&NeighbourView { now, senses: &senses, peers: &peers, obeyed, places: &places });
-        let found: Vec<Neighbour> = table.iter().collect();
+        let found = table.update(&NeighbourView { now, senses: &senses, peers: &peers, obeyed, places: &places });
         assert_eq!(found.len(), 1, "a neighbour that is ranged and heard counts once");
         found[0].share
     }

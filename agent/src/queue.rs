@@ -60,8 +60,10 @@ pub(crate) struct QueuePacer {
     seen: Option<usize>,
     /// The places of peers before one of `mine`, by rank. All other places are of no interest, so they are not kept.
     before: Vec<Queued>,
-    /// The peers of `before`, in the same order. Apart from it, so that a search touches little memory.
-    peers: Vec<u32>,
+    /// The ranks of `before`, in the same order. Apart from it, so that a search touches little memory.
+    ranks: Vec<u16>,
+    /// By the index of a peer: how many entries of `before` are its own.
+    entries: Vec<u8>,
     /// Memory for the queue that is looked at.
     ahead: Vec<Ahead>,
 }
@@ -109,7 +111,9 @@ impl QueuePacer {
             return;
         }
         self.before.clear();
-        self.peers.clear();
+        self.ranks.clear();
+        self.entries.clear();
+        self.entries.resize(peers.stamps().len(), 0);
         peers.all().zip(0..).for_each(|((_, pose), index)| self.note(index, &pose));
     }
 
@@ -119,23 +123,33 @@ impl QueuePacer {
         let is_before = |place: &QueuePlace| mine.iter().any(|own| is_ahead(place, own));
         let places = pose.queue().filter(is_before);
         let news = places.map(|place| Queued { peer, stamp: pose.stamp(), speed_mps: pose.velocity().norm(), place });
-        let known = self.peers.iter().filter(|known| **known == peer).count();
-        if let (1, 1, Some(new)) = (known, news.clone().count(), news.clone().next())
-            && let Some(at) = self.peers.iter().position(|known| *known == peer)
-            && self.before[at].place.rank == new.place.rank
+        let known = self.entries[peer as usize];
+        if known == 1
+            && let (Some(new), 1) = (news.clone().next(), news.clone().count())
+            && let Some(at) = self.find(peer, new.place.rank)
         {
             self.before[at] = new;
             return;
         }
         if known > 0 {
             self.before.retain(|known| known.peer != peer);
-            self.peers.retain(|known| *known != peer);
+            self.ranks.clear();
+            self.ranks.extend(self.before.iter().map(|known| known.place.rank));
+            self.entries[peer as usize] = 0;
         }
         for new in news {
-            let at = self.before.partition_point(|known| known.place.rank <= new.place.rank);
+            let at = self.ranks.partition_point(|rank| *rank <= new.place.rank);
             self.before.insert(at, new);
-            self.peers.insert(at, peer);
+            self.ranks.insert(at, new.place.rank);
+            self.entries[peer as usize] += 1;
         }
+    }
+
+    /// The index in `before` of a peer's entry with this rank.
+    fn find(&self, peer: u32, rank: u16) -> Option<usize> {
+        let first = self.ranks.partition_point(|known| *known < rank);
+        let same = self.ranks[first..].iter().take_while(|known| **known == rank).count();
+        (first..first + same).find(|at| self.before[*at].peer == peer)
     }
 
     /// Collects the living peers with a place before `mine` on the same route of the same set, sorted by rank. The remaining
@@ -212,6 +226,34 @@ mod tests {
         assert_eq!(queue(&peers), [ahead(0, 100.0), ahead(3, 100.0)]);
         hear(&mut peers, 5, 10.0, [place(1, 4), none]);
         assert_eq!(queue(&peers).len(), 3);
+    }
+
+    #[test]
+    fn what_is_kept_of_the_beacons_agrees_with_a_look_at_all() {
+        let mut peers = Peers::new(12, 1.0);
+        let mut pacer = QueuePacer::default();
+        for step in 0..3000_u32 {
+            let draw =
+                |salt: u32, below: u32| (step.wrapping_mul(0x9e37_79b9) ^ salt.wrapping_mul(0x85eb_ca6b)) % below;
+            let stamp = SimTime::from_secs(0.01 * f64::from(step + 1));
+            let place = |salt| QueuePlace {
+                remaining_m: f64::from(draw(salt, 97)),
+                set: 7 * u32::from(draw(salt + 1, 3) > 0),
+                route: draw(salt + 2, 2) as u16,
+                rank: draw(salt + 3, 5) as u16,
+            };
+            let queue = [place(10), place(20)];
+            peers.hear(stamp, DroneId(draw(30, 12)), Pose { stamp, queue, ..Pose::zeroed() });
+            let places = [0, 1].map(|route| QueuePlace { remaining_m: 300.0, set: 7, route, rank: 4 });
+            let mut anew = QueuePacer::default();
+            for place in places {
+                pacer.speed_mps(places.into_iter(), &peers, stamp, &PARAMS);
+                pacer.collect_ahead(place, &peers, stamp);
+                anew.speed_mps(places.into_iter(), &peers, stamp, &PARAMS);
+                anew.collect_ahead(place, &peers, stamp);
+                assert_eq!(pacer.ahead, anew.ahead, "step {step}");
+            }
+        }
     }
 
     #[test]

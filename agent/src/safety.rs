@@ -10,7 +10,14 @@ use skein_leader::geometry::nearest;
 use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, Vec2};
+use smallvec::SmallVec;
 use std::collections::VecDeque;
+
+/// Number of neighbours for which there is room on the stack. Its memory stays in the cache while one thread steps many drones in turn.
+const FEW: usize = 32;
+
+/// A list that seldom has more than [`FEW`] entries.
+type Few<T> = SmallVec<[T; FEW]>;
 
 /// Constants of the filter. The lengths and speeds in this file are those at full [`Scale`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,12 +118,10 @@ pub struct Neighbour {
     pub share: f64,
 }
 
-/// The behaviour that was expected of a sensed neighbour in an earlier tick.
+/// The behaviour that was expected of a neighbour in an earlier tick.
 #[derive(Clone, Copy, Debug)]
 struct Expectation {
     id: DroneId,
-    /// Its velocity in that tick, world frame, m/s.
-    velocity: Vec2,
     /// Unit vector from it to this drone.
     normal: Vec2,
     /// The share of the acceleration away from this drone that was due from it, m/s².
@@ -127,28 +132,19 @@ struct Expectation {
 #[derive(Clone, Debug)]
 pub struct Safety {
     params: SafetyParams,
-    /// The obstacles in reach.
-    obstacles: Vec<NearObstacle>,
-    planes: Vec<HalfPlane>,
     program: Program,
     /// Expectations of the neighbours, the newest last. One entry per tick, kept until the commands of that tick have taken
     /// effect.
     expected: VecDeque<Vec<Expectation>>,
-    assessed: Vec<Assessed>,
+    /// The velocities of the neighbours in the last tick, world frame, m/s.
+    velocities: Vec<(DroneId, Vec2)>,
 }
 
 impl Safety {
     /// Creates a filter with these constants and an empty memory.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        Self {
-            params,
-            obstacles: Vec::new(),
-            planes: Vec::new(),
-            program: Program::default(),
-            expected: VecDeque::new(),
-            assessed: Vec::new(),
-        }
+        Self { params, program: Program::default(), expected: VecDeque::new(), velocities: Vec::new() }
     }
 
     /// The present constants of the filter.
@@ -174,51 +170,47 @@ impl Safety {
     ) -> Vec2 {
         let params = self.params;
         let reach_m = params.clearance_m + OBSTACLE_REACH_M;
-        self.obstacles.clear();
-        self.obstacles.extend(obstacles.filter(|obstacle| obstacle.distance_m <= reach_m));
-        self.planes.clear();
-        self.planes.extend(self.obstacles.iter().map(|o| params.obstacle_plane(o, velocity, &self.obstacles)));
+        let obstacles: Few<NearObstacle> = obstacles.filter(|obstacle| obstacle.distance_m <= reach_m).collect();
+        let planes = obstacles.iter().map(|o| params.obstacle_plane(o, velocity, &obstacles));
+        let mut planes: SmallVec<[HalfPlane; 2 * FEW]> = planes.collect();
         let lag = (params.reaction_time_s / params.dt_s).round() as usize;
         let full = self.expected.len() > lag + 1;
         let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
         expectations.clear();
-        let mut assessed = std::mem::take(&mut self.assessed);
-        assessed.clear();
-        assessed.extend(neighbours.map(|neighbour| self.assess(neighbour, velocity, lag)));
-        let mut tiers = [self.planes.len(); 2];
+        let neighbours = neighbours.enumerate();
+        let assessed: Few<Assessed> = neighbours.map(|(at, one)| self.assess(at, one, velocity, lag)).collect();
+        let mut tiers = [planes.len(); 2];
+        self.velocities.clear();
         let in_order = assessed.iter().filter(|c| c.first).chain(assessed.iter().filter(|c| !c.first));
         for Assessed { neighbour, barrier, braking, missing, first } in in_order {
-            self.planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));
-            self.planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
+            planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));
+            planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
             if *first {
-                tiers[1] = self.planes.len();
+                tiers[1] = planes.len();
             }
-            expectations.push(Expectation {
-                id: neighbour.id,
-                velocity: velocity + neighbour.velocity_mps,
-                normal: barrier.normal,
-                due: (barrier.share - 1.0) * barrier.slack,
-            });
+            self.velocities.push((neighbour.id, velocity + neighbour.velocity_mps));
+            let due = (barrier.share - 1.0) * barrier.slack;
+            expectations.push(Expectation { id: neighbour.id, normal: barrier.normal, due });
         }
-        self.assessed = assessed;
         self.expected.push_back(expectations);
-        self.program.solve(&self.planes, tiers, params.acceleration_max_mps2, wanted)
+        self.program.solve(&planes, tiers, params.acceleration_max_mps2, wanted)
     }
 
     /// Assesses a neighbour. Three kinds have priority over the others: a neighbour that cannot evade, one that has
     /// precedence in a queue and is non-cooperative, and one that has come deep into the margin. A silent neighbour that
     /// closes in faster than this drone does is not a hovering body and has to brake itself. It has no priority, so that a
-    /// drone chased from behind does not fly into what is ahead.
-    fn assess(&self, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Assessed {
+    /// drone chased from behind does not fly into what is ahead. `at`: its index among the neighbours.
+    fn assess(&self, at: usize, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Assessed {
         let params = &self.params;
-        let find = |known: Option<&Vec<Expectation>>| -> Option<Expectation> {
-            known.filter(|_| neighbour.sensed)?.iter().find(|expected| expected.id == neighbour.id).copied()
-        };
-        let due = self.expected.len().checked_sub(lag + 1).and_then(|i| self.expected.get(i));
         let other_velocity = velocity + neighbour.velocity_mps;
-        let change = |expected: Expectation| (other_velocity - expected.velocity) / params.dt_s;
-        let braking = find(self.expected.back()).map_or_else(Vec2::zeros, change);
-        let missing = find(due).map_or(0.0, |expected| expected.missing(braking));
+        let (mut braking, mut missing) = (Vec2::zeros(), 0.0);
+        if neighbour.sensed {
+            let before = find(&self.velocities, at, |(id, _)| *id == neighbour.id);
+            braking = before.map_or_else(Vec2::zeros, |(_, before)| (other_velocity - before) / params.dt_s);
+            let due = self.expected.len().checked_sub(lag + 1).and_then(|i| self.expected.get(i));
+            let due = due.and_then(|due| find(due, at, |expected| expected.id == neighbour.id));
+            missing = due.map_or(0.0, |expected| expected.missing(braking));
+        }
         let barrier = params.neighbour_barrier(&neighbour);
         let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
         let intruded_m = params.keep_m(0.0) - INTRUSION * params.margin_m();
@@ -227,6 +219,11 @@ impl Safety {
             || (neighbour.sensed && neighbour.position_m.norm() < intruded_m);
         Assessed { neighbour, barrier, braking, missing, first }
     }
+}
+
+/// The entry that `is_it` accepts. It is usually the one at the index `guess`.
+fn find<T>(list: &[T], guess: usize, is_it: impl Fn(&T) -> bool) -> Option<&T> {
+    list.get(guess).filter(|one| is_it(one)).or_else(|| list.iter().find(|one| is_it(one)))
 }
 
 /// A neighbour and its assessment.

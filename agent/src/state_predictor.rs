@@ -7,15 +7,16 @@ use crate::reaction::PendingMotion;
 use crate::safety::NearObstacle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, Senses};
 use skein_protocol::{SimTime, raised};
+use smallvec::SmallVec;
 
-/// Predicted senses, and the memory for their entries.
+/// Predicted senses. There is room on the stack for as many entries as most drones sense.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StatePredictor {
     now: SimTime,
     position_m: [f64; 3],
     velocity_mps: [f64; 3],
-    obstacles: Vec<SensedObstacle>,
-    neighbours: Vec<SensedNeighbour>,
+    obstacles: SmallVec<[SensedObstacle; 8]>,
+    neighbours: SmallVec<[SensedNeighbour; 32]>,
 }
 
 impl StatePredictor {

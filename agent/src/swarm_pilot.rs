@@ -66,7 +66,6 @@ pub struct SwarmPilot {
     reaction: ReactionDelay,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
-    predictor: StatePredictor,
     escape: Escape,
     straggler: Straggler,
     stale_formation: StaleFormation,
@@ -106,7 +105,6 @@ impl SwarmPilot {
             turn: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             stepped: None,
-            predictor: StatePredictor::default(),
             escape: Escape::default(),
             straggler: Straggler::default(),
             stale_formation: StaleFormation::default(),
@@ -366,7 +364,13 @@ impl SwarmPilot {
     }
 
     /// The safe acceleration nearest to the one that leads to the wanted velocity, m/s².
-    fn safe_acceleration(&mut self, wanted: Vec2, now: &Senses<'_>, senses: &Senses<'_>) -> Vec2 {
+    fn safe_acceleration(
+        &mut self,
+        wanted: Vec2,
+        now: &Senses<'_>,
+        senses: &Senses<'_>,
+        neighbours: &[Neighbour],
+    ) -> Vec2 {
         let gain = self.params.velocity_gain_per_s;
         let error_m = self.obstacle_error_m(senses);
         let obstacles = senses
@@ -378,7 +382,7 @@ impl SwarmPilot {
         // Drones that keep apart by words keep to the lines between them instead of fleeing from where an old beacon was.
         let words = self.separations.as_deref();
         let by_words = |n: &Neighbour| !n.sensed && words.is_some_and(|lines| lines.has_agreed(n.id));
-        let neighbours = self.neighbours.iter().filter(|n| !self.params.apart_by_words && !by_words(n));
+        let neighbours = neighbours.iter().copied().filter(|n| !self.params.apart_by_words && !by_words(n));
         let wanted = (wanted - senses.velocity()) * gain;
         let smooth = self.safety.filter(wanted, senses.velocity(), obstacles, neighbours);
         self.keep_braking_path(smooth, now, senses)
@@ -429,7 +433,7 @@ impl SwarmPilot {
 
     /// The acceleration to command now, m/s², computed for the moment at which it takes effect.
     fn steer(&mut self, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
-        let mut predictor = std::mem::take(&mut self.predictor);
+        let mut predictor = StatePredictor::default();
         let delay_s = self.reaction.delay_s();
         let then = if delay_s > 0.0 {
             predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity()));
@@ -441,16 +445,14 @@ impl SwarmPilot {
             Some(place) => self.velocity_to_slot(&then, place, Vec2::zeros()),
             None => self.unstuck_velocity(senses.now, &then, open),
         };
-        self.neighbours.update(&NeighbourView {
+        let neighbours = self.neighbours.update(&NeighbourView {
             now: senses.now,
             senses: &then,
             peers: self.leading.peers(),
             obeyed: self.leading.stamp(),
             places: open,
         });
-        let safe = self.safe_acceleration(wanted, senses, &then);
-        self.predictor = predictor;
-        safe
+        self.safe_acceleration(wanted, senses, &then, &neighbours)
     }
 
     /// Where the drone looks for another one that it has lost, world frame, m.

@@ -55,6 +55,7 @@ mod fork_guard;
 mod futex;
 mod home_file;
 mod host;
+mod large_pages;
 mod mission;
 pub mod payload;
 pub mod ports;
@@ -80,6 +81,7 @@ pub use drone_endpoint::{DroneEndpoint, TickSignal};
 pub use error::BusError;
 pub use fork_guard::ForkGuard;
 pub use host::{PinMode, allowed_cores, pin_to_core, raise_file_limit};
+pub use large_pages::LargePages;
 pub use mission::WorldState;
 pub use payload::UplinkHeader;
 pub use ports::{

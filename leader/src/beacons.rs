@@ -16,6 +16,8 @@ pub(crate) struct Beacons {
     /// First and second entries of [`Pose::queue`]. A list is empty while all its entries are unused.
     queues: [Vec<QueuePlace>; MAX_PLACES],
     allegiances: SharedValues<Allegiance>,
+    /// Number of the drones that say which part of the swarm they hear: [`Pose::hears`].
+    hearing_parts: usize,
 }
 
 /// What differs from drone to drone. It fills one line of the cache: the states of a large swarm do not fit into it.
@@ -85,6 +87,7 @@ impl Beacons {
         let allegiance = self.allegiances.share(&pose.into());
         self.stamps.insert(index, pose.stamp);
         self.states.insert(index, State::new(pose, allegiance));
+        self.hearing_parts += usize::from(pose.hears != 0);
         for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
             queue.insert(index, QueuePlace::default());
         }
@@ -96,6 +99,7 @@ impl Beacons {
     pub(crate) fn replace(&mut self, index: usize, pose: &Pose) {
         let state = &mut self.states[index];
         let was_queued = state.queued;
+        self.hearing_parts = self.hearing_parts + usize::from(pose.hears != 0) - usize::from(state.hears != 0);
         *state = State::new(pose, self.allegiances.replace(state.allegiance, &pose.into()));
         self.stamps[index] = pose.stamp;
         if was_queued || state.queued {
@@ -118,10 +122,22 @@ impl Beacons {
     /// Removes a beacon. The index of those behind it falls by one.
     pub(crate) fn remove(&mut self, index: usize) {
         self.stamps.remove(index);
-        self.allegiances.release(self.states.remove(index).allegiance);
+        let State { allegiance, hears, .. } = self.states.remove(index);
+        self.allegiances.release(allegiance);
+        self.hearing_parts -= usize::from(hears != 0);
         for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
             queue.remove(index);
         }
+    }
+
+    /// Whether some drone says which part of the swarm it hears.
+    pub(crate) fn some_hear_parts(&self) -> bool {
+        self.hearing_parts > 0
+    }
+
+    /// Whether some drone of a group within `scope` obeys an earlier term.
+    pub(crate) fn some_lag(&self, term: Ballot, scope: GroupId) -> bool {
+        self.allegiances.used().any(|one| one.term < term && scope.contains(one.group))
     }
 
     /// Gives back the memory of queues in which no drone waits any more.
@@ -280,7 +296,8 @@ impl Beacon<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bytemuck::Zeroable;
+
+    const TERM: Ballot = Ballot { round: 3, ..Ballot::NONE };
 
     fn pose(number: u32) -> Pose {
         let place = |route| QueuePlace { remaining_m: f64::from(number), set: 9, route, rank: number as u16 };
@@ -297,8 +314,8 @@ mod tests {
             group: GroupId::ALL.child((number % 2) as u8 + 1),
             incarnation: 1 + number % 7 / 6,
             flags: number % 4,
-            hears: number.wrapping_mul(77),
-            ..Pose::zeroed()
+            hears: number % 3 * 77,
+            term: Ballot { round: number / 400, ..Ballot::NONE },
         }
     }
 
@@ -325,6 +342,9 @@ mod tests {
                 }
             }
             assert_eq!(beacons.iter().map(|beacon| beacon.pose()).collect::<Vec<_>>(), expected);
+            assert_eq!(beacons.hearing_parts, expected.iter().filter(|pose| pose.hears != 0).count());
+            let lags = |pose: &Pose| pose.term < TERM && GroupId::ALL.contains(pose.group);
+            assert_eq!(beacons.some_lag(TERM, GroupId::ALL), expected.iter().any(lags));
         }
     }
 

@@ -1,4 +1,5 @@
-//! Where a drone keeps what it may pass on. A large swarm has a thousand assignments: each is found by its drone, without a search.
+//! Where a drone keeps what it may pass on. A large swarm has a thousand assignments and passages: each is found by its drone, without a
+//! search.
 
 use crate::subject::Subject;
 use skein_protocol::{DroneId, GroupId, SimTime};
@@ -9,9 +10,9 @@ use std::hint::black_box;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FactStore<T> {
     drones: u32,
-    /// By drone: its assignments in the plans for these groups. They are few.
-    parts: Vec<Vec<(GroupId, T)>>,
-    /// All others, and assignments of no drone of the swarm.
+    /// By drone: what is about it. These are few.
+    of_drones: Vec<Vec<(Subject, T)>>,
+    /// What is about no drone of the swarm.
     others: BTreeMap<Subject, T>,
     /// Number of entries.
     len: usize,
@@ -20,7 +21,7 @@ pub(crate) struct FactStore<T> {
 impl<T> FactStore<T> {
     /// No entry, in a swarm of `drones`.
     pub(crate) fn new(drones: u32) -> Self {
-        Self { drones, parts: Vec::new(), others: BTreeMap::new(), len: 0 }
+        Self { drones, of_drones: Vec::new(), others: BTreeMap::new(), len: 0 }
     }
 
     /// Number of entries.
@@ -28,30 +29,28 @@ impl<T> FactStore<T> {
         self.len
     }
 
-    /// The drone and the group, if this is the assignment of a drone of the swarm.
-    fn part(&self, subject: &Subject) -> Option<(DroneId, GroupId)> {
-        match *subject {
-            Subject::Part(scope, drone) if drone.0 < self.drones => Some((drone, scope)),
-            _ => None,
-        }
+    /// The index of the drone of the swarm that a subject is about.
+    fn drone(&self, subject: &Subject) -> Option<usize> {
+        subject.drone().filter(|drone| drone.0 < self.drones).map(DroneId::index)
     }
 
     /// The entry of a subject.
     pub(crate) fn get_mut(&mut self, subject: &Subject) -> Option<&mut T> {
-        let Some((drone, scope)) = self.part(subject) else { return self.others.get_mut(subject) };
-        self.parts_of(drone).find(|(of, _)| *of == scope).map(|(_, entry)| entry)
+        let Some(drone) = self.drone(subject) else { return self.others.get_mut(subject) };
+        let mut entries = self.of_drones.get_mut(drone)?.iter_mut();
+        entries.find(|(about, _)| about == subject).map(|(_, entry)| entry)
     }
 
     /// Whether a subject has an entry.
     pub(crate) fn contains(&self, subject: &Subject) -> bool {
-        let Some((drone, scope)) = self.part(subject) else { return self.others.contains_key(subject) };
-        self.parts.get(drone.index()).is_some_and(|parts| parts.iter().any(|(of, _)| *of == scope))
+        let Some(drone) = self.drone(subject) else { return self.others.contains_key(subject) };
+        self.of_drones.get(drone).is_some_and(|entries| entries.iter().any(|(about, _)| about == subject))
     }
 
-    /// Reads something of the assignments of a drone, so that they are in the cache.
+    /// Reads something of what is about a drone, so that it is in the cache.
     #[inline]
     pub(crate) fn warm(&self, drone: DroneId, read: impl Fn(&T) -> SimTime) {
-        black_box(self.parts.get(drone.index()).and_then(|parts| parts.first()).map(|(_, entry)| read(entry)));
+        black_box(self.of_drones.get(drone.index()).and_then(|entries| entries.first()).map(|(_, entry)| read(entry)));
     }
 
     /// Adds an entry, or replaces the one of the same subject.
@@ -61,29 +60,35 @@ impl<T> FactStore<T> {
             return;
         }
         self.len += 1;
-        let Some((drone, scope)) = self.part(&subject) else {
+        let Some(drone) = self.drone(&subject) else {
             self.others.insert(subject, entry);
             return;
         };
-        if self.parts.len() <= drone.index() {
-            self.parts.resize_with(drone.index() + 1, Vec::new);
+        if self.of_drones.len() <= drone {
+            self.of_drones.resize_with(drone + 1, Vec::new);
         }
-        let parts = &mut self.parts[drone.index()];
+        let entries = &mut self.of_drones[drone];
         // Mostly there is one.
-        parts.reserve_exact(1);
-        parts.push((scope, entry));
+        entries.reserve_exact(1);
+        entries.push((subject, entry));
     }
 
     /// The assignments of a drone of the swarm, and the groups for which the plans are.
     pub(crate) fn parts_of(&mut self, drone: DroneId) -> impl Iterator<Item = (GroupId, &mut T)> {
-        self.parts.get_mut(drone.index()).into_iter().flatten().map(|(scope, entry)| (*scope, entry))
+        let entries = self.of_drones.get_mut(drone.index()).into_iter().flatten();
+        entries.filter_map(|(about, entry)| match *about {
+            Subject::Part(scope, _) => Some((scope, entry)),
+            _ => None,
+        })
     }
 
-    /// Removes all other entries.
-    pub(crate) fn retain(&mut self, stays: impl Fn(&T) -> bool) {
+    /// Removes all other entries. Returns whether any was removed.
+    pub(crate) fn retain(&mut self, mut stays: impl FnMut(&T) -> bool) -> bool {
+        let before = self.len;
         self.others.retain(|_, entry| stays(entry));
-        self.parts.iter_mut().for_each(|parts| parts.retain(|(_, entry)| stays(entry)));
-        self.len = self.others.len() + self.parts.iter().map(Vec::len).sum::<usize>();
+        self.of_drones.iter_mut().for_each(|entries| entries.retain(|(_, entry)| stays(entry)));
+        self.len = self.others.len() + self.of_drones.iter().map(Vec::len).sum::<usize>();
+        self.len < before
     }
 
     /// Removes all entries.
@@ -117,7 +122,8 @@ mod tests {
             store.parts_of(DroneId(9)).map(|(scope, entry)| (scope, *entry)).collect::<Vec<_>>(),
             [(first, 1), (all, 2)]
         );
-        store.retain(|entry| entry % 2 == 1);
+        assert!(!store.retain(|_| true));
+        assert!(store.retain(|entry| entry % 2 == 1));
         assert_eq!(subjects.map(|subject| store.contains(&subject)), [false, true, false, true, false, true]);
         assert_eq!(store.len(), 3);
         store.clear();

@@ -25,6 +25,7 @@ use crate::situation::Situation;
 use skein_protocol::payload::{Assignment, Leadership, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
+use std::hint::black_box;
 
 /// From this number of drones on, what a drone knows of the others may not be in the cache. Chosen by hand.
 const LARGE: u32 = 64;
@@ -202,17 +203,21 @@ impl Leading {
             return;
         }
         let peers = self.peers();
+        let stamp_of = peers.stamp_finder();
         for (source, message) in heard.clone() {
             peers.warm(source);
-            if let MessageRef::Presence(presence) = message {
-                presence.present().iter().for_each(|present| peers.warm_stamp(present.drone));
+            match message {
+                MessageRef::Presence(presence) => presence.present().iter().for_each(|present| {
+                    black_box(stamp_of(present.drone));
+                }),
+                _ => self.relays.warm_facts(source, message),
             }
         }
         for (source, message) in heard {
             let MessageRef::Presence(presence) = message else { continue };
             let near = self.relays.is_near(&self.knowledge, source);
             for present in presence.present() {
-                let is_new = peers.stamp_of(present.drone) < Some(present.stamp);
+                let is_new = stamp_of(present.drone) < Some(present.stamp);
                 if near || is_new {
                     self.relays.warm(present.drone);
                 }

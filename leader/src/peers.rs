@@ -6,7 +6,7 @@ use crate::changes::Changes;
 use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS, RELAYED_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
-use skein_protocol::{DroneId, PlanStamp, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime};
 use std::hint::black_box;
 
 /// A beacon that took longer to arrive does not count, s.
@@ -82,6 +82,8 @@ pub struct Peers {
     /// Those that were heard without a relay, ascending: all that may still count as heard so, and some that no longer do. In a wide
     /// swarm they are few.
     near: Vec<DroneId>,
+    /// All of `near` certainly count as heard without a relay until then.
+    direct_until: SimTime,
 }
 
 impl Peers {
@@ -101,6 +103,7 @@ impl Peers {
             changes: Changes::default(),
             last: Vec::new(),
             near: Vec::new(),
+            direct_until: SimTime::MAX,
         }
     }
 
@@ -123,13 +126,14 @@ impl Peers {
             return;
         }
         let place = self.place(source);
-        if direct.is_some() && place.is_ok_and(|place| now.since(self.last[place].direct) > self.timeout_s) {
-            self.note_near(source);
+        let before = place.ok().map(|place| self.last[place].direct);
+        if let Some(heard) = before.filter(|heard| direct.is_some() && now.since(*heard) > self.timeout_s) {
+            self.note_near(heard, source);
         }
         match place {
             Err(place) => {
                 if direct.is_some() {
-                    self.note_near(source);
+                    self.note_near(now, source);
                 }
                 let timeout = self.prior(now, direct.is_some());
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
@@ -163,8 +167,9 @@ impl Peers {
         }
     }
 
-    /// Adds a peer to those heard without a relay.
-    fn note_near(&mut self, peer: DroneId) {
+    /// Adds a peer to those heard without a relay. It was last heard so at this time, or later.
+    fn note_near(&mut self, heard: SimTime, peer: DroneId) {
+        self.direct_until = self.direct_until.min(self.certain_until(heard));
         if let Err(place) = self.near.binary_search(&peer) {
             self.near.insert(place, peer);
         }
@@ -183,9 +188,16 @@ impl Peers {
         let longest_s = MAX_TIMEOUTS * self.timeout_s;
         let mut near = std::mem::take(&mut self.near);
         near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
+        let heard = near.iter().filter_map(|peer| Some(self.get(*peer)?.direct)).min();
+        self.direct_until = heard.map_or(SimTime::MAX, |heard| self.certain_until(heard));
         self.near = near;
         self.all_but = lowest_but_one(&self.ids);
         self.beacons.tidy();
+    }
+
+    /// Until when a peer that is heard at this time certainly counts as heard.
+    fn certain_until(&self, heard: SimTime) -> SimTime {
+        heard + ((self.timeout_s - ROUNDING_S) * 1e9) as i64
     }
 
     /// Whether no peer is silent for too long, which needs no look at each.
@@ -213,12 +225,6 @@ impl Peers {
 
     fn get(&self, peer: DroneId) -> Option<&Peer> {
         self.place(peer).ok().map(|place| &self.last[place])
-    }
-
-    /// Reads the time stamp of a peer's last beacon, so that it is in the cache.
-    #[inline]
-    pub(crate) fn warm_stamp(&self, peer: DroneId) {
-        black_box(self.stamp_of(peer));
     }
 
     /// Reads all about a peer, so that it is in the cache.
@@ -260,17 +266,24 @@ impl Peers {
 
     /// What drone `me` says in [`Pose::hears`].
     pub(crate) fn hears(&self, me: DroneId, now: SimTime) -> u32 {
-        let heard = self.direct(now).count();
-        if heard == 0 || heard + 1 >= self.drones as usize {
+        if self.near.len() + 1 >= self.drones as usize && now <= self.direct_until {
             return 0;
         }
-        hash_of(self.direct(now).map(|(id, _)| id).chain([me]))
+        let mut heard = 0;
+        let hash = hash_of(self.direct(now).map(|(id, _)| id).inspect(|_| heard += 1).chain([me]));
+        if heard == 0 || heard + 1 >= self.drones as usize { 0 } else { hash }
     }
 
     /// How long a beacon takes to arrive, s: a running mean.
     #[must_use]
     pub fn delay_s(&self) -> f64 {
         self.delay_s
+    }
+
+    /// Whether some peer may hear other drones than those with which all drones are heard, or may obey an earlier term in this scope.
+    /// This needs no look at each peer.
+    pub(crate) fn may_differ(&self, term: Ballot, scope: GroupId) -> bool {
+        self.beacons.some_hear_parts() || self.beacons.some_lag(term, scope)
     }
 
     /// Forgets a peer.
@@ -305,6 +318,18 @@ impl Peers {
     /// The time stamp of a peer's last beacon.
     pub(crate) fn stamp_of(&self, peer: DroneId) -> Option<SimTime> {
         self.place(peer).ok().map(|place| self.stamps()[place])
+    }
+
+    /// As [`Self::stamp_of`], for many peers in turn.
+    #[inline]
+    pub(crate) fn stamp_finder(&self) -> impl Fn(DroneId) -> Option<SimTime> + '_ {
+        let (stamps, all_but) = (self.stamps(), self.all_but);
+        move |peer| match all_but {
+            Some(missing) if peer != missing && peer.index() <= stamps.len() => {
+                stamps.get(peer.index() - usize::from(peer > missing)).copied()
+            }
+            _ => self.stamp_of(peer),
+        }
     }
 
     /// The last beacon of a peer that is not silent for too long.
@@ -458,7 +483,7 @@ mod tests {
 
     #[test]
     fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
-        let mut peers = Peers::new(9, 1.0);
+        let mut peers = Peers::new(10, 1.0);
         for tick in 0..600u32 {
             let now = SimTime::from_secs(0.1 * f64::from(tick));
             for id in (0..9).filter(|id| tick.wrapping_mul(0x9e37_79b9).rotate_left(5 * id) % 16 < 2 + id) {
@@ -475,6 +500,8 @@ mod tests {
             let mut found = Vec::new();
             peers.ages_s(now, &mut found);
             assert_eq!(found, ages);
+            let direct = peers.known().filter(|(_, peer, _)| peer.is_direct(now, 1.0)).count();
+            assert_eq!(peers.hears(DroneId(9), now) == 0, direct == 0 || direct == 9, "tick {tick}");
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));

@@ -66,13 +66,22 @@ pub(crate) struct RelayedFacts {
     known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
+    /// Nothing was last heard before.
+    heard_since: SimTime,
 }
 
 impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
-        Self { me, repeat_s, room, known: FactStore::new(params.drones), turns: Turns::default() }
+        Self {
+            me,
+            repeat_s,
+            room,
+            known: FactStore::new(params.drones),
+            turns: Turns::default(),
+            heard_since: params.start,
+        }
     }
 
     /// Forgets all.
@@ -83,8 +92,33 @@ impl RelayedFacts {
 
     /// Forgets what was not heard for long.
     pub(crate) fn forget(&mut self, now: SimTime) {
-        self.known.retain(|one| now.since(one.heard) < RELAY_MEMORY_S);
-        self.turns.retain(|subject| self.known.contains(subject));
+        // A look at all costs as much as many ticks.
+        if now.since(self.heard_since) < RELAY_MEMORY_S {
+            return;
+        }
+        self.heard_since = now;
+        let stays = |one: &Relayed| {
+            let stays = now.since(one.heard) < RELAY_MEMORY_S;
+            if stays {
+                self.heard_since = self.heard_since.min(one.heard);
+            }
+            stays
+        };
+        if self.known.retain(stays) {
+            self.turns.retain(|subject| self.known.contains(subject));
+        }
+    }
+
+    /// Reads what is kept of the drones that a message of `source` is about, so that it is in the cache.
+    pub(crate) fn warm(&self, source: DroneId, message: MessageRef<'_>) {
+        let warm = |drone| self.known.warm(drone, |one| one.heard);
+        match message {
+            MessageRef::Assignment(part) => warm(part.drone),
+            MessageRef::AssignmentList(list) => list.assignments().for_each(|part| warm(part.drone)),
+            MessageRef::Arrivals(row) => warm(row.drone),
+            MessageRef::Passed(passed) => warm(passed.drone(source)),
+            _ => {}
+        }
     }
 
     /// Notes a message of `source`. `near`: that drone is close to this one.

@@ -131,7 +131,8 @@ impl Relays {
         let mut differs = false;
         let (term, scope) = (k.election().obeyed(), k.election().scope());
         self.lags = false;
-        for (_, pose) in k.peers().direct(now) {
+        let looked_at = if k.peers().may_differ(term, scope) { usize::MAX } else { 0 };
+        for (_, pose) in k.peers().direct(now).take(looked_at) {
             // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
             differs |= pose.hears() != 0 && pose.hears() != mine;
             self.lags |= pose.term() < term && scope.contains(pose.group());
@@ -209,6 +210,14 @@ impl Relays {
     #[inline]
     pub(crate) fn warm(&self, drone: DroneId) {
         self.presences.warm(drone);
+    }
+
+    /// Reads what is kept of the subjects of a message, so that it is in the cache.
+    #[inline]
+    pub(crate) fn warm_facts(&self, source: DroneId, message: MessageRef<'_>) {
+        if self.wide {
+            self.facts.warm(source, message);
+        }
     }
 
     /// Notes a message about leadership that `source` said. Returns whether it is to be obeyed: it comes from the leader

@@ -55,6 +55,11 @@ impl<T: Copy + PartialEq> SharedValues<T> {
         self.share(value)
     }
 
+    /// The values that some entry has.
+    pub(crate) fn used(&self) -> impl Iterator<Item = &T> {
+        self.slots.iter().filter(|slot| slot.uses > 0).map(|slot| &slot.value)
+    }
+
     /// All values, to be changed for all entries that have them.
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut T> {
         self.slots.iter_mut().map(|slot| &mut slot.value)
@@ -79,6 +84,7 @@ mod tests {
         let changed = values.replace(c, &9);
         assert_eq!((*values.get(a), *values.get(b), *values.get(changed)), (7, 8, 9));
         values.release(b);
+        assert_eq!(values.used().collect::<Vec<_>>(), [&7, &9]);
         assert_eq!(values.share(&10), b, "nobody has 8 any more");
         assert_eq!(values.slots.len(), 3);
     }

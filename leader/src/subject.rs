@@ -14,3 +14,13 @@ pub(crate) enum Subject {
     /// What this drone has passed.
     Passed(DroneId),
 }
+
+impl Subject {
+    /// The drone that it is about.
+    pub(crate) fn drone(&self) -> Option<DroneId> {
+        match *self {
+            Self::Plan(_) => None,
+            Self::Part(_, drone) | Self::Arrivals(_, drone) | Self::Passed(drone) => Some(drone),
+        }
+    }
+}

@@ -30,6 +30,10 @@ impl PartitionMask {
     /// by it.
     #[must_use]
     pub fn separates(self, other: Self) -> bool {
+        // Without this, a swarm that was never parted would compare all sides for each frame.
+        if self.0 == 0 || other.0 == 0 {
+            return false;
+        }
         (0..MAX_PARTITIONS).any(|partition| {
             let side = |mask: Self| mask.0 >> (partition * WIDTH) & ((1 << WIDTH) - 1);
             let (here, there) = (side(self), side(other));

@@ -154,13 +154,25 @@ impl<'a> MessageRef<'a> {
     /// [`DecodeError`] if the frame does not contain a valid message. No content of a frame causes a panic.
     #[inline]
     pub fn read(frame: &'a Frame) -> Result<Self, DecodeError> {
+        let message = Self::borrow(frame)?;
+        message.check()?;
+        Ok(message)
+    }
+
+    /// Borrows the message in a frame whose values [`MessageRef::read`] has checked before.
+    ///
+    /// # Errors
+    /// [`DecodeError`] if the frame does not contain a message. The values in the message can be any: no content of a frame causes
+    /// undefined behaviour.
+    #[inline]
+    pub fn borrow(frame: &'a Frame) -> Result<Self, DecodeError> {
         if frame.version != payload::VERSION {
             return Err(DecodeError::Version(frame.version));
         }
         if frame.kind & OWN_TOPIC != 0 {
             return UserMessage::read(frame).map(Self::User);
         }
-        let message = match Topic::from_wire(frame.kind).ok_or(DecodeError::Kind(frame.kind))? {
+        Ok(match Topic::from_wire(frame.kind).ok_or(DecodeError::Kind(frame.kind))? {
             Topic::Pose => Self::Pose(read(frame)?),
             Topic::Obstacle => Self::Obstacle(read(frame)?),
             Topic::Leadership => Self::Leadership(read(frame)?),
@@ -174,9 +186,7 @@ impl<'a> MessageRef<'a> {
             Topic::Passed => Self::Passed(read(frame)?),
             Topic::Separation => Self::Separation(read(frame)?),
             Topic::Presence => Self::Presence(read(frame)?),
-        };
-        message.check()?;
-        Ok(message)
+        })
     }
 
     /// Copies the message.
@@ -322,6 +332,17 @@ mod tests {
     #[test]
     fn a_decoded_message_equals_the_encoded_one() {
         assert_eq!(Message::decode(&obstacle().encode()), Ok(obstacle()));
+    }
+
+    #[test]
+    fn a_frame_is_borrowed_without_a_look_at_its_values() {
+        let mut frame = Message::Pose(bytemuck::Zeroable::zeroed()).encode();
+        assert_eq!(MessageRef::borrow(&frame), MessageRef::read(&frame));
+        frame.payload[8..16].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert_eq!(MessageRef::read(&frame), Err(DecodeError::Field("position")));
+        assert!(matches!(MessageRef::borrow(&frame), Ok(MessageRef::Pose(pose)) if pose.position_m[0].is_nan()));
+        frame.len += 1;
+        assert!(MessageRef::borrow(&frame).is_err());
     }
 
     #[test]

@@ -54,9 +54,23 @@ impl Locality {
         self.holds(OWN_TOPIC)
     }
 
+    /// Whether the frame is sure to be out of range at this place, world frame, m.
+    #[inline]
+    #[must_use]
+    pub fn is_beyond(&self, frame: &AirFrame, here: [f64; 3]) -> bool {
+        let offset = |axis: usize| frame.position_m[axis] - here[axis];
+        let [x, y, z] = [offset(0), offset(1), offset(2)];
+        self.holds(frame.frame.kind) && x * x + y * y + z * z > self.side_m() * self.side_m()
+    }
+
+    /// Side of a cell, m. It is slightly greater than the range, so that rounding never puts two points at exactly this distance two cells
+    /// apart.
+    fn side_m(&self) -> f64 {
+        (self.cell_m * 1.000_001).max(f64::MIN_POSITIVE)
+    }
+
     fn cell(&self, point: Vec2) -> (i32, i32) {
-        // The cells are slightly wider, so that rounding never puts two points at exactly this distance two cells apart.
-        let side_m = (self.cell_m * 1.000_001).max(f64::MIN_POSITIVE);
+        let side_m = self.side_m();
         ((point.x / side_m).floor() as i32, (point.y / side_m).floor() as i32)
     }
 }
@@ -159,6 +173,7 @@ impl<'a> NearbyFrames<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Vec3;
     use crate::ids::DroneId;
     use proptest::prelude::*;
 
@@ -191,6 +206,11 @@ mod tests {
                     prop_assert_eq!(visits, 1);
                 }
                 prop_assert!(visits <= 1);
+                if index.locality.is_beyond(frame, [here[0], here[1], 50.0]) {
+                    prop_assert!(local && (frame.position() - Vec3::new(here[0], here[1], 50.0)).norm() > 90.0);
+                } else {
+                    prop_assert!(!local || (frame.position() - Vec3::new(here[0], here[1], 50.0)).norm() < 90.1);
+                }
             }
         }
     }

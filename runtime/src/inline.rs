@@ -9,6 +9,7 @@ use crate::pacer::Pacer;
 use crate::pilot_host::{PilotHost, StepScratch};
 use crate::pilot_registry::PilotRegistry;
 use crate::run_end::RunEnd;
+use skein_bus::LargePages;
 use skein_protocol::downlink::DownlinkView;
 use skein_protocol::frame::Frame;
 use skein_protocol::record::{FaultKind, RecordSink};
@@ -23,6 +24,10 @@ use std::time::Instant;
 
 /// Drones that a thread takes at a time. Chosen by hand: few enough that a leader that plans does not keep others waiting.
 const CHUNK: usize = 8;
+
+/// From this number of drones on, the heap gets large pages: what drones know does not fit into the caches. Chosen by hand; with 64 drones
+/// it gains nothing.
+const LARGE_SWARM: usize = 100;
 
 /// Flies a mission in this thread with the pilots that the scenario names. `interrupted` is called once per tick; it returns the
 /// number of a signal that should stop the run.
@@ -110,6 +115,8 @@ struct InlineSwarm<'s> {
     drones: Vec<InlineDrone>,
     /// One per thread.
     workers: Vec<Worker>,
+    /// Those of a large swarm.
+    pages: Option<LargePages>,
 }
 
 /// What a thread has for the drones that it steps.
@@ -129,10 +136,14 @@ impl<'s> InlineSwarm<'s> {
         let drones = (0..scenario.formation.drones).map(new_drone).collect::<Result<Vec<_>, _>>()?;
         let useful = drones.len().div_ceil(CHUNK).max(1);
         let workers = (0..threads.get().min(useful)).map(|_| Worker::default()).collect();
-        Ok(Self { factory, world, drones, workers })
+        let pages = (drones.len() >= LARGE_SWARM).then(LargePages::default);
+        Ok(Self { factory, world, drones, workers, pages })
     }
 
     fn tick(&mut self) {
+        if let Some(pages) = &mut self.pages {
+            pages.tick();
+        }
         let start = self.world.now();
         for &command in self.world.process_commands() {
             carry_out(command, &mut self.drones, &self.factory, start);

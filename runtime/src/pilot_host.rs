@@ -1,7 +1,7 @@
 //! A pilot with its radio receiver, as both runtimes step it.
 
 use crate::forked::copy_came_back;
-use crate::radio_receiver::{Pending, RadioReceiver};
+use crate::radio_receiver::{Arrived, RadioReceiver};
 use crate::reported_panic::catch;
 use crate::said::Said;
 use crate::tuning::{MAX_MESSAGES, MAX_OWN_MESSAGES, MAX_TELEMETRY};
@@ -17,8 +17,7 @@ use std::sync::Arc;
 /// and it is as large as the busiest of them needs.
 #[derive(Default)]
 pub struct StepScratch {
-    /// Frames that are due in this tick.
-    arrived: Vec<Pending>,
+    arrived: Arrived,
     /// The messages of these frames; empty between ticks.
     heard: Vec<Heard<'static>>,
     out: Out,
@@ -74,7 +73,7 @@ impl PilotHost {
         slot: &mut Slot,
         stats: &mut LinkStats,
     ) -> Said<'s> {
-        scratch.arrived.clear();
+        scratch.arrived.begin();
         scratch.out.clear();
         scratch.ages_s.clear();
         let Some(senses) = down.senses(self.params.me) else { return Said::of(&scratch.out) };

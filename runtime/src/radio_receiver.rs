@@ -9,20 +9,27 @@ use skein_protocol::message::Topic;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::{DROP_REASONS, Delivery, DropReason, Radio, ReceiverChannels};
 use skein_protocol::slot::LinkStats;
-use skein_protocol::{DroneId, MessageRef, SimTime, horizontal};
+use skein_protocol::{DroneId, MessageRef, SimTime, Tick, horizontal};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 /// A frame on its way to this drone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Pending {
+struct Pending {
     due: SimTime,
     source: DroneId,
     sequence: u32,
     /// Whether it is the second copy of a duplicated frame.
     duplicate: bool,
     place: Place,
+}
+
+impl Pending {
+    /// By time, then by source and sequence number; a second copy after the first.
+    fn order(&self) -> (SimTime, u64, bool) {
+        (self.due, u64::from(self.source.0) << 32 | u64::from(self.sequence), self.duplicate)
+    }
 }
 
 /// Where a frame on its way is stored. Most frames are due in the tick in which they come in, and are read in the downlink.
@@ -32,6 +39,52 @@ enum Place {
     Downlink(u32),
     /// At this index of [`RadioReceiver::kept`].
     Kept(u32),
+}
+
+/// Memory for the work of one tick, which receivers share.
+#[derive(Debug, Default)]
+pub(crate) struct Arrived {
+    /// Frames that are due in this tick.
+    pending: Vec<Pending>,
+    checked: CheckedFrames,
+}
+
+impl Arrived {
+    /// Begins the tick of the next receiver.
+    pub(crate) fn begin(&mut self) {
+        self.pending.clear();
+    }
+}
+
+/// What is known of the frames of a tick. The receivers that share it check each frame once.
+#[derive(Debug, Default)]
+struct CheckedFrames {
+    tick: Tick,
+    /// For each frame, whether it contains a valid message; `None` before it was checked.
+    valid: Vec<Option<bool>>,
+}
+
+/// A copy of a frame on its way.
+struct KeptFrame {
+    air: AirFrame,
+    /// Whether it contains a valid message.
+    valid: bool,
+}
+
+impl CheckedFrames {
+    /// Turns to the frames of a downlink: another one, or the same for another drone.
+    fn turn_to(&mut self, tick: Tick, frames: usize) {
+        if (self.tick, self.valid.len()) != (tick, frames) {
+            self.tick = tick;
+            self.valid.clear();
+            self.valid.resize(frames, None);
+        }
+    }
+
+    /// Whether the frame at an index of the downlink contains a valid message.
+    fn is_valid(&mut self, index: usize, air: &AirFrame) -> bool {
+        *self.valid[index].get_or_insert_with(|| MessageRef::read(&air.frame).is_ok())
+    }
 }
 
 /// A drone's radio receiver, and the frames on their way to it.
@@ -47,7 +100,7 @@ pub(crate) struct RadioReceiver {
     /// Frames that are due in a later tick than they came in, the earliest first.
     pending: BinaryHeap<Reverse<Pending>>,
     /// Copies of the pending frames.
-    kept: Vec<AirFrame>,
+    kept: Vec<KeptFrame>,
     /// Indices of `kept` that are free.
     free: Vec<u32>,
     /// Counts since the last [`RadioReceiver::tally`].
@@ -94,9 +147,10 @@ impl RadioReceiver {
         &mut self,
         down: &DownlinkView<'_>,
         now: SimTime,
-        arrived: &mut Vec<Pending>,
+        arrived: &mut Arrived,
         stats: &mut LinkStats,
     ) {
+        arrived.checked.turn_to(down.head.tick, down.frames.len());
         let Some(own) = down.drones.get(self.me.index()) else { return };
         let air = Arriving { own, frames: down.frames, now };
         if own.link_faults != LinkFaults::default() || !self.hears_nearby(&down.nearby.locality) {
@@ -106,8 +160,11 @@ impl RadioReceiver {
             return;
         }
         let mut examined = 0;
-        let here = horizontal(own.position_m);
-        down.nearby.each(here, |index| examined += usize::from(self.receive_frame(&air, index, arrived, stats)));
+        let is_near = |frame: &AirFrame| !down.nearby.locality.is_beyond(frame, own.position_m);
+        down.nearby.each(horizontal(own.position_m), |index| {
+            let near = down.frames.get(index).is_some_and(is_near);
+            examined += usize::from(near && self.receive_frame(&air, index, arrived, stats));
+        });
         let from = |id| down.frames.partition_point(|frame| frame.source.0 < id);
         let others = down.frames.len() - (from(self.me.0 + 1) - from(self.me.0));
         self.drop_frames(DropReason::Range, (others - examined) as u32, stats);
@@ -125,7 +182,7 @@ impl RadioReceiver {
         &mut self,
         air: &Arriving<'_>,
         index: usize,
-        arrived: &mut Vec<Pending>,
+        arrived: &mut Arrived,
         stats: &mut LinkStats,
     ) -> bool {
         let Some(frame) = air.frames.get(index).filter(|frame| frame.source != self.me) else { return false };
@@ -139,59 +196,65 @@ impl RadioReceiver {
                 let (source, sequence) = (frame.source, frame.sequence);
                 let place = Place::Downlink(index as u32);
                 let first = Pending { due, source, sequence, duplicate: false, place };
-                self.expect(first, frame, air.now, arrived);
+                self.expect(first, frame, index, air.now, arrived);
                 if let Some(due) = again {
-                    self.expect(Pending { due, duplicate: true, ..first }, frame, air.now, arrived);
+                    self.expect(Pending { due, duplicate: true, ..first }, frame, index, air.now, arrived);
                 }
             }
         }
         true
     }
 
-    /// Puts a frame of the current downlink where it belongs: to `arrived` if it is due, otherwise to those that are kept.
-    fn expect(&mut self, pending: Pending, frame: &AirFrame, now: SimTime, arrived: &mut Vec<Pending>) {
+    /// Puts a frame of the current downlink, at this index, where it belongs: to `arrived` if it is due, otherwise to those that
+    /// are kept.
+    fn expect(&mut self, pending: Pending, frame: &AirFrame, index: usize, now: SimTime, arrived: &mut Arrived) {
         if pending.due <= now {
-            arrived.push(pending);
+            arrived.pending.push(pending);
         } else {
-            let place = Place::Kept(self.keep(frame));
+            let valid = arrived.checked.is_valid(index, frame);
+            let place = Place::Kept(self.keep(KeptFrame { air: *frame, valid }));
             self.pending.push(Reverse(Pending { place, ..pending }));
         }
     }
 
-    fn keep(&mut self, frame: &AirFrame) -> u32 {
+    fn keep(&mut self, frame: KeptFrame) -> u32 {
         if let Some(index) = self.free.pop() {
-            self.kept[index as usize] = *frame;
+            self.kept[index as usize] = frame;
             return index;
         }
-        self.kept.push(*frame);
+        self.kept.push(frame);
         self.kept.len() as u32 - 1
     }
 
     /// Delivers what is due at the time of the downlink to `heard`, in the order (due, source, sequence), a second copy after
-    /// the first. `arrived` holds what the downlink itself brought.
+    /// the first. The given [`Arrived`] holds what the downlink itself brought.
     pub(crate) fn deliver<'a>(
         &'a mut self,
         senses: &Senses<'_>,
         frames: &'a [AirFrame],
-        arrived: &mut Vec<Pending>,
+        Arrived { pending, checked }: &mut Arrived,
         heard: &mut Vec<Heard<'a>>,
         stats: &mut LinkStats,
     ) {
         while self.pending.peek().is_some_and(|Reverse(next)| next.due <= senses.now) {
-            arrived.extend(self.pending.pop().map(|Reverse(pending)| pending));
+            pending.extend(self.pending.pop().map(|Reverse(pending)| pending));
         }
-        arrived.sort_unstable();
+        pending.sort_unstable_by_key(Pending::order);
         let Self { kept, free, tally, .. } = self;
-        for &Pending { source, sequence, duplicate, place, .. } in arrived.iter() {
-            let air: &'a AirFrame = match place {
-                Place::Downlink(index) => &frames[index as usize],
+        for &Pending { source, sequence, duplicate, place, .. } in pending.iter() {
+            let (air, valid): (&'a AirFrame, bool) = match place {
+                Place::Downlink(index) => {
+                    let air = &frames[index as usize];
+                    (air, checked.is_valid(index as usize, air))
+                }
                 Place::Kept(index) => {
                     free.push(index);
-                    &kept[index as usize]
+                    let KeptFrame { air, valid } = &kept[index as usize];
+                    (air, *valid)
                 }
             };
-            match MessageRef::read(&air.frame) {
-                Ok(message) => {
+            match MessageRef::borrow(&air.frame).ok().filter(|_| valid) {
+                Some(message) => {
                     tally.hash = Digest::chain(tally.hash, u64::from(source.0) << 32 | u64::from(sequence));
                     if duplicate {
                         tally.duplicates += 1;
@@ -202,8 +265,8 @@ impl RadioReceiver {
                     }
                     heard.push(Heard { source, message });
                 }
-                Err(_) if duplicate => {}
-                Err(_) => {
+                None if duplicate => {}
+                None => {
                     stats.malformed += 1;
                     tally.dropped[DropReason::Malformed as usize] += 1;
                     stats.dropped[DropReason::Malformed as usize] += 1;
