@@ -255,6 +255,9 @@ fn a_run_that_does_not_fit_into_shared_memory_is_refused_with_both_numbers() {
     }
 }
 
+/// Waits, in a script, until a run has begun its first tick. Before, it still takes pages.
+const FIRST_TICK: &str = "until \"$1\" topic echo senses --count 1 >first.txt 2>&1; do sleep 0.01; done;";
+
 /// A run that has started does not need another page.
 #[test]
 fn a_full_shared_memory_does_not_end_a_run_that_has_started() {
@@ -262,8 +265,7 @@ fn a_full_shared_memory_does_not_end_a_run_that_has_started() {
     for (clock, dt_s) in [("realtime:20", 0.005), ("lockstep", 0.001)] {
         let place = Place::new();
         let script = format!(
-            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} & \
-             while [ ! -e out/processes.json ]; do sleep 0.01; done; sleep 0.5; \
+            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} & {FIRST_TICK} \
              dd if=/dev/zero of=/dev/shm/others bs=4k 2>dd.txt; cp dd.txt filled.txt; \
              \"$1\" topic echo senses --count 1 >observer.txt 2>&1; wait $!"
         );
@@ -291,8 +293,7 @@ fn a_full_shared_memory_does_not_keep_a_drone_from_its_restart() {
     for (clock, dt_s) in [("realtime:5", "0.01"), ("lockstep", "0.0005")] {
         let place = Place::new();
         let script = format!(
-            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} --set '{faults}' & \
-             while [ ! -e out/processes.json ]; do sleep 0.01; done; \
+            "\"$1\" run \"$2\" --json --out out --clock {clock} --set time.dt_s={dt_s} --set '{faults}' & {FIRST_TICK} \
              dd if=/dev/zero of=/dev/shm/others bs=4k 2>dd.txt; cp dd.txt filled.txt; wait $!"
         );
         let Some(done) = with_shared_memory(&place, "20m", &script) else { return };
