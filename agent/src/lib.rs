@@ -27,6 +27,7 @@ mod detour;
 mod distant_peers;
 pub mod emergency_route;
 pub mod escape;
+mod few;
 pub mod guidance;
 mod lone_flight;
 pub mod navigator;

@@ -1,6 +1,7 @@
 //! The neighbours that a drone keeps its distance from, and its share of each evasion.
 
 use crate::distant_peers::{Distant, DistantPeers};
+use crate::few::Few;
 use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::beacons::Beacon;
@@ -8,7 +9,6 @@ use skein_leader::peers::Peers;
 use skein_protocol::downlink::Senses;
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
-use smallvec::SmallVec;
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +36,6 @@ pub(crate) struct NeighbourView<'a> {
     pub(crate) places: &'a [QueuePlace],
 }
 
-/// The neighbours of a drone. As many as most drones have are on the stack, whose memory stays in the cache while one thread steps many
-/// drones in turn.
-pub(crate) type Neighbours = SmallVec<[Neighbour; 32]>;
-
 /// Finds the neighbours of a drone.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourTable {
@@ -54,9 +50,9 @@ impl NeighbourTable {
     }
 
     /// The neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
-    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) -> Neighbours {
+    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) -> Few<Neighbour> {
         let senses = view.senses;
-        let mut neighbours = Neighbours::new();
+        let mut neighbours = Few::new();
         for sensed in senses.neighbours {
             neighbours.push(Neighbour {
                 id: sensed.drone,

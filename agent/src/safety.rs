@@ -5,6 +5,7 @@
 //! control barrier function on the braking distance). x is the distance beyond the distance to keep, and α is the assumed
 //! deceleration. Each barrier bounds the acceleration along the line of sight: a half-plane for [`Program`].
 
+use crate::few::{FEW, Few};
 use crate::program::{HalfPlane, Program};
 use skein_leader::geometry::nearest;
 use skein_protocol::scale::Scale;
@@ -12,12 +13,6 @@ use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, Vec2};
 use smallvec::SmallVec;
 use std::collections::VecDeque;
-
-/// Number of neighbours for which there is room on the stack. Its memory stays in the cache while one thread steps many drones in turn.
-const FEW: usize = 32;
-
-/// A list that seldom has more than [`FEW`] entries.
-type Few<T> = SmallVec<[T; FEW]>;
 
 /// Constants of the filter. The lengths and speeds in this file are those at full [`Scale`].
 #[derive(Clone, Copy, Debug, PartialEq)]

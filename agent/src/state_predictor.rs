@@ -3,20 +3,20 @@
 //! The drone's own motion until then is known, because the pending commands are. Obstacles stay where they are.
 //! Neighbours are assumed to keep their velocities.
 
+use crate::few::Few;
 use crate::reaction::PendingMotion;
 use crate::safety::NearObstacle;
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, Senses};
 use skein_protocol::{SimTime, raised};
-use smallvec::SmallVec;
 
-/// Predicted senses. There is room on the stack for as many entries as most drones sense.
+/// Predicted senses.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StatePredictor {
     now: SimTime,
     position_m: [f64; 3],
     velocity_mps: [f64; 3],
-    obstacles: SmallVec<[SensedObstacle; 8]>,
-    neighbours: SmallVec<[SensedNeighbour; 32]>,
+    obstacles: Few<SensedObstacle>,
+    neighbours: Few<SensedNeighbour>,
 }
 
 impl StatePredictor {

@@ -32,11 +32,13 @@ impl LargePages {
 
 /// The parts of the heap in a list of the mappings of a process, as `/proc/PID/maps` gives it.
 fn heap(maps: &str) -> impl Iterator<Item = Range<usize>> {
-    maps.lines().filter(|line| line.ends_with("[heap]")).filter_map(|line| {
-        let (from, to) = line.split_whitespace().next()?.split_once('-')?;
-        let address = |hex| usize::from_str_radix(hex, 16).ok();
-        Some(address(from)?..address(to)?)
-    })
+    maps.lines().filter(|line| line.ends_with("[heap]")).filter_map(range)
+}
+
+/// The addresses of a mapping, by its line in such a list.
+fn range(line: &str) -> Option<Range<usize>> {
+    let (from, to) = line.split_whitespace().next()?.split_once('-')?;
+    Some(usize::from_str_radix(from, 16).ok()?..usize::from_str_radix(to, 16).ok()?)
 }
 
 /// Makes the pages of this part of the heap large, and those that the kernel maps there later.
@@ -54,6 +56,7 @@ fn enlarge(part: Range<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous};
 
     #[test]
     fn the_parts_of_the_heap_are_found() {
@@ -65,11 +68,31 @@ mod tests {
         assert_eq!(heap(maps).collect::<Vec<_>>(), expected);
     }
 
+    /// Whether large pages are asked for at this address, as `/proc/self/smaps` tells.
+    fn is_advised(address: usize) -> bool {
+        let smaps = fs::read_to_string("/proc/self/smaps").unwrap();
+        let mut own = smaps.lines().skip_while(|line| !range(line).is_some_and(|range| range.contains(&address)));
+        own.find_map(|line| line.strip_prefix("VmFlags:")).unwrap().contains(" hg")
+    }
+
     #[test]
-    fn memory_keeps_its_contents() {
-        let numbers: Vec<Box<u64>> = (0..1 << 18).map(Box::new).collect();
-        let mut pages = LargePages::default();
-        (0..9).for_each(|_| pages.tick());
-        assert!(numbers.iter().zip(0..).all(|(number, expected)| **number == expected));
+    fn whole_large_pages_are_asked_for_and_memory_keeps_its_contents() {
+        let len = 4 * LARGE_PAGE;
+        // SAFETY: a new mapping at an address that the kernel chooses overlaps no other memory.
+        let mapped =
+            unsafe { mmap_anonymous(std::ptr::null_mut(), len, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE) };
+        let start: *mut u8 = mapped.unwrap().cast();
+        // SAFETY: the mapping is that long, and nothing else uses it.
+        let bytes = unsafe { std::slice::from_raw_parts_mut(start, len) };
+        bytes.iter_mut().zip(0_usize..).for_each(|(byte, place)| *byte = (place / 4096 % 251) as u8);
+        // Neither end is at a large page.
+        let (from, to) = (start.addr() + 4096, start.addr() + len - 4096);
+        enlarge(from..to);
+        assert!(bytes.iter().zip(0_usize..).all(|(byte, place)| *byte == (place / 4096 % 251) as u8));
+        if fs::exists("/sys/kernel/mm/transparent_hugepage").unwrap() {
+            let (first, last) = (from.next_multiple_of(LARGE_PAGE), to / LARGE_PAGE * LARGE_PAGE);
+            assert_eq!([first - 1, first, last - 1, last].map(is_advised), [false, true, true, false]);
+        }
+        enlarge(from..from + 4096);
     }
 }

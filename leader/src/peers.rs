@@ -209,12 +209,7 @@ impl Peers {
     /// less one for the ids above this drone's own.
     #[inline]
     fn place(&self, peer: DroneId) -> Result<usize, usize> {
-        match self.all_but {
-            Some(missing) if peer != missing && peer.index() <= self.ids.len() => {
-                Ok(peer.index() - usize::from(peer > missing))
-            }
-            _ => self.search(peer),
-        }
+        known_place(self.all_but, self.ids.len(), peer).map_or_else(|| self.search(peer), Ok)
     }
 
     fn search(&self, peer: DroneId) -> Result<usize, usize> {
@@ -324,11 +319,9 @@ impl Peers {
     #[inline]
     pub(crate) fn stamp_finder(&self) -> impl Fn(DroneId) -> Option<SimTime> + '_ {
         let (stamps, all_but) = (self.stamps(), self.all_but);
-        move |peer| match all_but {
-            Some(missing) if peer != missing && peer.index() <= stamps.len() => {
-                stamps.get(peer.index() - usize::from(peer > missing)).copied()
-            }
-            _ => self.stamp_of(peer),
+        move |peer| match known_place(all_but, stamps.len(), peer) {
+            Some(place) => stamps.get(place).copied(),
+            None => self.stamp_of(peer),
         }
     }
 
@@ -407,6 +400,13 @@ impl Peers {
         let known = self.ids.iter().zip(&self.last).zip(self.beacons.iter());
         known.map(|((&id, peer), beacon)| (id, peer, beacon))
     }
+}
+
+/// The index of a peer among `count` peers, if they are the lowest ids but one.
+#[inline]
+fn known_place(all_but: Option<DroneId>, count: usize, peer: DroneId) -> Option<usize> {
+    let missing = all_but.filter(|missing| *missing != peer && peer.index() <= count)?;
+    Some(peer.index() - usize::from(peer > missing))
 }
 
 /// The id that is missing among the lowest ids, if these ascending ids are all others; `None` if more are missing.
@@ -500,13 +500,35 @@ mod tests {
             let mut found = Vec::new();
             peers.ages_s(now, &mut found);
             assert_eq!(found, ages);
-            let direct = peers.known().filter(|(_, peer, _)| peer.is_direct(now, 1.0)).count();
-            assert_eq!(peers.hears(DroneId(9), now) == 0, direct == 0 || direct == 9, "tick {tick}");
+            let direct: Vec<DroneId> = peers.direct(now).map(|(id, _)| id).collect();
+            let hash = if [0, 9].contains(&direct.len()) { 0 } else { hash_of(direct.into_iter().chain([DroneId(9)])) };
+            assert_eq!(peers.hears(DroneId(9), now), hash, "tick {tick}");
+            let finder = peers.stamp_finder();
+            assert!((0..12).map(DroneId).all(|id| finder(id) == peers.last(id).map(|beacon| beacon.stamp())));
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));
         peers.forget(DroneId(5));
         assert!(peers.last(DroneId(5)).is_none() && peers.last(DroneId(6)).is_some());
+    }
+
+    #[test]
+    fn a_peer_that_falls_silent_is_missed_as_soon_as_it_does_not_count_as_heard() {
+        let mut peers = Peers::new(5, 1.0);
+        let mut missed = 0;
+        for tick in 1..1200_u32 {
+            let now = SimTime::from_secs(0.01 * f64::from(tick));
+            // Drone 3 falls silent at 10 s.
+            for id in (0..4).filter(|id| tick.is_multiple_of(10) && (*id != 3 || tick <= 1000)) {
+                peers.hear(now, DroneId(id), pose(0.01 * f64::from(tick), 0.0));
+            }
+            let direct: Vec<DroneId> = peers.direct(now).map(|(id, _)| id).collect();
+            let hash = if [0, 4].contains(&direct.len()) { 0 } else { hash_of(direct.into_iter().chain([DroneId(4)])) };
+            assert_eq!(peers.hears(DroneId(4), now), hash, "tick {tick}");
+            assert!(peers.direct_until >= now || !(100..1090).contains(&tick), "no look at each: tick {tick}");
+            missed += u32::from(hash != 0);
+        }
+        assert!((90..110).contains(&missed), "{missed}");
     }
 
     #[test]

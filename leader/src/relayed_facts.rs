@@ -287,3 +287,42 @@ fn is_plan_wanted(k: &Knowledge, now: SimTime, scope: GroupId, plan: &Plan) -> b
 fn is_late(pose: &Beacon<'_>, ballot: Ballot, epoch: u32) -> bool {
     (pose.obeyed().ballot, pose.obeyed().epoch) < (ballot, epoch) && pose.term() <= ballot
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn each_message_is_forgotten_when_it_was_not_heard_for_long() {
+        let mut facts = RelayedFacts {
+            me: DroneId(8),
+            repeat_s: 0.2,
+            room: 64,
+            known: FactStore::new(8),
+            turns: Turns::default(),
+            heard_since: SimTime::ZERO,
+        };
+        let mut heard = [None; 8];
+        let passed = Passed { set_count: 1, ..Passed::zeroed() };
+        let (mut kept, mut forgotten) = (0, 0);
+        for second in 0..600_u32 {
+            let now = SimTime::from_secs(f64::from(second));
+            let drone = second.wrapping_mul(0x9e37_79b9) >> 29;
+            // Drones are heard in some minutes only.
+            if (second / 60 + drone).is_multiple_of(3) {
+                facts.hear(now, DroneId(drone), MessageRef::Passed(&passed), false);
+                heard[drone as usize] = Some(now);
+            }
+            facts.forget(now);
+            for (drone, heard) in (0..).map(DroneId).zip(heard) {
+                let lives = heard.is_some_and(|heard| now.since(heard) < RELAY_MEMORY_S);
+                let subject = Subject::Passed(drone);
+                assert_eq!(facts.known.contains(&subject), lives, "{drone:?} at {second} s");
+                assert_eq!(facts.turns.due(SimTime::MAX).any(|turn| turn == subject), lives, "{drone:?} at {second} s");
+                (kept, forgotten) = (kept + u32::from(lives), forgotten + u32::from(heard.is_some() && !lives));
+            }
+        }
+        assert!(kept > 1000 && forgotten > 1000, "{kept} {forgotten}");
+    }
+}

@@ -131,11 +131,12 @@ impl Relays {
         let mut differs = false;
         let (term, scope) = (k.election().obeyed(), k.election().scope());
         self.lags = false;
-        let looked_at = if k.peers().may_differ(term, scope) { usize::MAX } else { 0 };
-        for (_, pose) in k.peers().direct(now).take(looked_at) {
-            // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
-            differs |= pose.hears() != 0 && pose.hears() != mine;
-            self.lags |= pose.term() < term && scope.contains(pose.group());
+        if k.peers().may_differ(term, scope) {
+            for (_, pose) in k.peers().direct(now) {
+                // A drone that hears nobody cannot be told anything, and one that hears all drones need not be.
+                differs |= pose.hears() != 0 && pose.hears() != mine;
+                self.lags |= pose.term() < term && scope.contains(pose.group());
+            }
         }
         self.measure_reach(k, now, beacon_s);
         self.differs = differs.then(|| self.differs.unwrap_or(now));

@@ -1,4 +1,4 @@
-//! A drone receives and counts the same frames whether the downlink sorts them by place or not.
+//! A drone receives and counts the same frames whether the downlink sorts them by place or not, and whether receivers share memory or not.
 
 use proptest::prelude::*;
 use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
@@ -6,7 +6,7 @@ use skein_protocol::downlink::{Downlink, SensesHeader};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::Leadership;
-use skein_protocol::radio::{ChannelModel, Radio, Range, Rule};
+use skein_protocol::radio::{ChannelModel, Delay, Radio, Range, Rule};
 use skein_protocol::slot::{LinkStats, Slot};
 use skein_protocol::{DroneId, Message, SimTime};
 use skein_runtime::{HostParams, PilotHost, StepScratch};
@@ -77,5 +77,40 @@ proptest! {
             prop_assert_eq!(expected.0, found.0);
             prop_assert!(expected.1 == found.1);
         }
+    }
+}
+
+/// Frames of the same places in the list are valid in one tick and not in the next, and each receiver finds out.
+#[test]
+fn receivers_that_share_memory_find_the_same_malformed_frames_as_those_that_do_not() {
+    for mean_s in [0.0, 0.05] {
+        let channel = ChannelModel { delay: Delay { mean_s, ..Delay::default() }, ..ChannelModel::default() };
+        let radio = Radio { seed: 7, channel, ..Radio::default() };
+        let hosts = || {
+            let params = |me| HostParams { me: DroneId(me), dt_s: 0.02, velocity_gain_per_s: 1.0 };
+            (0..3).map(|me| PilotHost::new(params(me), radio.clone(), Box::new(Idle))).collect::<Vec<_>>()
+        };
+        let (mut together, mut apart) = (hosts(), hosts());
+        let (mut shared, mut malformed, mut heard) = (StepScratch::default(), 0, 0);
+        for tick in 1..12_u64 {
+            let mut down = downlink(&[([0.0; 2], false), ([9.0; 2], false), ([20.0; 2], false)]);
+            for (frame, id) in down.frames.iter_mut().zip(0..) {
+                (frame.tick, frame.sequence) = (tick - 1, tick as u32);
+                if (tick + id).is_multiple_of(3) {
+                    frame.frame.payload[8..16].copy_from_slice(&f64::NAN.to_le_bytes());
+                }
+            }
+            down.seal(tick, SimTime(tick as i64 * 20_000_000));
+            for (host, alone) in together.iter_mut().zip(&mut apart) {
+                let (mut slots, mut stats) = ([Slot::default(); 2], [LinkStats::default(), LinkStats::default()]);
+                host.step(&down.view(), &mut shared, &mut slots[0], &mut stats[0]);
+                alone.step(&down.view(), &mut StepScratch::default(), &mut slots[1], &mut stats[1]);
+                assert_eq!(slots[0], slots[1], "tick {tick}");
+                assert!(stats[0] == stats[1], "tick {tick}");
+                malformed += stats[1].malformed;
+                heard += u64::from(slots[1].heard);
+            }
+        }
+        assert!(malformed > 10 && heard > 2 * malformed - 10, "{malformed} malformed, {heard} heard");
     }
 }
