@@ -11,7 +11,7 @@ use crate::tuning::{IN_REACH, STILL_MPS};
 use own_path::OwnPath;
 use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
-use separation_pair::{NO_LINE, NumberedLine, SeparationPair, Statement};
+use separation_pair::{MAX_LINES, NO_LINE, NumberedLine, SeparationPair, Statement};
 use skein_leader::peers::Peers;
 use skein_protocol::payload::{MAX_SEPARATORS, Pose, Separation, Separator};
 use skein_protocol::scale::Scale;
@@ -31,12 +31,17 @@ const ABREAST_MPS: f64 = 0.5;
 const PATIENCE_ROUND_TRIPS: f64 = 1.0;
 /// The same as a time, s. It is added.
 const PATIENCE_S: f64 = 0.5;
+/// Time without a new line, in times of this patience, after which a drone makes one however many it is bound to.
+const LAST_PATIENCE: f64 = 10.0;
 /// A path is kept this far beyond what a new line demands, m, so that rounding does not matter.
 const ROUNDING_M: f64 = 1e-6;
 
-/// Of two drones that are both still and nearer to each other than this, in distances to keep, the one with the lower id has all the room
-/// between them.
+/// Of two drones that are both still and nearer to each other than this, in distances to keep, one has all the room between them.
 const CLOSE: f64 = 2.0;
+/// The two have it in turn: the one with the lower id first, for this long, s.
+const FRONT_TURN_S: f64 = 60.0;
+/// Then the one with the higher id, for this long, s.
+const BACK_TURN_S: f64 = 20.0;
 
 /// A line that moves for longer than this is no line that a drone makes, s.
 const LONGEST_MOTION_S: f64 = 300.0;
@@ -391,6 +396,13 @@ struct Other {
     lost_at: Option<Vec2>,
 }
 
+/// Which of two drones that are still and close has all the room between them. Each of the two says so by its own clock: where their clocks
+/// differ, they differ for that long in each turn about the line to make, and in nothing else.
+fn turn_at(now: SimTime) -> Side {
+    let into_turns_s = now.secs() % (FRONT_TURN_S + BACK_TURN_S);
+    if into_turns_s < FRONT_TURN_S { Side::Front } else { Side::Back }
+}
+
 /// The side of drone `me` of its lines with another one.
 fn side_of(me: DroneId, peer: DroneId) -> Side {
     if me < peer { Side::Front } else { Side::Back }
@@ -464,13 +476,15 @@ impl SeparationParams {
         let abreast_mps = self.scale().speed(ABREAST_MPS);
         let ahead = along_mps > abreast_mps || (along_mps >= -abreast_mps && side == Side::Front);
         let patience_s = PATIENCE_S + PATIENCE_ROUND_TRIPS * 2.0 * late_s + self.period_s;
-        if !ahead && now.since(known.changed) < patience_s {
+        let unchanged_s = now.since(known.changed);
+        if !ahead && unchanged_s < patience_s {
             return;
         }
         let Some(line) = self.line(Some(&stated.line), side, &own, &peer, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
-        if (turned || shifted_m >= self.scale().length(SHIFT_M)) && known.pair.propose(line, path.earliest()) {
+        let most = if unchanged_s < LAST_PATIENCE * patience_s { MAX_LINES } else { usize::MAX };
+        if (turned || shifted_m >= self.scale().length(SHIFT_M)) && known.pair.propose(line, path.earliest(), most) {
             known.changed = now;
         }
     }
@@ -520,11 +534,11 @@ impl SeparationParams {
         let close = own_m - peer_m < CLOSE * self.keep_m;
         let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().speed(STILL_MPS);
         // The first line is in the middle: the other drone, which hovers, must keep to it.
-        let aimed_m = match (close && still && present.is_some(), side) {
+        let aimed_m = match (close && still && present.is_some(), side == turn_at(now)) {
             (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.
-            (true, Side::Front) => peer_m + half_m,
-            (true, Side::Back) => own_m - half_m,
+            (true, true) => peer_m + half_m,
+            (true, false) => own_m - half_m,
         };
         let present_m = present.filter(keeps).map_or(f64::NEG_INFINITY, |line| side.sign() * line.stop_m());
         let reach_m = |at: Vec2| n.dot(&at) + IN_REACH * self.radio_range_m - half_m;

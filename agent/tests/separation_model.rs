@@ -170,7 +170,7 @@ impl Model for Track {
         match action {
             Action::Propose { drone, peer, place } => {
                 state.proposals += 1;
-                if !state.pairs[drone][peer].propose(line(place), SimTime::ZERO) {
+                if !state.pairs[drone][peer].propose(line(place), SimTime::ZERO, usize::MAX) {
                     return None;
                 }
                 if !self.waits_for_acknowledgement {

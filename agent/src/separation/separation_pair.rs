@@ -3,8 +3,8 @@
 use super::separating_line::{SeparatingLine, Side};
 use skein_protocol::{SimTime, Vec2};
 
-/// Greatest number of lines that do not imply each other. A drone that is bound to that many makes no further line.
-const MAX_LINES: usize = 6;
+/// Greatest number of lines that do not imply each other. A drone that is bound to that many makes no further line for the time being.
+pub const MAX_LINES: usize = 6;
 
 /// In place of the number of a line, if a drone says that it knows no line.
 pub const NO_LINE: u32 = u32::MAX;
@@ -159,15 +159,16 @@ impl SeparationPair {
         }
     }
 
-    /// Binds the drone to a new line, to which its path keeps. Returns whether it did: a drone that is bound to many lines that
-    /// the other drone has not heard of makes no further one.
-    pub fn propose(&mut self, line: SeparatingLine, now: SimTime) -> bool {
+    /// Binds the drone to a new line, to which its path keeps. Returns whether it did: a drone that is bound to as many lines as `most`
+    /// makes no further one. The other drone may not have heard of these lines, or may be unable to keep to them. If each of the two is
+    /// bound to such lines only, no line of theirs ever changes until one of them makes a further one: then `most` has no limit.
+    pub fn propose(&mut self, line: SeparatingLine, now: SimTime, most: usize) -> bool {
         let Some(number) = self.next_number() else { return false };
         if self.bound.is_empty() {
             return false;
         }
         let (side, bound) = (self.side, self.bound.iter());
-        if bound.filter(|known| !line.implies(&known.line, side, now)).count() >= MAX_LINES {
+        if bound.filter(|known| !line.implies(&known.line, side, now)).count() >= most {
             return false;
         }
         let implied = &mut self.implied;
@@ -233,7 +234,7 @@ mod tests {
     fn a_drone_is_bound_to_its_own_line_and_the_old_one_until_the_other_is_bound_to_the_new_one() {
         let (mut front, mut back) =
             (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
-        assert!(front.propose(line(-5.0), NOW), "it asks for room");
+        assert!(front.propose(line(-5.0), NOW, MAX_LINES), "it asks for room");
         assert_eq!(numbers(&front), [0, 2]);
         back.hear(&front.statement().unwrap(), |_| false);
         assert_eq!(numbers(&back), [0], "its path does not keep to the line");
@@ -248,7 +249,7 @@ mod tests {
         let (mut front, mut back) =
             (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
         for step in 1..=20 {
-            assert!(front.propose(line(f64::from(step)), NOW));
+            assert!(front.propose(line(f64::from(step)), NOW, MAX_LINES));
             assert_eq!(front.lines().len(), 1);
         }
         back.hear(&front.statement().unwrap(), |_| true);
@@ -259,7 +260,7 @@ mod tests {
     fn two_lines_at_the_same_time_both_bind_until_one_is_superseded() {
         let (mut front, mut back) =
             (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
-        assert!(front.propose(line(-2.0), NOW) && back.propose(line(2.0), NOW));
+        assert!(front.propose(line(-2.0), NOW, MAX_LINES) && back.propose(line(2.0), NOW, MAX_LINES));
         let (said, answered) = (front.statement().unwrap(), back.statement().unwrap());
         front.hear(&answered, |_| true);
         back.hear(&said, |_| true);
@@ -273,35 +274,57 @@ mod tests {
     fn two_drones_that_can_make_no_further_line_free_each_other() {
         let start = || (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
         let (mut front, mut back) = start();
-        assert!(back.propose(line(1.0), NOW));
+        assert!(back.propose(line(1.0), NOW, MAX_LINES));
         front.hear(&back.statement().unwrap(), |_| true);
         assert_eq!(numbers(&front), [1]);
-        while front.propose(line(-f64::from(front.newest)), NOW) {}
-        while back.propose(line(f64::from(back.newest) + 2.0), NOW) {}
+        while front.propose(line(-f64::from(front.newest)), NOW, MAX_LINES) {}
+        while back.propose(line(f64::from(back.newest) + 2.0), NOW, MAX_LINES) {}
         assert_eq!((front.lines().len(), back.lines().len()), (MAX_LINES, MAX_LINES));
         back.hear(&front.statement().unwrap(), |_| false);
         front.hear(&back.statement().unwrap(), |_| false);
-        assert!(!front.propose(line(-50.0), NOW) && !back.propose(line(50.0), NOW), "neither can move");
+        assert!(
+            !front.propose(line(-50.0), NOW, MAX_LINES) && !back.propose(line(50.0), NOW, MAX_LINES),
+            "neither can move"
+        );
         back.hear(&front.answer().unwrap(), |_| false);
         assert_eq!(numbers(&back)[0], 1, "line 0 is over");
-        assert!(back.propose(line(0.5), NOW) && back.answer().is_none());
+        assert!(back.propose(line(0.5), NOW, MAX_LINES) && back.answer().is_none());
         front.hear(&back.statement().unwrap(), |_| true);
         back.hear(&front.answer().or(front.statement()).unwrap(), |_| false);
         assert_eq!(numbers(&back).len(), 1, "both are bound to the newest line: {:?}", numbers(&back));
     }
 
+    /// Each drone is bound to lines of its own making only, besides the first one, and the other one cannot keep to any of them.
+    #[test]
+    fn a_further_line_frees_two_drones_that_have_no_answer_for_each_other() {
+        let (mut front, mut back) =
+            (SeparationPair::new(Side::Front, line(0.0)), SeparationPair::new(Side::Back, line(0.0)));
+        while front.propose(line(-f64::from(front.newest) - 1.0), NOW, MAX_LINES) {}
+        while back.propose(line(f64::from(back.newest) + 1.0), NOW, MAX_LINES) {}
+        for _ in 0..2 {
+            back.hear(&front.answer().or(front.statement()).unwrap(), |_| false);
+            front.hear(&back.answer().or(back.statement()).unwrap(), |_| false);
+        }
+        assert_eq!((front.lines().len(), back.lines().len()), (MAX_LINES, MAX_LINES));
+        assert!(!front.propose(line(-20.0), NOW, MAX_LINES) && front.propose(line(-20.0), NOW, usize::MAX));
+        back.hear(&front.statement().unwrap(), |_| true);
+        front.hear(&back.statement().unwrap(), |_| true);
+        assert_eq!((front.lines().len(), back.lines().len()), (1, 1));
+        assert_eq!(numbers(&front), numbers(&back));
+    }
+
     #[test]
     fn a_drone_makes_a_bounded_number_of_lines() {
         let mut front = SeparationPair::new(Side::Front, line(0.0));
-        let made = (1..50).filter(|step| front.propose(line(-f64::from(*step)), NOW)).count();
+        let made = (1..50).filter(|step| front.propose(line(-f64::from(*step)), NOW, MAX_LINES)).count();
         assert_eq!(made, MAX_LINES - 1);
         let mut restarted = SeparationPair::restarted(Side::Front, 2);
-        assert!(!restarted.propose(line(0.0), NOW));
+        assert!(!restarted.propose(line(0.0), NOW, MAX_LINES));
         let bound_to = NumberedLine { number: NO_LINE - 1, line: line(0.0) };
         restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 1 }, |_| true);
         assert!(restarted.lines().is_empty(), "it was said to the incarnation before");
         restarted.hear(&Statement { bound_to, incarnation: 1, addressed: 2 }, |_| true);
         assert_eq!(restarted.lines().len(), 1);
-        assert!(!restarted.propose(line(0.0), NOW), "there are no more numbers");
+        assert!(!restarted.propose(line(0.0), NOW, MAX_LINES), "there are no more numbers");
     }
 }

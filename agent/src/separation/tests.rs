@@ -206,14 +206,15 @@ fn a_drone_out_of_reach_is_freed_by_lines_that_others_pass_on() {
     assert!(first - middle >= FILTER.keep_m() - 1e-6 && middle - last >= FILTER.keep_m() - 1e-6);
 }
 
-#[test]
-fn of_two_drones_that_block_each_other_the_one_with_the_lower_id_has_the_room_between_them() {
-    let mut drones = [separations(0, 1), separations(1, 1)];
+/// The room beside the lines that each of two drones has which hang still and near each other for a second, m. `from_s`: from when on.
+fn rooms_of_blocked_drones_m(drones: &mut [Separations; 2], from_s: f64) -> [f64; 2] {
     let places = [Vec2::new(-40.0, 0.0), Vec2::new(-80.0, 0.0)];
     let mut peers = [Peers::new(3, 2.0), Peers::new(3, 2.0)];
-    for tick in 0..100 {
-        let now = SimTime::from_secs(f64::from(tick) * FILTER.dt_s);
-        let here = places.map(|place| path(tick as u64, place, Vec2::zeros()));
+    let first = (from_s / FILTER.dt_s).round() as u64;
+    let last = first + 100;
+    for tick in first..last {
+        let now = SimTime::from_secs(tick as f64 * FILTER.dt_s);
+        let here = places.map(|place| path(tick, place, Vec2::zeros()));
         for me in 0..2 {
             let (other, mut say) = (1 - me, Vec::new());
             peers[me].hear(now, DroneId(other as u32), pose(now, places[other], Vec2::zeros()));
@@ -224,15 +225,27 @@ fn of_two_drones_that_block_each_other_the_one_with_the_lower_id_has_the_room_be
             }
         }
     }
-    let room_m = [0, 1].map(|me: usize| {
+    [0, 1].map(|me: usize| {
         let peer = DroneId(1 - me as u32);
         let known = drones[me].known.iter().find(|known| known.peer == peer).expect("they know each other");
         let side = known.pair.side();
         let lines = known.pair.lines().iter();
-        let here = path(100, places[me], Vec2::zeros());
+        let here = path(last, places[me], Vec2::zeros());
         lines.map(|line| here.distance_m(&line.line, side) - FILTER.keep_m() / 2.0).fold(f64::INFINITY, f64::min)
-    });
-    assert!((room_m[0] - (40.0 - FILTER.keep_m())).abs() < 0.01 && room_m[1].abs() < 0.01, "{room_m:?}");
+    })
+}
+
+#[test]
+fn two_drones_that_block_each_other_have_the_room_between_them_in_turn() {
+    let mut drones = [separations(0, 1), separations(1, 1)];
+    let all_m = 40.0 - FILTER.keep_m();
+    for (from_s, wanted_m) in
+        [(0.0, [all_m, 0.0]), (58.0, [all_m, 0.0]), (61.0, [0.0, all_m]), (78.0, [0.0, all_m]), (81.0, [all_m, 0.0])]
+    {
+        let rooms_m = rooms_of_blocked_drones_m(&mut drones, from_s);
+        let differ_m = (rooms_m[0] - wanted_m[0]).abs().max((rooms_m[1] - wanted_m[1]).abs());
+        assert!(differ_m < 0.01, "after {from_s} s: {rooms_m:?}, not {wanted_m:?}");
+    }
 }
 
 #[test]
