@@ -4,10 +4,14 @@ use crate::channel_params::ChannelParams;
 use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
-use crate::tuning::LEADER_SHARE;
+use crate::split::Crowd;
+use crate::tuning::{CROWD_DELAY, CROWD_DRONES, LANES, LEADER_SHARE};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
+
+/// A drone is never taken to fly more slowly than this in a queue, in nominal speeds.
+const LEAST_SPEED: f64 = 1e-3;
 
 /// How a leader chooses among the groupings of its members.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +109,8 @@ pub struct PlannerParams {
     pub speed_mps: f64,
     /// Time between two drones on one route, s.
     pub headway_s: f64,
+    /// A drone in a queue flies no slower than this, m/s.
+    pub queue_speed_min_mps: f64,
     /// Clearances of routes.
     pub routes: RouteParams,
     /// Shape of the formation.
@@ -131,6 +137,16 @@ pub struct PlannerParams {
 }
 
 impl PlannerParams {
+    /// How drones pass that cannot wait for their turn in a queue. `now_s`: the present, in the time of their arrivals, s.
+    #[must_use]
+    pub(crate) fn crowd(&self, now_s: f64) -> Crowd {
+        // Drones that may stop in a queue always wait for their turn. The times stay finite.
+        let slowest_mps = self.queue_speed_min_mps.max(LEAST_SPEED * self.speed_mps);
+        let headway_s = self.safe_distance_m / (LANES * slowest_mps);
+        let slowdown = CROWD_DELAY * self.speed_mps / slowest_mps;
+        Crowd { now_s, slowdown, headway_s, drones: CROWD_DRONES }
+    }
+
     /// How long so many drones take to pass one behind another, s.
     #[must_use]
     pub fn file_s(&self, drones: u32) -> f64 {

@@ -78,6 +78,21 @@ pub enum SplitError {
     },
 }
 
+/// How the drones of a queue pass that cannot wait for their turn. A drone flies no slower than a least speed, so a drone whose turn comes
+/// later than it arrives at that speed arrives before its turn. In a long queue the drones behind push it on. On the outermost routes there
+/// is room beside the file: there such drones pass side by side, as a crowd. Between two obstacles there is none, and each one waits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crowd {
+    /// The present, in the time of the arrivals, s.
+    pub now_s: f64,
+    /// Time that a drone takes to the gate in a crowd, in times of what it would take if it were alone; at least 1.
+    pub slowdown: f64,
+    /// Time between two drones of a crowd, s.
+    pub headway_s: f64,
+    /// A queue of at least so many drones is a crowd where it cannot wait.
+    pub drones: usize,
+}
+
 /// When each drone would pass on each route if it were alone, and the headway of each route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrivalTable {
@@ -172,6 +187,29 @@ impl ArrivalTable {
             return Err(SplitError::Assignment { drones: self.arrivals.len() });
         }
         Ok(self.queued(routes.to_vec()))
+    }
+
+    /// When the last drone of an assignment passes as drones fly, s: unlike in [`RouteAssignment::makespan_s`], a drone does not wait for
+    /// its turn longer than its least speed lets it, where there is room.
+    ///
+    /// # Errors
+    /// [`SplitError::Assignment`] if the assignment does not name a usable route for each drone.
+    pub fn forecast_s(&self, routes: &[usize], crowd: &Crowd) -> Result<f64, SplitError> {
+        let queues = self.assigned(routes)?.queues;
+        let micros = |s: f64| (s * MICROS).round() as Cost;
+        let (now, beside) = (micros(crowd.now_s), micros(crowd.headway_s));
+        let latest = |arrival: Cost| now + ((arrival - now) as f64 * crowd.slowdown).round() as Cost;
+        let last = |(route, queue): (usize, &Vec<usize>)| {
+            let has_room = (route == 0 || route + 1 == self.headways.len()) && queue.len() >= crowd.drones;
+            let arrivals = queue.iter().filter_map(|&drone| self.arrivals[drone][route]);
+            arrivals.fold(None, |before: Option<Cost>, arrival| {
+                let Some(before) = before else { return Some(arrival) };
+                let turn = before + self.headways[route];
+                let wait = if has_room { turn.min(latest(arrival).max(before + beside)) } else { turn };
+                Some(arrival.max(wait))
+            })
+        };
+        Ok(queues.iter().enumerate().filter_map(last).max().map_or(0.0, |last| last as f64 / MICROS))
     }
 
     /// The least makespan, s: [`ArrivalTable::split`] without its tie-break, in a fraction of the time.

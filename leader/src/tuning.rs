@@ -3,6 +3,20 @@
 //! "By hand" means that the value was chosen from watching single runs and that no sweep is on record. A number that was
 //! measured names the command that measures it again.
 
+// ---- Forecasts (`split.rs`) ----
+
+/// Drones side by side in a crowd that passes an obstacle: distances to keep that it passes in the time in which one drone flies one of
+/// them. No unit. 3.8. Fitted together with the next one to flights of `scenarios/open-field.toml` with grids of 150, 200 and 300 drones, with
+/// 300 also with other spacings, distances, speeds and a larger circle, and to `scenarios/grid.toml` with 300. docs/performance.md shows
+/// flights that chose nothing.
+pub(crate) const LANES: f64 = 3.8;
+/// Time that a drone takes to the gate in a crowd, in times of the time at its least speed along its shortest path. No unit. 1.15. Fitted as
+/// above.
+pub(crate) const CROWD_DELAY: f64 = 1.15;
+/// Fewer drones than this in one queue are held before the gate until it is their turn. 33. By hand: of 100 random scenes with up to 16 drones,
+/// four had drones that could not wait, and three of these passed as a file.
+pub(crate) const CROWD_DRONES: usize = 33;
+
 // ---- Adaptive time-outs (`adaptive_timeout.rs`) ----
 
 /// Weight of a new gap in the running means of a source's gaps. No unit. 0.02. By hand.

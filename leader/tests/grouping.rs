@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use skein_leader::slots::{TooFewSlots, assign};
-use skein_leader::split::{ArrivalTable, RouteAssignment, SplitError};
+use skein_leader::split::{ArrivalTable, Crowd, RouteAssignment, SplitError};
 use skein_protocol::Vec2;
 use std::collections::BTreeSet;
 
@@ -237,4 +237,47 @@ fn a_thousand_drones_are_split_exactly() {
     // A thousand passes over four routes, three seconds apart, starting with the earliest arrival of all.
     assert!(split.makespan_s >= 249.0 * 3.0);
     assert_eq!(split.queues.iter().map(Vec::len).sum::<usize>(), 1000);
+}
+
+/// Ten drones arrive together after 10 s, and wait for their turns. From the fifth on, the turn is later than a drone arrives at its least
+/// speed.
+#[test]
+fn drones_that_cannot_wait_for_their_turn_pass_side_by_side_where_there_is_room() {
+    let crowd = |now_s: f64| Crowd { now_s, slowdown: 2.3, headway_s: 1.0, drones: 6 };
+    let table = |routes: usize, start_s: f64| {
+        ArrivalTable::new(&vec![vec![10.0 + start_s; routes]; 10], &vec![4.0; routes]).unwrap()
+    };
+    let file_s = 10.0 + 9.0 * 4.0;
+    for (routes, route, last_s) in [(1, 0, 28.0), (2, 0, 28.0), (2, 1, 28.0), (3, 1, file_s), (3, 2, 28.0)] {
+        for start_s in [0.0, 500.0] {
+            let all_on = vec![route; 10];
+            let forecast_s = table(routes, start_s).forecast_s(&all_on, &crowd(start_s)).unwrap();
+            assert_eq!(forecast_s, start_s + last_s, "route {route} of {routes}, from {start_s} s");
+        }
+    }
+    let last_s = |n: usize| table(2, 0.0).forecast_s(&[vec![0; n], vec![1; 10 - n]].concat(), &crowd(0.0)).unwrap();
+    assert_eq!(last_s(5), 26.0, "five on each route wait for their turns");
+    assert_eq!((last_s(6), last_s(4)), (24.0, 24.0), "of six on one route, the last two pass as a crowd");
+    assert!(table(2, 0.0).forecast_s(&[0; 9], &crowd(0.0)).is_err());
+}
+
+proptest! {
+    /// The forecast lies between the last arrival of a drone alone and the makespan of the paper's queues, and is the latter if
+    /// no drone has to wait.
+    #[test]
+    fn a_forecast_is_never_later_than_the_queues(
+        rows in prop::collection::vec(prop::collection::vec(-20.0..60.0f64, 3), 1..12),
+        picks in prop::collection::vec(0..3usize, 12),
+        slowdown in 1.0..4.0f64,
+        headway_s in 0.1..5.0f64,
+    ) {
+        let table = ArrivalTable::new(&rows, &[2.0; 3]).unwrap();
+        let chosen = &picks[..rows.len()];
+        let forecast_s = table.forecast_s(chosen, &Crowd { now_s: 0.0, slowdown, headway_s, drones: 1 }).unwrap();
+        let makespan_s = table.assigned(chosen).unwrap().makespan_s;
+        let last_s = rows.iter().zip(chosen).map(|(row, &route)| row[route]).fold(f64::NEG_INFINITY, f64::max);
+        prop_assert!(last_s - 1e-6 <= forecast_s && forecast_s <= makespan_s, "{last_s} {forecast_s} {makespan_s}");
+        let never_wait = table.forecast_s(chosen, &Crowd { now_s: -100.0, slowdown: 1e3, headway_s, drones: 1 }).unwrap();
+        prop_assert_eq!(never_wait, makespan_s);
+    }
 }
