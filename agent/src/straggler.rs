@@ -19,8 +19,9 @@ pub(crate) struct Straggler {
 pub(crate) struct OwnPlan {
     /// Whether the drone leads and no other drone shows its term. In a group of one drone this is always so.
     pub(crate) unfollowed: bool,
-    /// When the plan was made by which the drone passes obstacles; `None` if it obeys another kind of plan.
-    pub(crate) passing_since: Option<SimTime>,
+    /// When the plan was made by which the drone passes obstacles, or its part of the swarm goes on by itself; `None` if it obeys another kind
+    /// of plan.
+    pub(crate) apart_since: Option<SimTime>,
 }
 
 impl Straggler {
@@ -38,8 +39,8 @@ impl Straggler {
     pub(crate) fn slot(&mut self, now: SimTime, own: OwnPlan, shape: &Shape, spacing_m: f64) -> Option<(Vec2, Vec2)> {
         self.unfollowed_since = own.unfollowed.then(|| self.unfollowed_since.unwrap_or(now));
         let unheard = self.unfollowed_since.is_some_and(|since| now.since(since) >= UNHEARD_S);
-        // A formation from before the obstacles is behind the drone, where others are still passing.
-        let current = |plan: &&Plan| own.passing_since.is_none_or(|since| plan.stamp > since);
+        // A formation from before the obstacles is behind the drone, where others are still passing, or in front of the obstacles.
+        let current = |plan: &&Plan| own.apart_since.is_none_or(|since| plan.stamp > since);
         let plan = self.formation.as_ref().filter(|_| unheard).filter(current)?;
         let (front, velocity) = anchor(plan, now);
         Some((front + *shape.slots(plan.members as usize + 1, spacing_m).last()?, velocity))
@@ -57,7 +58,7 @@ mod tests {
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0], [-20.0, 5.0]]);
         let mut straggler = Straggler::default();
         let slot = |straggler: &mut Straggler, now_s, unfollowed| {
-            let own = OwnPlan { unfollowed, passing_since: None };
+            let own = OwnPlan { unfollowed, apart_since: None };
             straggler.slot(SimTime::from_secs(now_s), own, &shape, 10.0)
         };
         assert_eq!(slot(&mut straggler, 0.0, true), None);
@@ -77,7 +78,7 @@ mod tests {
             ..Plan::zeroed()
         };
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0]]);
-        let own = OwnPlan { unfollowed: true, passing_since: Some(SimTime::from_secs(2.0)) };
+        let own = OwnPlan { unfollowed: true, apart_since: Some(SimTime::from_secs(2.0)) };
         let mut straggler = Straggler::default();
         straggler.hear(MessageRef::Plan(&made(1.0)));
         straggler.slot(SimTime::from_secs(3.0), own, &shape, 10.0);

@@ -46,7 +46,7 @@ use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Plan, QueuePlace, set_tag};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, Message, MessageRef, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
+use skein_protocol::{DroneId, GroupId, Message, MessageRef, ObstacleId, Phase, PlanStamp, SimTime, Vec2, raised};
 use std::iter;
 
 /// The pilot of one drone, composed of machines that each own their state.
@@ -268,10 +268,11 @@ impl SwarmPilot {
             return direction * self.queue_speed_mps(senses.now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
-        let passing = self.leading.obeyed().filter(|bundle| bundle.plan.phase() == Phase::Avoid);
+        let is_apart = |plan: &Plan| plan.phase() == Phase::Avoid || plan.group != GroupId::ALL;
+        let apart = self.leading.obeyed().filter(|bundle| is_apart(&bundle.plan));
         let own = OwnPlan {
             unfollowed: self.leading.is_unfollowed(senses.now),
-            passing_since: passing.map(|bundle| bundle.plan.stamp),
+            apart_since: apart.map(|bundle| bundle.plan.stamp),
         };
         if let Some((slot, velocity)) = self.straggler.slot(senses.now, own, shape, spacing_m) {
             return self.velocity_to_slot(senses, slot, velocity);

@@ -79,6 +79,7 @@ fn scenes_of_other_sizes_and_speeds_are_reached() {
 #[test]
 fn scenes_of_an_independent_generator_are_reached() {
     for name in [
+        "alone-in-its-part",
         "beside-a-long-block",
         "beside-a-slanted-wall",
         "channel-of-just-enough-width",
@@ -93,6 +94,7 @@ fn scenes_of_an_independent_generator_are_reached() {
         "head-on-at-a-gap",
         "identity-in-a-corridor",
         "late-first-command",
+        "lines-that-bind-both",
         "lost-on-two-sides-of-a-wall",
         "lost-straggler",
         "mute-at-the-goal",
@@ -105,6 +107,7 @@ fn scenes_of_an_independent_generator_are_reached() {
         "pushed-along-a-channel",
         "restarted-and-left-behind",
         "restarts-in-a-corridor",
+        "room-in-turn",
         "shut-out",
         "slit-with-coarse-ticks",
         "stop-before-the-next-wall",
