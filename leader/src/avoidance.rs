@@ -33,7 +33,8 @@ fn groupings(s: &Situation<'_>, survey: &Survey<'_>) -> Option<Vec<Grouping>> {
             chosen[i] = route;
         }
         let ranks = ranks(&chosen, &arrivals, &survey.kept_ranks());
-        Some(Grouping { predicted_s: all.forecast_s(&chosen, &s.params.crowd(0.0)).ok()?, chosen, ranks })
+        let predicted_s = all.forecast_s(&all.assigned(&chosen).ok()?, &s.params.crowd(0.0));
+        Some(Grouping { chosen, ranks, predicted_s })
     };
     splits.into_iter().map(grouping).collect()
 }

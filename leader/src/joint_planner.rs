@@ -228,8 +228,7 @@ fn own_grouping(
         }
     }
     let now_s = s.now.since(SimTime::ZERO);
-    let last_s = union.forecast_s(&split.routes, &s.params.crowd(now_s)).unwrap_or(split.makespan_s);
-    Grouping { chosen, ranks, predicted_s: last_s - now_s }
+    Grouping { chosen, ranks, predicted_s: union.forecast_s(split, &s.params.crowd(now_s)) - now_s }
 }
 
 /// The place in its queue of each drone in the table.

@@ -139,7 +139,6 @@ impl ArrivalTable {
                 return Err(SplitError::NoRoute { drone });
             }
         }
-        let micros = |s: f64| (s * MICROS).round() as Cost;
         let arrival = |&s: &f64| (s.abs() < NEVER_S).then(|| micros(s));
         Ok(Self {
             arrivals: arrivals.iter().map(|row| row.iter().map(arrival).collect()).collect(),
@@ -189,27 +188,25 @@ impl ArrivalTable {
         Ok(self.queued(routes.to_vec()))
     }
 
-    /// When the last drone of an assignment passes as drones fly, s: unlike in [`RouteAssignment::makespan_s`], a drone does not wait for
-    /// its turn longer than its least speed lets it, where there is room.
+    /// When the last drone of an assignment of this table passes as drones fly, s; 0 without drones. Unlike in
+    /// [`RouteAssignment::makespan_s`], a drone does not wait for its turn longer than its least speed lets it, where there is room.
     ///
-    /// # Errors
-    /// [`SplitError::Assignment`] if the assignment does not name a usable route for each drone.
-    pub fn forecast_s(&self, routes: &[usize], crowd: &Crowd) -> Result<f64, SplitError> {
-        let queues = self.assigned(routes)?.queues;
-        let micros = |s: f64| (s * MICROS).round() as Cost;
+    /// # Panics
+    /// If the assignment has more drones than this table.
+    #[must_use]
+    pub fn forecast_s(&self, split: &RouteAssignment, crowd: &Crowd) -> f64 {
         let (now, beside) = (micros(crowd.now_s), micros(crowd.headway_s));
         let latest = |arrival: Cost| now + ((arrival - now) as f64 * crowd.slowdown).round() as Cost;
-        let last = |(route, queue): (usize, &Vec<usize>)| {
+        let last = |route: usize| {
+            let queue = self.queue(&split.routes, route);
             let has_room = (route == 0 || route + 1 == self.headways.len()) && queue.len() >= crowd.drones;
-            let arrivals = queue.iter().filter_map(|&drone| self.arrivals[drone][route]);
-            arrivals.fold(None, |before: Option<Cost>, arrival| {
-                let Some(before) = before else { return Some(arrival) };
+            let turn = |before: Cost, arrival: Cost| {
                 let turn = before + self.headways[route];
-                let wait = if has_room { turn.min(latest(arrival).max(before + beside)) } else { turn };
-                Some(arrival.max(wait))
-            })
+                if has_room { turn.min(latest(arrival).max(before + beside)) } else { turn }
+            };
+            passes(&queue, turn).last()
         };
-        Ok(queues.iter().enumerate().filter_map(last).max().map_or(0.0, |last| last as f64 / MICROS))
+        (0..self.headways.len()).filter_map(last).max().map_or(0.0, |last| last as f64 / MICROS)
     }
 
     /// The least makespan, s: [`ArrivalTable::split`] without its tie-break, in a fraction of the time.
@@ -270,17 +267,14 @@ impl ArrivalTable {
         queue
     }
 
-    /// When each drone of a queue passes.
-    fn passes(&self, queue: &[(Cost, usize)], route: usize) -> impl Iterator<Item = Cost> {
+    /// The turn of a drone in the paper's queue: a headway after the drone before it.
+    fn by_headway(&self, route: usize) -> impl Fn(Cost, Cost) -> Cost {
         let headway = self.headways[route];
-        queue.iter().scan(Cost::MIN / 2, move |last, &(arrival, _)| {
-            *last = arrival.max(*last + headway);
-            Some(*last)
-        })
+        move |before, _| before + headway
     }
 
     fn makespan(&self, routes: &[usize]) -> Cost {
-        let last = |route| self.passes(&self.queue(routes, route), route).last();
+        let last = |route| passes(&self.queue(routes, route), self.by_headway(route)).last();
         (0..self.headways.len()).filter_map(last).max().unwrap_or(0)
     }
 
@@ -291,7 +285,7 @@ impl ArrivalTable {
         let mut queues = Vec::with_capacity(self.headways.len());
         for route in 0..self.headways.len() {
             let queue = self.queue(&routes, route);
-            for (pass, &(arrival, drone)) in self.passes(&queue, route).zip(&queue) {
+            for (pass, &(arrival, drone)) in passes(&queue, self.by_headway(route)).zip(&queue) {
                 pass_s[drone] = seconds(pass);
                 total += arrival;
             }
@@ -299,4 +293,17 @@ impl ArrivalTable {
         }
         RouteAssignment { makespan_s: seconds(self.makespan(&routes)), routes, queues, pass_s, total_s: seconds(total) }
     }
+}
+
+/// When each drone of a queue passes: once it arrives and it is its `turn`, which follows from when the drone before it passes and from its own
+/// arrival.
+fn passes(queue: &[(Cost, usize)], turn: impl Fn(Cost, Cost) -> Cost) -> impl Iterator<Item = Cost> {
+    queue.iter().scan(Cost::MIN / 2, move |last, &(arrival, _)| {
+        *last = arrival.max(turn(*last, arrival));
+        Some(*last)
+    })
+}
+
+fn micros(s: f64) -> Cost {
+    (s * MICROS).round() as Cost
 }

@@ -73,7 +73,7 @@ fn scenes_of_other_sizes_and_speeds_are_reached() {
     }
 }
 
-/// What independent generators of scenes found: routes that nobody needed or that led back, drones that shut each other out of their
+/// What independent generators of scenes found, and one flight of the sweep over delay and loss: routes that nobody needed or that led back, drones that shut each other out of their
 /// slots or push against each other, parts out of each other's reach, obstacles or corners that no drone senses, and two drones whose
 /// first line was wrong.
 #[test]
