@@ -19,6 +19,8 @@ use std::iter;
 const MAX_ANCHOR_STEPS: u32 = 10_000;
 /// Distances that differ by less than this are equal, m.
 const ROUNDING_M: f64 = 1e-6;
+/// The time after which members at rest are stuck doubles at most this often: from 3 s to 96 s.
+const MAX_DOUBLINGS: u32 = 5;
 
 /// What a leader remembers while the formation closes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,6 +36,8 @@ pub(crate) struct FormationPlanner {
     /// Whether drones were still shut out of their slots after the ranks had been open. From then on slots are assigned by
     /// [`Reformation::Optimal`], whatever the scenario's method.
     shut_out: bool,
+    /// How often the ranks were closed again since the formation began to close.
+    closings: u32,
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
@@ -111,7 +115,14 @@ impl FormationPlanner {
             return false;
         }
         let since = *self.stalled.get_or_insert(s.now);
-        s.now.since(since) >= STALLED_S
+        s.now.since(since) >= self.patience_s()
+    }
+
+    /// For how long all members are at rest before they are stuck, s. Drones that only move once others have answered them over a slow
+    /// radio may rest for longer than usual. Therefore the time doubles whenever the ranks have opened and closed in vain.
+    fn patience_s(&self) -> f64 {
+        let doublings = self.closings.saturating_sub(1).min(MAX_DOUBLINGS);
+        STALLED_S * f64::from(1_u32 << doublings)
     }
 
     /// The plan for members that are stuck. A drone that has reached its slot may shut others out of theirs: first each takes the slot that
@@ -120,7 +131,8 @@ impl FormationPlanner {
     fn loosen(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
         let pinned = s.members.iter().any(|m| is_alone(m, s));
         let shut_out = self.shut_out || self.open;
-        let fresh = Self { pinned, shut_out, pace: self.pace, ..Self::default() };
+        let closings = self.closings + u32::from(self.open);
+        let fresh = Self { pinned, shut_out, closings, pace: self.pace, ..Self::default() };
         if !pinned && !self.open && !self.swapped {
             let swapped = Self { swapped: true, ..fresh };
             let plan = swapped.assign(s, Phase::Reform);
