@@ -10,7 +10,7 @@ use crate::error::BusError;
 use crate::futex;
 use crate::segment::SharedArray;
 use crate::spec::WaitMode;
-use crate::tick_word::{DEAD, PaddedWord, STOP, word_of};
+use crate::tick_word::{DEAD, NOT_BEGUN, PaddedWord, STOP, word_of};
 use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
 use std::ptr::NonNull;
@@ -87,10 +87,11 @@ impl Barrier {
         // First all words, so that a drone that is awake need not be woken. Then the wake-ups: the other cores first, so
         // that they work while this core is still in its system calls; core 0, the world's own, last.
         let cores = self.ticks.count();
+        let mut sleeps = self.wait == WaitMode::Block;
         for core in 0..cores {
-            self.tick_word(core).store(value, Ordering::SeqCst);
+            sleeps |= self.tick_word(core).swap(value, Ordering::SeqCst) == NOT_BEGUN;
         }
-        if self.wait == WaitMode::Block {
+        if sleeps {
             for core in (0..cores).rev() {
                 futex::wake_all(self.tick_word(core));
             }

@@ -7,7 +7,7 @@ use crate::error::BusError;
 use crate::futex::{self, SLICE};
 use crate::spec::WaitMode;
 use crate::stopwatch::Stopwatch;
-use crate::tick_word::{STOP, word_of};
+use crate::tick_word::{NOT_BEGUN, STOP, word_of};
 use skein_protocol::Tick;
 use skein_protocol::slot::{LinkStats, Slot};
 use std::ptr::NonNull;
@@ -131,11 +131,13 @@ impl DroneEndpoint {
         self.stopwatch
     }
 
-    /// Waits for another value than `seen`; false if there was none for a while.
+    /// Waits for another value than `seen`; false if there was none for a while. Before the first tick a drone always sleeps: drones that
+    /// yield would take the cores from those that are still starting.
     #[inline]
     fn pause(&self, seen: u32) -> bool {
         let (word, calls) = (self.tick_word(), self.words().calls());
-        match self.wait {
+        let wait = if seen == NOT_BEGUN { WaitMode::Block } else { self.wait };
+        match wait {
             WaitMode::Block => {
                 calls.fetch_add(1, Ordering::Relaxed);
                 if self.bound { futex::wait_on(word, seen) } else { futex::wait(word, seen, SLICE) }

@@ -11,7 +11,8 @@ pub enum WaitMode {
     /// They sleep on a futex.
     #[default]
     Block,
-    /// They give up the core and look again: faster for few drones on an idle machine, very slow on a busy one.
+    /// They give up the core and look again: faster for few drones on an idle machine, very slow on a busy one. Before the first tick they
+    /// sleep on a futex, so that all can start.
     Yield,
 }
 

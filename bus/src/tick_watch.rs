@@ -4,7 +4,7 @@ use crate::control::Control;
 use crate::drone_endpoint::TickSignal;
 use crate::futex;
 use crate::spec::WaitMode;
-use crate::tick_word::STOP;
+use crate::tick_word::{NOT_BEGUN, STOP};
 use skein_protocol::Tick;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -38,7 +38,7 @@ impl TickWatch {
                 self.last = seen;
                 return TickSignal::Tick(Tick::from(seen - 1));
             }
-            if block {
+            if block || seen == NOT_BEGUN {
                 futex::wait_on(self.word(), seen);
             } else {
                 rustix::thread::sched_yield();

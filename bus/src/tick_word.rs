@@ -8,6 +8,8 @@ use std::sync::atomic::AtomicU32;
 
 /// In a done word: the drone's process is dead. The other bits keep the last tick it answered.
 pub(crate) const DEAD: u32 = 1 << 31;
+/// In a tick word: the world has opened no tick yet.
+pub(crate) const NOT_BEGUN: u32 = 0;
 /// In a tick word: the mission is over.
 pub(crate) const STOP: u32 = u32::MAX;
 

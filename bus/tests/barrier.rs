@@ -71,6 +71,26 @@ fn lockstep_works_with_yielding_waits() {
 }
 
 #[test]
+fn drones_that_yield_sleep_until_the_first_tick() {
+    let world = segment(2, 2, WaitMode::Yield);
+    let threads = [0, 1].map(|i| drone(&world, i));
+    thread::sleep(Duration::from_millis(50));
+    let [_, calls] = world.calls();
+    assert!(calls <= 4, "{calls} system calls before the first tick");
+    world.open_tick(0).unwrap();
+    world.wait_done(0, LONG, &mut [TickOutcome::Pending; 2]).unwrap();
+    world.close();
+    assert!(threads.map(|drone| drone.join().unwrap()) == [[0], [0]]);
+
+    // A mission that ends before its first tick wakes them as well.
+    let world = segment(1, 1, WaitMode::Yield);
+    let waits = drone(&world, 0);
+    thread::sleep(Duration::from_millis(20));
+    world.close();
+    assert!(waits.join().unwrap().is_empty());
+}
+
+#[test]
 fn marking_a_drone_dead_wakes_the_world() {
     let world = Arc::new(segment(2, 1, WaitMode::Block));
     let survivor = drone(&world, 1);
