@@ -112,9 +112,10 @@ impl PilotParams {
         }
     }
 
-    pub(crate) fn queueing(&self) -> QueueParams {
+    /// `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.
+    pub(crate) fn queueing(&self, between: bool, delay_s: f64) -> QueueParams {
         QueueParams {
-            headway_s: self.planner.headway_s,
+            headway_s: self.planner.turn_s(between, delay_s),
             speed_mps: self.guidance.speed_mps,
             speed_change_mps: self.guidance.speed_change_mps,
         }

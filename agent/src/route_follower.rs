@@ -18,6 +18,8 @@ struct Leg {
     exit_x_m: f64,
     /// Whether the drone has still to leave the set.
     open: bool,
+    /// Whether the route leads between two obstacles.
+    between: bool,
 }
 
 /// What the corridor was drawn for. When it changes, the corridor is drawn again.
@@ -202,6 +204,7 @@ impl RouteFollower {
                 gate_x_m: routes.gate_x_m(),
                 exit_x_m: routes.exit_x_m(),
                 open: position.x < routes.exit_x_m(),
+                between: routes.is_between(usize::from(place.route)),
             })
             .collect();
         let open: Vec<(&Routes, usize)> = passages
@@ -261,6 +264,12 @@ impl RouteFollower {
             *place = QueuePlace { remaining_m: self.remaining_m(leg, position), ..leg.place };
         }
         places
+    }
+
+    /// Whether the route of a place leads between two obstacles.
+    #[must_use]
+    pub fn leads_between(&self, place: QueuePlace) -> bool {
+        self.legs.iter().any(|leg| leg.place.set == place.set && leg.between)
     }
 
     /// Of these places, those whose sets the drone has still to leave; the other entries get set 0.

@@ -357,11 +357,14 @@ impl SwarmPilot {
     }
 
     fn queue_speed_mps(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) -> f64 {
+        let nominal_mps = self.params.guidance.speed_mps;
         if !self.params.queue {
-            return self.params.guidance.speed_mps;
+            return nominal_mps;
         }
         let places = open.iter().copied().filter(|place| place.set != 0);
-        self.queue.speed_mps(places, self.leading.peers(), now, &self.params.queueing())
+        let peers = self.leading.peers();
+        let params = |place: QueuePlace| self.params.queueing(self.route.leads_between(place), peers.delay_s());
+        self.queue.speed_mps(places, peers, now, params).min(nominal_mps)
     }
 
     /// The safe acceleration nearest to the one that leads to the wanted velocity, m/s².

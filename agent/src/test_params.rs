@@ -13,6 +13,7 @@ pub(crate) fn planner() -> PlannerParams {
         strategy: Strategy::PaperRule,
         speed_mps: 10.0,
         headway_s: 4.0,
+        by_words: false,
         queue_speed_min_mps: 5.0,
         routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 40.0, scale: Scale::FULL },
         shape: Shape::Line,

@@ -24,9 +24,9 @@ fn groupings(s: &Situation<'_>, survey: &Survey<'_>) -> Option<Vec<Grouping>> {
     let arrivals = survey.arrivals_s();
     let free: Vec<usize> = (0..members.len()).filter(|&i| settled(i).is_none()).collect();
     let free_arrivals: Vec<Vec<f64>> = free.iter().map(|&i| arrivals[i].clone()).collect();
-    let table = arrival_table(s.params, &free_arrivals, survey.routes().count())?;
+    let table = arrival_table(s, &free_arrivals, survey.routes())?;
     let splits = splits(s, survey, &free, &table)?;
-    let all = arrival_table(s.params, &arrivals, survey.routes().count())?;
+    let all = arrival_table(s, &arrivals, survey.routes())?;
     let grouping = |split: RouteAssignment| {
         let mut chosen: Vec<usize> = (0..members.len()).map(|i| settled(i).unwrap_or(0)).collect();
         for (&i, route) in free.iter().zip(split.routes) {

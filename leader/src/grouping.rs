@@ -2,8 +2,9 @@
 
 use crate::draft::draft;
 use crate::member::{Member, group_leaders};
-use crate::params::{Between, PlannerParams};
+use crate::params::Between;
 use crate::plan_bundle::PlanBundle;
+use crate::routes::Routes;
 use crate::set_place::SetPlace;
 use crate::situation::Situation;
 use crate::split::ArrivalTable;
@@ -60,8 +61,10 @@ impl Grouping {
 
 /// The table of these arrivals (s, by drone and route). `None` only if an arrival is not a number, which finite positions
 /// exclude.
-pub(crate) fn arrival_table(params: &PlannerParams, arrivals: &[Vec<f64>], routes: usize) -> Option<ArrivalTable> {
-    ArrivalTable::new(arrivals, &vec![params.headway_s; routes]).ok()
+pub(crate) fn arrival_table(s: &Situation<'_>, arrivals: &[Vec<f64>], routes: &Routes) -> Option<ArrivalTable> {
+    let turn_s = |route| s.params.turn_s(routes.is_between(route), s.delay_s);
+    let turns_s: Vec<f64> = (0..routes.count()).map(turn_s).collect();
+    ArrivalTable::new(arrivals, &turns_s).ok()
 }
 
 /// Place of each drone in the queue of its route. Drones that have a place already keep their order; the others follow by

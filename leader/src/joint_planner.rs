@@ -101,7 +101,7 @@ impl JointPlanner {
         survey: &Survey<'_>,
     ) -> Option<Alternatives> {
         let arrivals: Vec<Vec<f64>> = table.iter().map(arrivals_s).collect();
-        let union = arrival_table(s.params, &arrivals, survey.routes().count())?;
+        let union = arrival_table(s, &arrivals, survey.routes())?;
         let coordinator = coordinator(&table)?;
         let coordinates = coordinator == s.ballot.claimant;
         let looks_ahead = matches!(s.params.strategy, Strategy::LookAhead(_));
@@ -137,7 +137,7 @@ impl JointPlanner {
         };
         let survey = Survey::new(s, &awaited.set)?.with_kept(s.members, &awaited.kept);
         let arrivals: Vec<Vec<f64>> = awaited.table.iter().map(arrivals_s).collect();
-        let union = arrival_table(s.params, &arrivals, survey.routes().count())?;
+        let union = arrival_table(s, &arrivals, survey.routes())?;
         let grouping = own_grouping(s, &awaited.table, &union, &survey, &union.assigned(&routes).ok()?);
         Some(grouping.bundle(s, &awaited.set, &survey, awaited.replan))
     }

@@ -5,7 +5,7 @@ use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
 use crate::split::Crowd;
-use crate::tuning::{CROWD_DELAY, CROWD_DRONES, LANES, LEADER_SHARE};
+use crate::tuning::{AGREEMENT_MESSAGES, CROWD_DELAY, CROWD_DRONES, LANES, LEADER_SHARE};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
@@ -109,6 +109,8 @@ pub struct PlannerParams {
     pub speed_mps: f64,
     /// Time between two drones on one route, s.
     pub headway_s: f64,
+    /// Whether lines that the drones agree on keep them apart, because they do not range each other.
+    pub by_words: bool,
     /// A drone in a queue flies no slower than this, m/s.
     pub queue_speed_min_mps: f64,
     /// Clearances of routes.
@@ -145,6 +147,17 @@ impl PlannerParams {
         let headway_s = self.safe_distance_m / (LANES * slowest_mps);
         let slowdown = CROWD_DELAY * self.speed_mps / slowest_mps;
         Crowd { now_s, slowdown, headway_s, drones: CROWD_DRONES }
+    }
+
+    /// Time between two drones on one route, s. `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.
+    ///
+    /// By words, a drone follows another one into a gap only after the two have agreed on another line. That takes three messages: one that
+    /// states where the other drone is now, one that states the line, and its answer. Drones that follow each other faster jam in front of
+    /// the gap. Beside an outer route there is room.
+    #[must_use]
+    pub fn turn_s(&self, between: bool, delay_s: f64) -> f64 {
+        let agreed_s = if self.by_words && between { AGREEMENT_MESSAGES * delay_s } else { 0.0 };
+        self.headway_s.max(agreed_s)
     }
 
     /// How long so many drones take to pass one behind another, s.

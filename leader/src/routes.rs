@@ -205,6 +205,12 @@ impl Routes {
         self.routes.len()
     }
 
+    /// Whether a route leads between two obstacles. The first and the last one have nothing on their outer side.
+    #[must_use]
+    pub fn is_between(&self, route: usize) -> bool {
+        route > 0 && route + 1 < self.count()
+    }
+
     /// A route, 0 = rightmost. An index beyond the last gives the leftmost.
     #[must_use]
     pub fn route(&self, index: usize) -> &Route {

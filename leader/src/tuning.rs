@@ -7,7 +7,7 @@
 
 /// Drones side by side in a crowd that passes an obstacle: distances to keep that it passes in the time in which one drone flies one of
 /// them. No unit. 3.8. Fitted together with the next one to flights of `scenarios/open-field.toml` with grids of 150, 200 and 300 drones, with
-/// 300 also with other spacings, distances, speeds and a larger circle, and to `scenarios/grid.toml` with 300. docs/performance.md shows
+/// 300 also with other spacings, distances, speeds and a larger circle, and to `scenarios/grid.toml` with 300. docs/paper.md shows
 /// flights that chose nothing.
 pub(crate) const LANES: f64 = 3.8;
 /// Time that a drone takes to the gate in a crowd, in times of the time at its least speed along its shortest path. No unit. 1.15. Fitted as
@@ -16,6 +16,9 @@ pub(crate) const CROWD_DELAY: f64 = 1.15;
 /// Fewer drones than this in one queue are held before the gate until it is their turn. 33. By hand: of 100 random scenes (`skein scene 900000` to
 /// `900099`, up to 16 drones) four had drones that could not wait, and three of these passed as a file.
 pub(crate) const CROWD_DRONES: usize = 33;
+/// By words, drones follow each other through a gap no faster than such a number of messages takes, one after the other. No unit. 3. By
+/// reasoning ([`crate::params::PlannerParams::turn_s`]), and compared with 4 in `scenarios/narrow/gap.toml`, seeds 1 to 8.
+pub(crate) const AGREEMENT_MESSAGES: f64 = 3.0;
 
 // ---- Adaptive time-outs (`adaptive_timeout.rs`) ----
 

@@ -193,3 +193,13 @@ fn a_leader_does_not_outbid_a_claim_that_is_under_way() {
         assert_eq!(outbids, is_of_part);
     }
 }
+
+#[test]
+fn by_words_drones_follow_each_other_through_a_gap_no_faster_than_they_agree() {
+    let mut planner = params(&DEFAULT, DRONES, 0, 1, SimTime::ZERO).planner;
+    planner.headway_s = 2.75;
+    assert_eq!([false, true].map(|between| planner.turn_s(between, 2.0)), [2.75; 2], "with ranging");
+    planner.by_words = true;
+    assert_eq!([false, true].map(|between| planner.turn_s(between, 2.0)), [2.75, 6.0]);
+    assert_eq!(planner.turn_s(true, 0.5), 2.75, "a fast radio does not matter");
+}

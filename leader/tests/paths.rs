@@ -212,6 +212,15 @@ fn a_body_in_a_gap_becomes_part_of_the_nearer_wall() {
 }
 
 #[test]
+fn all_routes_but_the_outer_ones_lead_between_two_obstacles() {
+    let between = |routes: &Routes| (0..routes.count()).map(|route| routes.is_between(route)).collect::<Vec<_>>();
+    assert_eq!(between(&routes(&[])), [false]);
+    assert_eq!(between(&routes(&[rectangle(640.0, 0.0, 10.0, 15.0)])), [false, false]);
+    let two = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
+    assert_eq!(between(&two), [false, true, false]);
+}
+
+#[test]
 fn bodies_bar_a_gap_if_they_leave_no_room_beside_them() {
     let routes = routes(&[rectangle(640.0, 60.0, 10.0, 15.0), rectangle(640.0, -60.0, 10.0, 15.0)]);
     let body = |x: f64, y: f64| Body { centre_m: Vec2::new(x, y), radius_m: 30.0 };

@@ -240,6 +240,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         },
         speed_mps: drone.speed_mps,
         headway_s: avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps,
+        by_words: scenario.apart_by_words(),
         queue_speed_min_mps: drone.speed_mps - if scenario.guidance.queue { drone.speed_change_mps } else { 0.0 },
         routes: RouteParams {
             clearance_m: avoidance.clearance_m + scenario.sensors.obstacle_error_max_m,
