@@ -20,6 +20,8 @@ struct Leg {
     open: bool,
     /// Whether the route leads between two obstacles.
     between: bool,
+    /// Whether the drones on the route pass side by side, without a queue.
+    crowd: bool,
 }
 
 /// What the corridor was drawn for. When it changes, the corridor is drawn again.
@@ -58,6 +60,8 @@ pub struct RouteFollower {
     legs: Vec<Leg>,
     corridor: Option<Corridor>,
     drawn_for: Option<DrawnFor>,
+    /// Number of assignments from which it is known which routes are those of crowds.
+    heard: usize,
     detours: Vec<Detour>,
     bodies: Vec<Body>,
     blocked: bool,
@@ -74,6 +78,7 @@ impl RouteFollower {
             legs: Vec::new(),
             corridor: None,
             drawn_for: None,
+            heard: 0,
             detours: Vec::new(),
             bodies: Vec::new(),
             blocked: false,
@@ -122,13 +127,25 @@ impl RouteFollower {
             self.detours.clear();
         }
         let detoured = self.find_detours(ledger, position, bodies);
-        if self.drawn_for == Some(key) && !moved && !detoured {
-            return;
+        if self.drawn_for != Some(key) || moved || detoured {
+            self.bodies.clear();
+            self.bodies.extend_from_slice(bodies);
+            self.draw(ledger, position);
+            self.drawn_for = Some(self.drawing_key(ledger, position));
+            self.heard = 0;
         }
-        self.bodies.clear();
-        self.bodies.extend_from_slice(bodies);
-        self.draw(ledger, position);
-        self.drawn_for = Some(self.drawing_key(ledger, position));
+        let heard = ledger.sets().iter().map(|set| set.parts.len()).sum();
+        if std::mem::replace(&mut self.heard, heard) != heard {
+            self.find_crowds(ledger);
+        }
+    }
+
+    /// Finds out on which of its routes the drone is in a crowd.
+    fn find_crowds(&mut self, ledger: &Ledger) {
+        for leg in &mut self.legs {
+            let set = ledger.sets().iter().find(|set| set.tag == leg.place.set);
+            leg.crowd = set.is_some_and(|set| set.passes_as_crowd(usize::from(leg.place.route)));
+        }
     }
 
     fn drawing_key(&self, ledger: &Ledger, position: Vec2) -> DrawnFor {
@@ -205,6 +222,7 @@ impl RouteFollower {
                 exit_x_m: routes.exit_x_m(),
                 open: position.x < routes.exit_x_m(),
                 between: routes.is_between(usize::from(place.route)),
+                crowd: false,
             })
             .collect();
         let open: Vec<(&Routes, usize)> = passages
@@ -270,6 +288,12 @@ impl RouteFollower {
     #[must_use]
     pub fn leads_between(&self, place: QueuePlace) -> bool {
         self.legs.iter().any(|leg| leg.place.set == place.set && leg.between)
+    }
+
+    /// Whether the drones on the route of a place pass side by side, as a crowd: it has no queue.
+    #[must_use]
+    pub fn is_in_crowd(&self, place: QueuePlace) -> bool {
+        self.legs.iter().any(|leg| leg.place.set == place.set && leg.crowd)
     }
 
     /// Of these places, those whose sets the drone has still to leave; the other entries get set 0.

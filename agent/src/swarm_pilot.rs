@@ -363,7 +363,10 @@ impl SwarmPilot {
         }
         let places = open.iter().copied().filter(|place| place.set != 0);
         let peers = self.leading.peers();
-        let params = |place: QueuePlace| self.params.queueing(self.route.leads_between(place), peers.delay_s());
+        let params = |place: QueuePlace| {
+            let between = self.route.leads_between(place);
+            (!self.route.is_in_crowd(place)).then(|| self.params.queueing(between, peers.delay_s()))
+        };
         self.queue.speed_mps(places, peers, now, params).min(nominal_mps)
     }
 

@@ -14,7 +14,7 @@ pub(crate) fn planner() -> PlannerParams {
         speed_mps: 10.0,
         headway_s: 4.0,
         by_words: false,
-        queue_speed_min_mps: 5.0,
+        speed_on_sight_mps: f64::INFINITY,
         routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 40.0, scale: Scale::FULL },
         shape: Shape::Line,
         spacing_m: 40.0,

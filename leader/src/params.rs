@@ -5,13 +5,10 @@ use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
 use crate::split::Crowd;
-use crate::tuning::{AGREEMENT_MESSAGES, CROWD_DELAY, CROWD_DRONES, LANES, LEADER_SHARE};
+use crate::tuning::{AGREEMENT_MESSAGES, CROWD_DETOUR, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
-
-/// A drone is never taken to fly more slowly than this in a queue, in nominal speeds.
-const LEAST_SPEED: f64 = 1e-3;
 
 /// How a leader chooses among the groupings of its members.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,8 +108,8 @@ pub struct PlannerParams {
     pub headway_s: f64,
     /// Whether lines that the drones agree on keep them apart, because they do not range each other.
     pub by_words: bool,
-    /// A drone in a queue flies no slower than this, m/s.
-    pub queue_speed_min_mps: f64,
+    /// The greatest speed from which a drone stops within what it senses, m/s.
+    pub speed_on_sight_mps: f64,
     /// Clearances of routes.
     pub routes: RouteParams,
     /// Shape of the formation.
@@ -139,14 +136,12 @@ pub struct PlannerParams {
 }
 
 impl PlannerParams {
-    /// How drones pass that cannot wait for their turn in a queue. `now_s`: the present, in the time of their arrivals, s.
+    /// How the drones of a crowd pass. `now_s`: the present, in the time of their arrivals, s.
     #[must_use]
     pub(crate) fn crowd(&self, now_s: f64) -> Crowd {
-        // Drones that may stop in a queue always wait for their turn. The times stay finite.
-        let slowest_mps = self.queue_speed_min_mps.max(LEAST_SPEED * self.speed_mps);
-        let headway_s = self.safe_distance_m / (LANES * slowest_mps);
-        let slowdown = CROWD_DELAY * self.speed_mps / slowest_mps;
-        Crowd { now_s, slowdown, headway_s, drones: CROWD_DRONES }
+        let speed_mps = self.speed_mps.min(self.speed_on_sight_mps);
+        let interval_s = CROWD_INTERVAL * self.safe_distance_m / speed_mps;
+        Crowd { now_s, detour: CROWD_DETOUR, interval_s, drones: CROWD_DRONES }
     }
 
     /// Time between two drones on one route, s. `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.

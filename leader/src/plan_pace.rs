@@ -73,7 +73,7 @@ mod tests {
             speed_mps: 10.0,
             headway_s: 4.0,
             by_words: false,
-            queue_speed_min_mps: 5.0,
+            speed_on_sight_mps: f64::INFINITY,
             routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
             between: Between::CloseUp,
             radio_range_m: f64::INFINITY,

@@ -78,19 +78,34 @@ pub enum SplitError {
     },
 }
 
-/// How the drones of a queue pass that cannot wait for their turn. A drone flies no slower than a least speed, so a drone whose turn comes
-/// later than it arrives at that speed arrives before its turn. In a long queue the drones behind push it on. On the outermost routes there
-/// is room beside the file: there such drones pass side by side, as a crowd. Between two obstacles there is none, and each one waits.
+/// How many drones pass on an outermost route, where there is room: side by side, as a crowd, without a queue. Of N drones that wait, one
+/// passes in each interval / N^¾: the more wait, the wider the crowd is. Between two obstacles there is no room, and each one waits for its
+/// turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crowd {
     /// The present, in the time of the arrivals, s.
     pub now_s: f64,
-    /// Time that a drone takes to the gate in a crowd, in times of what it would take if it were alone; at least 1.
-    pub slowdown: f64,
-    /// Time between two drones of a crowd, s.
-    pub headway_s: f64,
-    /// A queue of at least so many drones is a crowd where it cannot wait.
+    /// Part of its time to the gate after which a drone joins those that wait, at most 1.
+    pub detour: f64,
+    /// Time in which a drone passes that is the only one to wait, s.
+    pub interval_s: f64,
+    /// So many drones on one route are a crowd.
     pub drones: usize,
+}
+
+impl Crowd {
+    /// When the last of these drones passes, which would arrive at these times alone (s, ascending).
+    fn last_s(&self, arrivals_s: impl Iterator<Item = f64>) -> f64 {
+        let (mut waiting, mut at_s) = (0.0_f64, self.now_s);
+        // While nobody joins, the fourth root of the number of those that wait falls evenly.
+        let root = |waiting: f64| waiting.sqrt().sqrt();
+        for arrival_s in arrivals_s {
+            let joins_s = (self.now_s + self.detour * (arrival_s - self.now_s)).max(at_s);
+            let left = (root(waiting) - (joins_s - at_s) / (4.0 * self.interval_s)).max(0.0);
+            (waiting, at_s) = (left * left * left * left + 1.0, joins_s);
+        }
+        at_s + (root(waiting) - 1.0) * 4.0 * self.interval_s
+    }
 }
 
 /// When each drone would pass on each route if it were alone, and the headway of each route.
@@ -189,24 +204,21 @@ impl ArrivalTable {
     }
 
     /// When the last drone of an assignment of this table passes as drones fly, s; 0 without drones. Unlike in
-    /// [`RouteAssignment::makespan_s`], a drone does not wait for its turn longer than its least speed lets it, where there is room.
+    /// [`RouteAssignment::makespan_s`], many drones pass as a crowd where there is room.
     ///
     /// # Panics
     /// If the assignment has more drones than this table.
     #[must_use]
     pub fn forecast_s(&self, split: &RouteAssignment, crowd: &Crowd) -> f64 {
-        let (now, beside) = (micros(crowd.now_s), micros(crowd.headway_s));
-        let latest = |arrival: Cost| now + ((arrival - now) as f64 * crowd.slowdown).round() as Cost;
-        let last = |route: usize| {
+        let seconds = |micros: Cost| micros as f64 / MICROS;
+        let last_s = |route: usize| {
             let queue = self.queue(&split.routes, route);
+            let turns_s = seconds(passes(&queue, self.by_headway(route)).last()?);
             let has_room = (route == 0 || route + 1 == self.headways.len()) && queue.len() >= crowd.drones;
-            let turn = |before: Cost, arrival: Cost| {
-                let turn = before + self.headways[route];
-                if has_room { turn.min(latest(arrival).max(before + beside)) } else { turn }
-            };
-            passes(&queue, turn).last()
+            let crowd_s = || crowd.last_s(queue.iter().map(|&(arrival, _)| seconds(arrival)));
+            Some(if has_room { crowd_s().max(seconds(queue.last()?.0)).min(turns_s) } else { turns_s })
         };
-        (0..self.headways.len()).filter_map(last).max().map_or(0.0, |last| last as f64 / MICROS)
+        (0..self.headways.len()).filter_map(last_s).reduce(f64::max).unwrap_or(0.0)
     }
 
     /// The least makespan, s: [`ArrivalTable::split`] without its tie-break, in a fraction of the time.

@@ -5,17 +5,15 @@
 
 // ---- Forecasts (`split.rs`) ----
 
-/// Drones side by side in a crowd that passes an obstacle: distances to keep that it passes in the time in which one drone flies one of
-/// them. No unit. 3.8. Fitted together with the next one to flights of `scenarios/open-field.toml` with grids of 150, 200 and 300 drones, with
-/// 300 also with other spacings, distances, speeds and a larger circle, and to `scenarios/grid.toml` with 300. docs/paper.md shows
-/// flights that chose nothing.
-pub(crate) const LANES: f64 = 3.8;
-/// Time that a drone takes to the gate in a crowd, in times of the time at its least speed along its shortest path. No unit. 1.15. Fitted as
-/// above.
-pub(crate) const CROWD_DELAY: f64 = 1.15;
-/// Fewer drones than this in one queue are held before the gate until it is their turn. 33. By hand: of 100 random scenes (`skein scene 900000` to
-/// `900099`, up to 16 drones) four had drones that could not wait, and three of these passed as a file.
+/// From this number of drones on one route, they pass side by side where there is room, and not one behind another. 33. By hand: in a longer
+/// queue most drones cannot wait for their turn, because they fly no slower than v − δ. Of 100 random scenes (`skein scene 900000` to `900099`,
+/// up to 16 drones) four had drones that could not wait.
 pub(crate) const CROWD_DRONES: usize = 33;
+/// Time in which the only drone of a crowd passes, in times of the safe distance over the speed. No unit. 4.0. Fitted with the next one to 21
+/// flights past one obstacle with 80 to 300 drones, the first part of the table in docs/paper.md, *Large swarms*. The second part chose nothing.
+pub(crate) const CROWD_INTERVAL: f64 = 4.0;
+/// Part of its way to the gate that a drone of a crowd flies before it waits: most pass far beside the obstacle. No unit. 0.85. Fitted as above.
+pub(crate) const CROWD_DETOUR: f64 = 0.85;
 /// By words, drones follow each other through a gap no faster than such a number of messages takes, one after the other. No unit. 3. By
 /// reasoning ([`crate::params::PlannerParams::turn_s`]), and compared with 4 in `scenarios/narrow/gap.toml`, seeds 1 to 8.
 pub(crate) const AGREEMENT_MESSAGES: f64 = 3.0;

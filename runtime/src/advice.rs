@@ -11,7 +11,7 @@ use skein_scenario::{End, FaultKind, OutlineSensing, Parts, Scenario, Sensor};
 #[must_use]
 pub fn speed_on_sight_mps(scenario: &Scenario) -> f64 {
     let params = pilot(scenario);
-    params.speed_on_sight_mps(lag(scenario))
+    params.speed_on_sight_mps(mission::reaction_ticks(scenario))
 }
 
 /// The distances that the drones of a scenario keep, with all margins.
@@ -67,11 +67,6 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
 
 fn pilot(scenario: &Scenario) -> PilotParams {
     mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO)
-}
-
-/// Delay from a command to its effect, ticks.
-fn lag(scenario: &Scenario) -> u32 {
-    (scenario.drone.reaction_time_s / scenario.time.dt_s).round() as u32
 }
 
 fn too_fast(scenario: &Scenario, key: &str, speed_mps: f64) -> Option<String> {

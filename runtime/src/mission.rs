@@ -168,7 +168,7 @@ pub fn destination(scenario: &Scenario) -> Destination {
 #[must_use]
 pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotParams {
     let (drone, protocol) = (&scenario.drone, &scenario.protocol);
-    PilotParams {
+    let mut params = PilotParams {
         me,
         drones: scenario.formation.drones,
         incarnation,
@@ -223,7 +223,14 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             drones: scenario.channel_drones(),
         },
         peer_timeout_s: protocol.peer_timeout_s,
-    }
+    };
+    params.planner.speed_on_sight_mps = params.speed_on_sight_mps(reaction_ticks(scenario));
+    params
+}
+
+/// By how many ticks a drone's commands take effect late.
+pub(crate) fn reaction_ticks(scenario: &Scenario) -> u32 {
+    (scenario.drone.reaction_time_s / scenario.time.dt_s).round() as u32
 }
 
 fn planner(scenario: &Scenario) -> PlannerParams {
@@ -241,7 +248,8 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         speed_mps: drone.speed_mps,
         headway_s: avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps,
         by_words: scenario.apart_by_words(),
-        queue_speed_min_mps: drone.speed_mps - if scenario.guidance.queue { drone.speed_change_mps } else { 0.0 },
+        // Follows from the other parameters of the pilot.
+        speed_on_sight_mps: f64::INFINITY,
         routes: RouteParams {
             clearance_m: avoidance.clearance_m + scenario.sensors.obstacle_error_max_m,
             half_gap_m: scenario.half_gap_m(),

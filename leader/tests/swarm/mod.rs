@@ -65,7 +65,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             speed_mps: SPEED_MPS,
             headway_s: 4.0,
             by_words: false,
-            queue_speed_min_mps: 5.0,
+            speed_on_sight_mps: f64::INFINITY,
             routes: RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
             shape: Shape::V,
             spacing_m: 40.0,

@@ -1,6 +1,6 @@
 //! Queues on shared routes, and subgroups: Q1, G1.
 
-use super::flown::{Flown, fly_file, position};
+use super::flown::{Flown, fly, fly_file, position, scenario};
 use std::collections::BTreeMap;
 
 /// By route: when each drone passes the gate, s, and its place in the queue; in order of time.
@@ -40,6 +40,23 @@ fn q1_without_the_queue_law_drones_pass_side_by_side() {
     assert!(free < queued / 2.0, "{queued} s apart with it, {free} s without");
     // Only the safety filter keeps them apart.
     assert!(without.separation_m() >= 37.0, "{} m", without.separation_m());
+}
+
+/// Eighty drones in a grid, 40 on each side of a tree. One behind another they took 43 s. With 64 drones they still queue.
+#[test]
+fn q1_many_drones_pass_side_by_side_as_forecast() {
+    let rule = ("strategy", "congestion-aware-paper");
+    let passed_s = |drones: &str| {
+        let sets = [rule, ("formation.shape", "grid"), ("formation.drones", drones), ("time.timeout_s", "50")];
+        let flown = fly(&scenario("open-field", &sets));
+        (flown.passed_s(0) - flown.detected_s(0), flown.grouping().0, flown.separation_m())
+    };
+    let (crowd_s, forecast_s, separation_m) = passed_s("80");
+    assert!(crowd_s < 32.0, "{crowd_s} s");
+    assert!((0.9 * crowd_s..1.1 * crowd_s).contains(&forecast_s), "{forecast_s} s forecast, {crowd_s} s flown");
+    assert!(separation_m >= 4.0, "{separation_m} m");
+    let (queue_s, ..) = passed_s("64");
+    assert!(queue_s > crowd_s, "{queue_s} s for 64 drones, {crowd_s} s for 80");
 }
 
 #[test]
