@@ -141,7 +141,9 @@ impl PlannerParams {
     pub(crate) fn crowd(&self, now_s: f64) -> Crowd {
         let speed_mps = self.speed_mps.min(self.speed_on_sight_mps);
         let interval_s = CROWD_INTERVAL * self.safe_distance_m / speed_mps;
-        Crowd { now_s, detour: CROWD_DETOUR, interval_s, drones: CROWD_DRONES }
+        // By words, a crowd is as slow as its messages, and the time of a queue comes closer.
+        let drones = if self.by_words { usize::MAX } else { CROWD_DRONES };
+        Crowd { now_s, detour: CROWD_DETOUR, interval_s, drones }
     }
 
     /// Time between two drones on one route, s. `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.
