@@ -5,7 +5,7 @@ use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
 use crate::split::Crowd;
-use crate::tuning::{AGREEMENT_MESSAGES, CROWD_DETOUR, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE};
+use crate::tuning::{AGREEMENT_MESSAGES, CROWD_APPROACH, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
@@ -143,7 +143,7 @@ impl PlannerParams {
         let interval_s = CROWD_INTERVAL * self.safe_distance_m / speed_mps;
         // By words, a crowd is as slow as its messages, and the time of a queue comes closer.
         let drones = if self.by_words { usize::MAX } else { CROWD_DRONES };
-        Crowd { now_s, detour: CROWD_DETOUR, interval_s, drones }
+        Crowd { now_s, approach: CROWD_APPROACH, interval_s, drones }
     }
 
     /// Time between two drones on one route, s. `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.

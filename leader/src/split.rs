@@ -86,7 +86,7 @@ pub struct Crowd {
     /// The present, in the time of the arrivals, s.
     pub now_s: f64,
     /// Part of its time to the gate after which a drone joins those that wait, at most 1.
-    pub detour: f64,
+    pub approach: f64,
     /// Time in which a drone passes that is the only one to wait, s.
     pub interval_s: f64,
     /// So many drones on one route are a crowd.
@@ -100,7 +100,7 @@ impl Crowd {
         // While nobody joins, the fourth root of the number of those that wait falls evenly.
         let root = |waiting: f64| waiting.sqrt().sqrt();
         for arrival_s in arrivals_s {
-            let joins_s = (self.now_s + self.detour * (arrival_s - self.now_s)).max(at_s);
+            let joins_s = (self.now_s + self.approach * (arrival_s - self.now_s)).max(at_s);
             let left = (root(waiting) - (joins_s - at_s) / (4.0 * self.interval_s)).max(0.0);
             (waiting, at_s) = (left * left * left * left + 1.0, joins_s);
         }
@@ -210,7 +210,6 @@ impl ArrivalTable {
     /// If the assignment has more drones than this table.
     #[must_use]
     pub fn forecast_s(&self, split: &RouteAssignment, crowd: &Crowd) -> f64 {
-        let seconds = |micros: Cost| micros as f64 / MICROS;
         let last_s = |route: usize| {
             let queue = self.queue(&split.routes, route);
             let turns_s = seconds(passes(&queue, self.by_headway(route)).last()?);
@@ -225,7 +224,7 @@ impl ArrivalTable {
     #[must_use]
     pub fn least_makespan_s(&self) -> f64 {
         let unlimited = vec![self.arrivals.len(); self.headways.len()];
-        self.search(&unlimited, &self.costs()).map_or(0.0, |makespan| makespan as f64 / MICROS)
+        self.search(&unlimited, &self.costs()).map_or(0.0, seconds)
     }
 
     /// The grouping of least makespan with at most `limits[route]` drones on each route; among those, one of least total.
@@ -291,7 +290,6 @@ impl ArrivalTable {
     }
 
     fn queued(&self, routes: Vec<usize>) -> RouteAssignment {
-        let seconds = |micros: Cost| micros as f64 / MICROS;
         let mut pass_s = vec![0.0; routes.len()];
         let mut total = 0;
         let mut queues = Vec::with_capacity(self.headways.len());
@@ -314,6 +312,10 @@ fn passes(queue: &[(Cost, usize)], turn: impl Fn(Cost, Cost) -> Cost) -> impl It
         *last = arrival.max(turn(*last, arrival));
         Some(*last)
     })
+}
+
+fn seconds(micros: Cost) -> f64 {
+    micros as f64 / MICROS
 }
 
 fn micros(s: f64) -> Cost {

@@ -242,7 +242,7 @@ fn a_thousand_drones_are_split_exactly() {
 /// Sixteen drones arrive together after 10 s. As a crowd, they are fewer by the fourth power of a time that falls evenly.
 #[test]
 fn many_drones_pass_side_by_side_where_there_is_room() {
-    let crowd = |now_s: f64| Crowd { now_s, detour: 0.5, interval_s: 3.0, drones: 6 };
+    let crowd = |now_s: f64| Crowd { now_s, approach: 0.5, interval_s: 3.0, drones: 6 };
     let table = |routes: usize, start_s: f64| {
         ArrivalTable::new(&vec![vec![10.0 + start_s; routes]; 16], &vec![4.0; routes]).unwrap()
     };
@@ -271,7 +271,7 @@ fn many_drones_pass_side_by_side_where_there_is_room() {
 fn drones_join_a_crowd_as_they_arrive() {
     let rows = [[2.0], [2.0], [5.0]].map(Vec::from);
     let table = ArrivalTable::new(&rows, &[9.0]).unwrap();
-    let crowd = Crowd { now_s: 0.0, detour: 1.0, interval_s: 8.0, drones: 1 };
+    let crowd = Crowd { now_s: 0.0, approach: 1.0, interval_s: 8.0, drones: 1 };
     let waiting = (2.0_f64.powf(0.25) - 3.0 / 32.0).powi(4) + 1.0;
     let last_s = 5.0 + 32.0 * (waiting.powf(0.25) - 1.0);
     assert!((table.forecast_s(&table.shortest(), &crowd) - last_s).abs() < 1e-9);
@@ -284,17 +284,17 @@ proptest! {
     fn a_forecast_is_never_later_than_the_queues(
         rows in prop::collection::vec(prop::collection::vec(-20.0..60.0f64, 3), 1..12),
         picks in prop::collection::vec(0..3usize, 12),
-        detour in 0.1..1.0f64,
+        approach in 0.1..1.0f64,
         interval_s in 0.1..20.0f64,
     ) {
         let table = ArrivalTable::new(&rows, &[2.0; 3]).unwrap();
         let chosen = &picks[..rows.len()];
         let split = table.assigned(chosen).unwrap();
-        let forecast_s = table.forecast_s(&split, &Crowd { now_s: -20.0, detour, interval_s, drones: 1 });
+        let forecast_s = table.forecast_s(&split, &Crowd { now_s: -20.0, approach, interval_s, drones: 1 });
         let makespan_s = split.makespan_s;
         let last_s = rows.iter().zip(chosen).map(|(row, &route)| row[route]).fold(f64::NEG_INFINITY, f64::max);
         prop_assert!(last_s - 1e-6 <= forecast_s && forecast_s <= makespan_s, "{last_s} {forecast_s} {makespan_s}");
-        let slow = |drones| table.forecast_s(&split, &Crowd { now_s: -20.0, detour: 1.0, interval_s: 1e9, drones });
+        let slow = |drones| table.forecast_s(&split, &Crowd { now_s: -20.0, approach: 1.0, interval_s: 1e9, drones });
         prop_assert_eq!((slow(1), slow(12)), (makespan_s, makespan_s));
     }
 }

@@ -228,7 +228,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
     params
 }
 
-/// By how many ticks a drone's commands take effect late.
+/// Delay from a command to its effect, in ticks.
 pub(crate) fn reaction_ticks(scenario: &Scenario) -> u32 {
     (scenario.drone.reaction_time_s / scenario.time.dt_s).round() as u32
 }
