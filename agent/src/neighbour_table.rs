@@ -77,10 +77,15 @@ impl NeighbourTable {
             let pose = view.peers.at(index).1;
             distant(&pose, away_m(&pose))
         });
+        let mut ranged: Few<DroneId> = senses.neighbours.iter().map(|sensed| sensed.drone).collect();
+        ranged.sort_unstable();
+        let mut ranged = ranged.iter().peekable();
+        // The ids ascend.
         peers.visit(|index| {
             let (id, pose) = view.peers.at(index);
+            while ranged.next_if(|drone| **drone < id).is_some() {}
             // Of a drone that is ranged, the beacon is not read: in a large swarm it is not in the cache.
-            if !view.peers.is_living_at(index, view.now) || senses.neighbours.iter().any(|n| n.drone == id) {
+            if ranged.peek() == Some(&&id) || !view.peers.is_living_at(index, view.now) {
                 return None;
             }
             let position_m = away_m(&pose);

@@ -65,8 +65,10 @@ pub struct PilotParams {
     pub precedence_share: f64,
     /// Whether drones on one route slow down into a single file before its gate.
     pub queue: bool,
-    /// Time between two beacons, s.
+    /// Shortest time between two beacons, s.
     pub beacon_period_s: f64,
+    /// Longest time between two beacons, s: that of a drone that hears very many others.
+    pub beacon_period_max_s: f64,
     /// Time between two statements of its separating lines, s.
     pub separation_period_s: f64,
     /// Time between two repetitions of a message that has to be repeated, s.
@@ -90,6 +92,7 @@ impl PilotParams {
             election: self.election,
             planner: self.planner.clone(),
             beacon_period_s: self.beacon_period_s,
+            beacon_period_max_s: self.beacon_period_max_s,
             repeat_period_s: self.repeat_period_s,
             channel: self.channel,
             peer_timeout_s: self.peer_timeout_s,

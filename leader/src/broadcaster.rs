@@ -1,8 +1,10 @@
 //! What a drone broadcasts, and when: its beacon, its plan, and repetitions of what others may have missed.
 
+use crate::beacon_pace::BeaconPace;
 use crate::beacons::Beacon;
 use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
+use crate::news::News;
 use crate::obstacles::{Obstacles, set_array, set_ids};
 use crate::own_state::OwnState;
 use crate::params::LeadingParams;
@@ -16,8 +18,7 @@ use std::collections::BTreeMap;
 /// The broadcasts of one drone: their periods, and what was said when.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Broadcaster {
-    beacon_s: f64,
-    beacon_ticks: u64,
+    pace: BeaconPace,
     repeat_s: f64,
     /// Time that one assignment takes in a leader's share of the bandwidth, s.
     part_s: f64,
@@ -29,8 +30,6 @@ pub(crate) struct Broadcaster {
     passed: Gossip,
     /// The term that this drone obeyed in the last tick.
     term: Ballot,
-    /// Whether the first beacon was said.
-    spoken: bool,
     next_repeat: SimTime,
     /// The last plan of its own whose assignments it has said in full.
     announced: PlanStamp,
@@ -70,15 +69,13 @@ impl Broadcaster {
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let repeat_s = params.repeat_period_s;
         Self {
-            beacon_s: params.beacon_period_s,
-            beacon_ticks: ((params.beacon_period_s / params.dt_s).round() as u64).max(1),
+            pace: BeaconPace::new(params),
             repeat_s,
             part_s: params.leader_frame_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
             outlines: 0,
             passed: Gossip::new(params.start, repeat_s, params.me),
             term: Ballot::NONE,
-            spoken: false,
             next_repeat: params.start,
             announced: PlanStamp::default(),
             repetitions: 0,
@@ -115,10 +112,12 @@ impl Broadcaster {
         relays: &mut Relays,
         say: &mut Vec<Message>,
     ) {
-        if self.beacon_due(own.tick, k.me()) {
+        let beacon = pose(k, now, own, places);
+        let heard = if relays.is_wide() { k.peers().direct_count() } else { 0 };
+        if self.pace.is_due(own.tick, News::of(&beacon), heard) {
             let hears = k.peers().hears(k.me(), now);
-            relays.look(k, now, own, self.beacon_s, hears);
-            say.push(Message::Pose(Pose { hears, ..pose(k, now, own, places) }));
+            relays.look(k, now, own, self.pace.period_s(), hears);
+            say.push(Message::Pose(Pose { hears, ..beacon }));
         }
         if std::mem::replace(&mut self.term, k.election().obeyed()) != k.election().obeyed() {
             // The new leader may not know.
@@ -162,13 +161,6 @@ impl Broadcaster {
                 say.extend(obstacle(k.obstacles(), id));
             }
         }
-    }
-
-    /// Whether a beacon is due. The beacons of different drones fall into different ticks. The first one is said at once,
-    /// so that all drones know each other.
-    fn beacon_due(&mut self, tick: u64, me: DroneId) -> bool {
-        let first = !std::mem::replace(&mut self.spoken, true);
-        first || tick % self.beacon_ticks == u64::from(me.0) % self.beacon_ticks
     }
 
     fn repeat_due(&mut self, now: SimTime) -> bool {

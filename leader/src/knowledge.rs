@@ -40,7 +40,7 @@ impl Knowledge {
             incarnation: params.incarnation,
             params: params.planner.clone(),
             impaired: false,
-            peers: Peers::new(params.drones, params.peer_timeout_s),
+            peers: Peers::new(params.drones, params.peer_timeout_s).relayed_less(params.thinning()),
             obstacles: Obstacles::new(params.drones, reach_m),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
             election: Election::new(params.me, params.incarnation, params.election, params.start),

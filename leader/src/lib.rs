@@ -40,6 +40,7 @@
 mod adaptive_timeout;
 pub mod assignments;
 mod avoidance;
+mod beacon_pace;
 pub mod beacons;
 mod beats;
 mod broadcaster;

@@ -5,7 +5,9 @@ use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
 use crate::split::Crowd;
-use crate::tuning::{AGREEMENT_MESSAGES, CROWD_APPROACH, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE};
+use crate::tuning::{
+    AGREEMENT_MESSAGES, CROWD_APPROACH, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE, PRESENCE_REPEATS, STATES_PER_S,
+};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
@@ -181,8 +183,10 @@ pub struct LeadingParams {
     pub election: ElectionParams,
     /// Parameters of planning.
     pub planner: PlannerParams,
-    /// Period of beacons, s.
+    /// Shortest period of beacons, s.
     pub beacon_period_s: f64,
+    /// Longest period of beacons, s: that of a drone that hears very many others.
+    pub beacon_period_max_s: f64,
     /// Period of repetitions, s.
     pub repeat_period_s: f64,
     /// The channel that it shares with the drones near it.
@@ -192,6 +196,16 @@ pub struct LeadingParams {
 }
 
 impl LeadingParams {
+    /// Time between two states of a drone without news that are passed on, s.
+    pub(crate) fn state_period_s(&self) -> f64 {
+        self.repeat_period_s * PRESENCE_REPEATS * self.thinning()
+    }
+
+    /// How many times less often than in a small swarm states are passed on. No unit, at least 1.
+    pub(crate) fn thinning(&self) -> f64 {
+        (f64::from(self.drones) / (STATES_PER_S * self.repeat_period_s * PRESENCE_REPEATS)).max(1.0)
+    }
+
     /// Time that a message with a payload of this size takes in one leader's share of the bandwidth, s; 0 if bandwidth is no limit.
     pub(crate) fn leader_frame_s(&self, bytes: usize) -> f64 {
         (HEAD_BYTES as f64 + bytes as f64) / (LEADER_SHARE * self.channel.bandwidth_bytes_per_s)

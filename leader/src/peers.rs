@@ -39,30 +39,43 @@ impl Peer {
 
     /// The longest time without word of it after which it still counts as living, s. Where others pass its state on, it comes once per
     /// some time-outs at best, and at times not at all.
-    fn absence_s(&self, base_s: f64) -> f64 {
+    fn absence_s(&self, base: Timeouts) -> f64 {
         let relayed = self.timeout.last() > self.direct;
-        self.silence_s(base_s).max(if relayed { RELAYED_TIMEOUTS * base_s } else { 0.0 })
+        if relayed {
+            self.silence_s(base.relayed_s).max(RELAYED_TIMEOUTS * base.relayed_s)
+        } else {
+            self.silence_s(base.direct_s)
+        }
     }
 
-    fn lives(&self, now: SimTime, base_s: f64) -> bool {
-        now.since(self.timeout.last()) <= self.absence_s(base_s)
+    fn lives(&self, now: SimTime, base: Timeouts) -> bool {
+        now.since(self.timeout.last()) <= self.absence_s(base)
     }
 
-    fn is_direct(&self, now: SimTime, base_s: f64) -> bool {
-        now.since(self.direct) <= self.silence_s(base_s)
+    fn is_direct(&self, now: SimTime, base: Timeouts) -> bool {
+        now.since(self.direct) <= self.silence_s(base.direct_s)
     }
 
     /// A moment until which it certainly lives.
-    fn lives_until(&self, base_s: f64) -> SimTime {
-        self.timeout.last() + ((self.absence_s(base_s) - ROUNDING_S) * 1e9) as i64
+    fn lives_until(&self, base: Timeouts) -> SimTime {
+        self.timeout.last() + ((self.absence_s(base) - ROUNDING_S) * 1e9) as i64
     }
+}
+
+/// Time-outs of regular sources, s.
+#[derive(Clone, Copy, Debug)]
+struct Timeouts {
+    /// Of a drone that is heard itself.
+    direct_s: f64,
+    /// Of one whose state is passed on.
+    relayed_s: f64,
 }
 
 /// The last beacon heard of each peer.
 #[derive(Clone, Debug)]
 pub struct Peers {
     drones: u32,
-    timeout_s: f64,
+    base: Timeouts,
     /// Running mean of the beacons' delay, s.
     delay_s: f64,
     /// No peer is silent for too long until then.
@@ -93,7 +106,7 @@ impl Peers {
     pub fn new(drones: u32, timeout_s: f64) -> Self {
         Self {
             drones,
-            timeout_s,
+            base: Timeouts { direct_s: timeout_s, relayed_s: timeout_s },
             delay_s: 0.0,
             quiet_until: SimTime::MAX,
             next_look: SimTime::ZERO,
@@ -105,6 +118,12 @@ impl Peers {
             near: Vec::new(),
             direct_until: SimTime::MAX,
         }
+    }
+
+    /// The same, where the states of drones that are not heard themselves come less often: time-outs are longer for those by this factor.
+    pub(crate) fn relayed_less(mut self, factor: f64) -> Self {
+        self.base.relayed_s = factor * self.base.direct_s;
+        self
     }
 
     /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
@@ -127,7 +146,7 @@ impl Peers {
         }
         let place = self.place(source);
         let before = place.ok().map(|place| self.last[place].direct);
-        if let Some(heard) = before.filter(|heard| direct.is_some() && now.since(*heard) > self.timeout_s) {
+        if let Some(heard) = before.filter(|heard| direct.is_some() && now.since(*heard) > self.base.direct_s) {
             self.note_near(heard, source);
         }
         match place {
@@ -137,7 +156,7 @@ impl Peers {
                 }
                 let timeout = self.prior(now, direct.is_some());
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
-                self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
+                self.quiet_until = self.quiet_until.min(peer.lives_until(self.base));
                 self.ids.insert(place, source);
                 self.all_but = None;
                 self.beacons.insert(place, &pose);
@@ -147,7 +166,7 @@ impl Peers {
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
                 let prior = self.prior(now, false);
                 let peer = &mut self.last[place];
-                let longest_s = peer.absence_s(self.timeout_s);
+                let longest_s = peer.absence_s(self.base);
                 if direct.is_none() && peer.timeout.last() <= peer.direct {
                     peer.timeout = prior;
                 }
@@ -155,7 +174,7 @@ impl Peers {
                 peer.timeout.hear(now, 0.0, longest_s);
                 self.beacons.replace(place, &pose);
                 self.changes.note(place);
-                self.quiet_until = self.quiet_until.min(peer.lives_until(self.timeout_s));
+                self.quiet_until = self.quiet_until.min(peer.lives_until(self.base));
                 if direct.is_some() {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
                 }
@@ -177,15 +196,15 @@ impl Peers {
 
     /// What is assumed of the gaps between the beacons of a peer. Those that are passed on come rarely.
     fn prior(&self, now: SimTime, direct: bool) -> AdaptiveTimeout {
-        if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.timeout_s) }
+        if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.base.relayed_s) }
     }
 
     /// Finds out anew until when no peer is silent for too long.
     fn look_for_silence(&mut self, now: SimTime) {
-        self.next_look = now.after(LOOK_TIMEOUTS * self.timeout_s);
-        self.quiet_until = self.last.iter().map(|peer| peer.lives_until(self.timeout_s)).min().unwrap_or(SimTime::MAX);
+        self.next_look = now.after(LOOK_TIMEOUTS * self.base.direct_s);
+        self.quiet_until = self.last.iter().map(|peer| peer.lives_until(self.base)).min().unwrap_or(SimTime::MAX);
         // No silence is significant only after longer.
-        let longest_s = MAX_TIMEOUTS * self.timeout_s;
+        let longest_s = MAX_TIMEOUTS * self.base.direct_s;
         let mut near = std::mem::take(&mut self.near);
         near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
         let heard = near.iter().filter_map(|peer| Some(self.get(*peer)?.direct)).min();
@@ -197,7 +216,7 @@ impl Peers {
 
     /// Until when a peer that is heard at this time certainly counts as heard.
     fn certain_until(&self, heard: SimTime) -> SimTime {
-        heard + ((self.timeout_s - ROUNDING_S) * 1e9) as i64
+        heard + ((self.base.direct_s - ROUNDING_S) * 1e9) as i64
     }
 
     /// Whether no peer is silent for too long, which needs no look at each.
@@ -239,12 +258,17 @@ impl Peers {
 
     /// Whether a peer is heard without a relay.
     pub(crate) fn is_direct(&self, peer: DroneId, now: SimTime) -> bool {
-        self.get(peer).is_some_and(|known| known.is_direct(now, self.timeout_s))
+        self.get(peer).is_some_and(|known| known.is_direct(now, self.base))
     }
 
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
-        self.near(move |peer| peer.is_direct(now, self.timeout_s))
+        self.near(move |peer| peer.is_direct(now, self.base))
+    }
+
+    /// Number of peers that may count as heard without a relay.
+    pub(crate) fn direct_count(&self) -> usize {
+        self.near.len()
     }
 
     /// The peers whose own beacon was heard within the last `within_s`, by id.
@@ -335,14 +359,14 @@ impl Peers {
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let all = self.all_live(now);
-        let living = self.known().filter(move |(_, known, _)| all || known.lives(now, self.timeout_s));
+        let living = self.known().filter(move |(_, known, _)| all || known.lives(now, self.base));
         living.map(|(id, _, beacon)| (id, beacon))
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
         let some = if self.all_live(now) { 0 } else { self.ids.len() };
-        let silent = self.known().take(some).filter(move |(_, known, _)| !known.lives(now, self.timeout_s));
+        let silent = self.known().take(some).filter(move |(_, known, _)| !known.lives(now, self.base));
         silent.map(|(id, _, beacon)| (id, beacon))
     }
 
@@ -383,7 +407,7 @@ impl Peers {
     /// If there is no such peer.
     #[must_use]
     pub fn is_living_at(&self, index: usize, now: SimTime) -> bool {
-        self.all_live(now) || self.last[index].lives(now, self.timeout_s)
+        self.all_live(now) || self.last[index].lives(now, self.base)
     }
 
     /// Adds how old the last beacons of the living peers are, s, by id.
@@ -392,7 +416,7 @@ impl Peers {
         if self.all_live(now) {
             return ages.extend(self.stamps().iter().map(age_s));
         }
-        let living = self.stamps().iter().zip(&self.last).filter(|(_, peer)| peer.lives(now, self.timeout_s));
+        let living = self.stamps().iter().zip(&self.last).filter(|(_, peer)| peer.lives(now, self.base));
         ages.extend(living.map(|(stamp, _)| age_s(stamp)));
     }
 
@@ -494,7 +518,7 @@ mod tests {
             }
             let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
-            let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, 1.0));
+            let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, peers.base));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
             let mut found = Vec::new();

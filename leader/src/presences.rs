@@ -4,8 +4,7 @@ use crate::knowledge::Knowledge;
 use crate::news::News;
 use crate::params::LeadingParams;
 use crate::tuning::{
-    BACKLOG, MAX_THINNING, NEWS_TIMES, PRESENCE_OVERDUE, PRESENCE_REPEATS, STATES_PER_S, THICKEN, THIN,
-    WAITS_PER_PERIOD,
+    BACKLOG, LONGEST_TURN, MAX_THINNING, NEWS_TIMES, PRESENCE_OVERDUE, THICKEN, THIN, WAITS_PER_PERIOD,
 };
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
@@ -50,6 +49,8 @@ pub(crate) struct Presences {
     me: DroneId,
     drones: u32,
     repeat_s: f64,
+    /// Mean time between two times at which this drone says states without news, s: longer in large swarms, so that frames are full.
+    turn_s: f64,
     /// A state without news is passed on if it is newer by this than the one that was passed on before, s. So each drone's state comes
     /// once in this time, and travels on at once. What was not heard for longer, because frames were lost, is repeated.
     period_s: f64,
@@ -72,12 +73,14 @@ impl Presences {
     pub(crate) fn new(params: &LeadingParams) -> Self {
         let (me, start) = (params.me, params.start);
         let repeat_s = params.repeat_period_s;
-        let period_s = (repeat_s * PRESENCE_REPEATS).max(f64::from(params.drones) / STATES_PER_S);
+        let period_s = params.state_period_s();
+        let turn_s = repeat_s * params.thinning().min(LONGEST_TURN);
         let drones = params.drones.max(1);
         Self {
             me,
             drones,
             repeat_s,
+            turn_s,
             period_s,
             thinning: 1.0,
             open: false,
@@ -125,6 +128,21 @@ impl Presences {
         {
             told.cover(now, pose.stamp);
         }
+        if has_news {
+            self.hasten(now);
+        }
+    }
+
+    /// News does not wait for a turn of a large swarm.
+    fn hasten(&mut self, now: SimTime) {
+        if self.turn_s > self.repeat_s {
+            self.turn = self.turn.min(now.after(self.repeat_s * (0.5 + self.draw(now) as f64 / (1_u64 << 53) as f64)));
+        }
+    }
+
+    /// A random number below 2^53, another one for each drone and time.
+    fn draw(&self, now: SimTime) -> u64 {
+        Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11
     }
 
     /// Notes that a drone close to this one said the newest state of `drone`, which has this time stamp and which this drone knows.
@@ -145,7 +163,7 @@ impl Presences {
         if now < self.turn || frames == 0 {
             return;
         }
-        let draw = Digest::chain(u64::from(self.me.0), now.0 as u64) >> 11;
+        let draw = self.draw(now);
         let due = self.due(k, now, (draw % u64::from(self.drones)) as u32);
         let chunks = due.iter().flat_map(|(kind, drones)| drones.chunks(MAX_PRESENT).map(move |chunk| (kind, chunk)));
         let mut chunks: Vec<(&Kind, &[Due])> = chunks.collect();
@@ -153,7 +171,7 @@ impl Presences {
         let change = if chunks.len() > BACKLOG { THIN } else { THICKEN };
         self.thinning = (self.thinning * change).clamp(1.0, MAX_THINNING);
         if chunks.len() <= frames {
-            self.turn = now.after(self.repeat_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
+            self.turn = now.after(self.turn_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
         }
         // No kind has to wait until all others are said.
         chunks.sort_unstable_by_key(|(_, chunk)| chunk.first().copied());

@@ -8,7 +8,7 @@ use crate::gossip::Gossip;
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::subject::Subject;
-use crate::tuning::{DETOUR_DOUBLINGS, RELAY_MEMORY_S, UNWANTED_REPEATS};
+use crate::tuning::{DETOUR_DOUBLINGS, PASSAGES, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, Passed, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
@@ -66,8 +66,11 @@ pub(crate) struct RelayedFacts {
     known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
-    /// Nothing was last heard before.
+    /// No assignment, plan or row was last heard before, and no passage much before. See [`Self::forget`].
     heard_since: SimTime,
+    /// For how long a passage is remembered, s. Its drone goes on saying it, so once it is forgotten it is passed on again. In a large swarm
+    /// it is remembered for longer, so that a drone does not hear more passages than in a small one.
+    passage_s: f64,
 }
 
 impl RelayedFacts {
@@ -81,6 +84,7 @@ impl RelayedFacts {
             known: FactStore::new(params.drones),
             turns: Turns::default(),
             heard_since: params.start,
+            passage_s: passage_s(params.drones),
         }
     }
 
@@ -97,10 +101,12 @@ impl RelayedFacts {
             return;
         }
         self.heard_since = now;
+        let passage_s = self.passage_s;
         let stays = |one: &Relayed| {
-            let stays = now.since(one.heard) < RELAY_MEMORY_S;
+            let memory_s = if matches!(one.fact, Fact::Passed(_)) { passage_s } else { RELAY_MEMORY_S };
+            let stays = now.since(one.heard) < memory_s;
             if stays {
-                self.heard_since = self.heard_since.min(one.heard);
+                self.heard_since = self.heard_since.min(one.heard.after(memory_s - RELAY_MEMORY_S));
             }
             stays
         };
@@ -211,6 +217,11 @@ impl Relayed {
     }
 }
 
+/// For how long a drone of a swarm of this size remembers a passage, s.
+fn passage_s(drones: u32) -> f64 {
+    RELAY_MEMORY_S * (f64::from(drones) / PASSAGES).max(1.0)
+}
+
 /// The place among these messages of a list with room for this assignment.
 fn open_list(said: &[Message], fact: &Fact) -> Option<usize> {
     let Fact::Part(part) = fact else { return None };
@@ -302,6 +313,7 @@ mod tests {
             known: FactStore::new(8),
             turns: Turns::default(),
             heard_since: SimTime::ZERO,
+            passage_s: RELAY_MEMORY_S,
         };
         let mut heard = [None; 8];
         let passed = Passed { set_count: 1, ..Passed::zeroed() };
@@ -324,5 +336,31 @@ mod tests {
             }
         }
         assert!(kept > 1000 && forgotten > 1000, "{kept} {forgotten}");
+    }
+
+    #[test]
+    fn a_passage_is_passed_on_less_often_in_a_large_swarm() {
+        let passed_on = |drones: u32| {
+            let mut facts = RelayedFacts {
+                me: DroneId(8),
+                repeat_s: 0.2,
+                room: 64,
+                known: FactStore::new(9),
+                turns: Turns::default(),
+                heard_since: SimTime::ZERO,
+                passage_s: passage_s(drones),
+            };
+            let mut turns = 0;
+            for second in 0..1200 {
+                let now = SimTime::from_secs(f64::from(second));
+                // The drone says it again and again.
+                let passed = Passed { stamp: now, set_count: 1, ..Passed::zeroed() };
+                facts.hear(now, DroneId(1), MessageRef::Passed(&passed), false);
+                turns += std::iter::from_fn(|| facts.turns.take_due(now)).count();
+                facts.forget(now);
+            }
+            turns
+        };
+        assert_eq!([1, 64, 256, 1280].map(passed_on), [39, 39, 10, 2]);
     }
 }

@@ -98,6 +98,12 @@ pub(crate) const REDUNDANCY: u32 = 3;
 /// By hand; `skein sweep experiments/presets.toml`.
 pub(crate) const MAX_GOSSIP_DOUBLINGS: u32 = 3;
 
+// ---- Beacons (`beacon_pace.rs`) ----
+
+/// A drone that hears more beacons than this per second sends its own less often, 1/s. 320: those of 32 drones with the default period.
+/// SAE J2945/1 has 250 for cars: a period of 0.1 s for 25 neighbours.
+pub(crate) const BEACONS_PER_S: f64 = 320.0;
+
 // ---- Relays (`relays.rs`, `presences.rs`) ----
 
 /// A drone that hears this many copies from drones close to it does not pass a message on. No unit. 2. By hand.
@@ -126,6 +132,9 @@ pub(crate) const BEAT_REPEAT: f64 = 0.5;
 pub(crate) const FOREIGN_BEATS: f64 = 10.0;
 /// What was not heard for this long is forgotten, s. 30. By hand.
 pub(crate) const RELAY_MEMORY_S: f64 = 30.0;
+/// In swarms of more drones than this, passages are remembered longer in proportion. No unit. 64: so a drone passes on at most about two known
+/// passages per second. By hand.
+pub(crate) const PASSAGES: f64 = 64.0;
 /// Time between two looks at what was not heard for long, s. 3: a tenth of that. By hand.
 pub(crate) const FORGET_S: f64 = 3.0;
 /// Time between two counts of the drones that share the bandwidth, s. 1. By hand.
@@ -162,9 +171,13 @@ pub(crate) const PRESENCE_OVERDUE: f64 = 1.5;
 /// A drone whose state is passed on counts as living for at least this many time-outs without word of it. No unit. 4: with the default
 /// periods 6 s, in which its state comes three times. By hand.
 pub(crate) const RELAYED_TIMEOUTS: f64 = 4.0;
-/// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 320: swarms of
-/// more than 512 drones repeat states less often, so that what a drone hears does not grow with the swarm. By hand.
-pub(crate) const STATES_PER_S: f64 = 320.0;
+/// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 100: swarms of more than 160
+/// drones repeat states less often, so that what a drone hears does not grow with the swarm (`runtime/tests/growth.rs`). Chosen with whole
+/// missions of `scenarios/grid.toml` with 300 drones.
+pub(crate) const STATES_PER_S: f64 = 100.0;
+/// Longest mean time between two times at which a drone says states without news, in repeat periods. No unit. 2: a state needs half of
+/// that for a hop. By hand.
+pub(crate) const LONGEST_TURN: f64 = 2.0;
 /// Of the states that are due, those come first of which the neighbourhood has not heard for longest; differences of less than the period
 /// divided by this do not count, so that close drones do not all say the same. No unit. 8. By hand.
 pub(crate) const WAITS_PER_PERIOD: f64 = 8.0;

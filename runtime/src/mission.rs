@@ -215,6 +215,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
         precedence_share: scenario.guidance.precedence_share,
         queue: scenario.guidance.queue,
         beacon_period_s: scenario.beacon_period_s(),
+        beacon_period_max_s: scenario.beacon_period_max_s(),
         separation_period_s: scenario.separation_period_s(skein_agent::separation::messages(drones(scenario))),
         repeat_period_s: protocol.repeat_period_s,
         channel: ChannelParams {

@@ -258,6 +258,15 @@ impl Scenario {
         self.protocol.beacon_period_s.unwrap_or_else(|| least_s.clamp(BEACON_PERIOD_S, longest_s))
     }
 
+    /// Longest time between two beacons of a drone, s: that of a drone that hears very many others. It is that of all beacons if the
+    /// scenario names it, or if distances are kept by words.
+    #[must_use]
+    pub fn beacon_period_max_s(&self) -> f64 {
+        let fixed = self.protocol.beacon_period_s.is_some() || self.apart_by_words();
+        let longest_s = if fixed { 0.0 } else { self.protocol.peer_timeout_s / 3.0 };
+        longest_s.max(self.beacon_period_s())
+    }
+
     /// Time between two statements of a drone's separating lines, s. They are said with the beacons, or less often where those of
     /// all drones would take more than a quarter of the bandwidth. `messages`: number of messages of one statement.
     #[must_use]

@@ -79,6 +79,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             debounce_s: p.debounce_s,
         },
         beacon_period_s: p.beacon_s,
+        beacon_period_max_s: p.beacon_s,
         repeat_period_s: p.repeat_s,
         channel: ChannelParams::default(),
         peer_timeout_s: p.peer_timeout_s,
