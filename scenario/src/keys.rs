@@ -351,7 +351,9 @@ impl Default for Avoidance {
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
     /// Time between two pose beacons of a drone. Default: 0.1 s. Where `radio.rate_bps` limits the bandwidth, the default is longer
-    /// if the beacons of all drones would take more than a quarter of it, up to a third of `peer_timeout_s`.
+    /// if the beacons of all drones would take more than a quarter of it, up to a third of `peer_timeout_s`. It is also
+    /// longer, up to the same bound, for a drone that hears more than 32 others and passes messages on
+    /// ([leading.md](leading.md#beyond-one-hop)).
     #[schemars(range(max = 60.0), extend("exclusiveMinimum" = 0.0))]
     pub beacon_period_s: Option<f64>,
     /// Time between two heartbeats of a leader; at most `leader_timeout_s`.
