@@ -80,7 +80,7 @@ impl NeighbourTable {
         let mut ranged: Few<DroneId> = senses.neighbours.iter().map(|sensed| sensed.drone).collect();
         ranged.sort_unstable();
         let mut ranged = ranged.iter().peekable();
-        // The ids ascend.
+        // Peers are visited in the order of their ids.
         peers.visit(|index| {
             let (id, pose) = view.peers.at(index);
             while ranged.next_if(|drone| **drone < id).is_some() {}

@@ -45,10 +45,19 @@ impl BeaconPace {
         self.shortest_s * (self.period as f64 / self.shortest as f64)
     }
 
-    /// Whether a beacon that says this news is due in this tick, if the drone hears `heard` others. Beacons of different drones fall into
-    /// different ticks. The first one is due at once, so that all drones know each other.
+    /// Whether a beacon may be due in this tick. Beacons of different drones fall into different ticks. The first one is due at once, so that
+    /// all drones know each other.
+    pub(crate) fn may_be_due(&self, tick: u64) -> bool {
+        self.said.is_none() || self.is_turn(tick)
+    }
+
+    fn is_turn(&self, tick: u64) -> bool {
+        tick % self.shortest == u64::from(self.me.0) % self.shortest
+    }
+
+    /// Whether a beacon that says this news is due in this tick, if the drone hears `heard` others.
     pub(crate) fn is_due(&mut self, tick: u64, news: News, heard: usize) -> bool {
-        let turn = tick % self.shortest == u64::from(self.me.0) % self.shortest;
+        let turn = self.is_turn(tick);
         let is_due = self.said.is_none() || (turn && (tick >= self.next || self.said != Some(news)));
         if is_due {
             let share = heard as f64 / (BEACONS_PER_S * self.dt_s);

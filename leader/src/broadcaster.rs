@@ -112,12 +112,14 @@ impl Broadcaster {
         relays: &mut Relays,
         say: &mut Vec<Message>,
     ) {
-        let beacon = pose(k, now, own, places);
-        let heard = if relays.is_wide() { k.peers().direct_count() } else { 0 };
-        if self.pace.is_due(own.tick, News::of(&beacon), heard) {
-            let hears = k.peers().hears(k.me(), now);
-            relays.look(k, now, own, self.pace.period_s(), hears);
-            say.push(Message::Pose(Pose { hears, ..beacon }));
+        if self.pace.may_be_due(own.tick) {
+            let beacon = pose(k, now, own, places);
+            let heard = if relays.is_wide() { k.peers().direct_count() } else { 0 };
+            if self.pace.is_due(own.tick, News::of(&beacon), heard) {
+                let hears = k.peers().hears(k.me(), now);
+                relays.look(k, now, own, self.pace.period_s(), hears);
+                say.push(Message::Pose(Pose { hears, ..beacon }));
+            }
         }
         if std::mem::replace(&mut self.term, k.election().obeyed()) != k.election().obeyed() {
             // The new leader may not know.

@@ -483,6 +483,28 @@ mod tests {
     }
 
     #[test]
+    fn where_states_are_passed_on_less_often_only_those_peers_count_as_living_for_longer() {
+        let lives_s = |factor, direct: bool| {
+            let mut peers = Peers::new(4, 1.0).relayed_less(factor);
+            let period_s = if direct { 1.0 } else { factor };
+            let last_s = (0..200).map(|state| period_s * f64::from(state)).fold(0.0, |_, at_s| {
+                let (now, beacon) = (SimTime::from_secs(at_s), pose(at_s, 0.0));
+                if direct {
+                    peers.hear(now, DroneId(1), beacon)
+                } else {
+                    peers.hear_of(now, DroneId(1), beacon)
+                }
+                at_s
+            });
+            let lives =
+                |silence_s: &u32| peers.is_living(DroneId(1), SimTime::from_secs(last_s + f64::from(*silence_s)));
+            (0..1000).take_while(lives).last().unwrap()
+        };
+        assert_eq!([1.0, 5.0].map(|factor| lives_s(factor, false)), [4, 20]);
+        assert_eq!([1.0, 5.0].map(|factor| lives_s(factor, true)), [1, 1]);
+    }
+
+    #[test]
     fn all_ids_but_one_are_known_without_a_search() {
         let missing = |ids: &[u32]| lowest_but_one(&ids.iter().map(|id| DroneId(*id)).collect::<Vec<_>>());
         let found = [&[][..], &[0, 1, 2], &[1, 2, 3], &[0, 1, 3], &[0, 2, 4], &[0, 1, 4]].map(missing);

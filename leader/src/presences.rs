@@ -136,8 +136,13 @@ impl Presences {
     /// News does not wait for a turn of a large swarm.
     fn hasten(&mut self, now: SimTime) {
         if self.turn_s > self.repeat_s {
-            self.turn = self.turn.min(now.after(self.repeat_s * (0.5 + self.draw(now) as f64 / (1_u64 << 53) as f64)));
+            self.turn = self.turn.min(self.next_turn(now, self.repeat_s));
         }
+    }
+
+    /// A time at which this drone speaks next, if it speaks once per `mean_s` on average, s.
+    fn next_turn(&self, now: SimTime, mean_s: f64) -> SimTime {
+        now.after(mean_s * (0.5 + self.draw(now) as f64 / (1_u64 << 53) as f64))
     }
 
     /// A random number below 2^53, another one for each drone and time.
@@ -171,7 +176,7 @@ impl Presences {
         let change = if chunks.len() > BACKLOG { THIN } else { THICKEN };
         self.thinning = (self.thinning * change).clamp(1.0, MAX_THINNING);
         if chunks.len() <= frames {
-            self.turn = now.after(self.turn_s * (0.5 + draw as f64 / (1_u64 << 53) as f64));
+            self.turn = self.next_turn(now, self.turn_s);
         }
         // No kind has to wait until all others are said.
         chunks.sort_unstable_by_key(|(_, chunk)| chunk.first().copied());

@@ -66,7 +66,7 @@ pub(crate) struct RelayedFacts {
     known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
-    /// No assignment, plan or row was last heard before, and no passage much before. See [`Self::forget`].
+    /// No message is forgotten earlier than [`RELAY_MEMORY_S`] after this.
     heard_since: SimTime,
     /// For how long a passage is remembered, s. Its drone goes on saying it, so once it is forgotten it is passed on again. In a large swarm
     /// it is remembered for longer, so that a drone does not hear more passages than in a small one.

@@ -169,7 +169,7 @@ pub(crate) const PRESENCE_REPEATS: f64 = 8.0;
 /// so that nothing is repeated while nothing is lost.
 pub(crate) const PRESENCE_OVERDUE: f64 = 1.5;
 /// A drone whose state is passed on counts as living for at least this many time-outs without word of it. No unit. 4: with the default
-/// periods 6 s, in which its state comes three times. By hand.
+/// periods 6 s, or longer from 160 drones on, in which its state comes three times. By hand.
 pub(crate) const RELAYED_TIMEOUTS: f64 = 4.0;
 /// The drones within a close distance of each other pass on about this many states without news per second, 1/s. 100: swarms of more than 160
 /// drones repeat states less often, so that what a drone hears does not grow with the swarm (`runtime/tests/growth.rs`). Chosen with whole

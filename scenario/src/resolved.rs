@@ -254,8 +254,12 @@ impl Scenario {
     #[must_use]
     pub fn beacon_period_s(&self) -> f64 {
         let least_s = self.period_within_share_s(size_of::<Pose>());
-        let longest_s = BEACON_PERIOD_S.max(self.protocol.peer_timeout_s / 3.0);
-        self.protocol.beacon_period_s.unwrap_or_else(|| least_s.clamp(BEACON_PERIOD_S, longest_s))
+        self.protocol.beacon_period_s.unwrap_or_else(|| least_s.clamp(BEACON_PERIOD_S, self.beacon_period_bound_s()))
+    }
+
+    /// No beacon period is longer than this, s, unless the scenario names one.
+    fn beacon_period_bound_s(&self) -> f64 {
+        BEACON_PERIOD_S.max(self.protocol.peer_timeout_s / 3.0)
     }
 
     /// Longest time between two beacons of a drone, s: that of a drone that hears very many others. It is that of all beacons if the
@@ -263,8 +267,7 @@ impl Scenario {
     #[must_use]
     pub fn beacon_period_max_s(&self) -> f64 {
         let fixed = self.protocol.beacon_period_s.is_some() || self.apart_by_words();
-        let longest_s = if fixed { 0.0 } else { self.protocol.peer_timeout_s / 3.0 };
-        longest_s.max(self.beacon_period_s())
+        if fixed { self.beacon_period_s() } else { self.beacon_period_bound_s() }
     }
 
     /// Time between two statements of a drone's separating lines, s. They are said with the beacons, or less often where those of
