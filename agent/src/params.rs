@@ -189,6 +189,13 @@ impl PilotParams {
         }
     }
 
+    /// The least distance of two drones, as a share of their distance in formation, at most 1; `None` for a swarm that is too small to
+    /// pass as a crowd.
+    pub(crate) fn squeeze(&self) -> Option<f64> {
+        let share = (self.safety.keep_m(0.0) / self.planner.spacing_m).min(1.0);
+        self.planner.is_for_crowd(false).then_some(share)
+    }
+
     pub(crate) fn neighbours(&self) -> NeighbourParams {
         NeighbourParams {
             safe_distance_m: self.safety.safe_distance_m,

@@ -69,21 +69,19 @@ pub(crate) struct QueuePacer {
 }
 
 impl QueuePacer {
-    /// The lowest speed that one of the queues asks for, m/s; infinite if there is none. `params`: `None` for a place whose route has no
-    /// queue.
+    /// The lowest speed that one of the queues asks for, m/s; infinite if there is none.
     pub(crate) fn speed_mps(
         &mut self,
         places: impl Iterator<Item = QueuePlace> + Clone,
         peers: &Peers,
         now: SimTime,
-        params: impl Fn(QueuePlace) -> Option<QueueParams>,
+        params: impl Fn(QueuePlace) -> QueueParams,
     ) -> f64 {
         self.follow(places.clone(), peers);
         let mut speed = f64::INFINITY;
         for place in places {
-            let Some(params) = params(place) else { continue };
             self.collect_ahead(place, peers, now);
-            speed = speed.min(queue_speed(&self.ahead, place.remaining_m, &params));
+            speed = speed.min(queue_speed(&self.ahead, place.remaining_m, &params(place)));
         }
         speed
     }
@@ -215,7 +213,7 @@ mod tests {
         };
         let mut pacer = QueuePacer::default();
         let mut queue = |peers: &Peers| {
-            pacer.speed_mps([place(1, 5)].into_iter(), peers, now, |_| Some(PARAMS));
+            pacer.speed_mps([place(1, 5)].into_iter(), peers, now, |_| PARAMS);
             pacer.ahead.clone()
         };
         hear(&mut peers, 0, 9.5, [place(1, 2), none]);
@@ -249,9 +247,9 @@ mod tests {
             let places = [0, 1].map(|route| QueuePlace { remaining_m: 300.0, set: 7, route, rank: 4 });
             let mut anew = QueuePacer::default();
             for place in places {
-                pacer.speed_mps(places.into_iter(), &peers, stamp, |_| Some(PARAMS));
+                pacer.speed_mps(places.into_iter(), &peers, stamp, |_| PARAMS);
                 pacer.collect_ahead(place, &peers, stamp);
-                anew.speed_mps(places.into_iter(), &peers, stamp, |_| Some(PARAMS));
+                anew.speed_mps(places.into_iter(), &peers, stamp, |_| PARAMS);
                 anew.collect_ahead(place, &peers, stamp);
                 assert_eq!(pacer.ahead, anew.ahead, "step {step}");
             }
@@ -268,7 +266,7 @@ mod tests {
             heard_s += 0.1;
             let stamp = SimTime::from_secs(heard_s);
             peers.hear(stamp, DroneId(0), Pose { stamp, queue: [theirs, QueuePlace::default()], ..Pose::zeroed() });
-            pacer.speed_mps([place(80.0, 3)].into_iter(), &peers, now, |_| Some(PARAMS));
+            pacer.speed_mps([place(80.0, 3)].into_iter(), &peers, now, |_| PARAMS);
             pacer.is_first(place(80.0, 3), &peers, now)
         };
         assert!(!is_first_with(place(30.0, 2)));

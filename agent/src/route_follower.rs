@@ -3,7 +3,7 @@
 use crate::emergency_route::EmergencyRoute;
 use crate::silent_drones::have_moved;
 use skein_leader::cost::{Flight, shortest, trips};
-use skein_leader::funnel::{Corridor, Steering};
+use skein_leader::funnel::{Corridor, Passage, Steering};
 use skein_leader::ledger::Ledger;
 use skein_leader::planned_set::PlannedSet;
 use skein_leader::routes::{Body, Routes};
@@ -20,8 +20,6 @@ struct Leg {
     open: bool,
     /// Whether the route leads between two obstacles.
     between: bool,
-    /// Whether the drones on the route pass side by side, without a queue.
-    crowd: bool,
 }
 
 /// What the corridor was drawn for. When it changes, the corridor is drawn again.
@@ -57,11 +55,13 @@ enum RouteState {
 pub struct RouteFollower {
     me: DroneId,
     course_y_m: f64,
+    /// Of a swarm that is a crowd where it has room.
+    squeeze: Option<f64>,
     legs: Vec<Leg>,
     corridor: Option<Corridor>,
     drawn_for: Option<DrawnFor>,
-    /// Number of assignments from which it is known which routes are those of crowds.
-    heard: usize,
+    /// Ordinate of the drone before it began to pass the sets ahead, m. A drone of a crowd returns to it.
+    own_y_m: f64,
     detours: Vec<Detour>,
     bodies: Vec<Body>,
     blocked: bool,
@@ -69,16 +69,18 @@ pub struct RouteFollower {
 }
 
 impl RouteFollower {
-    /// A drone with nothing to pass. `course_y_m`: ordinate of the line to which its paths return, m.
+    /// A drone with nothing to pass. `course_y_m`: ordinate of the line to which its paths return, m. `squeeze`: of a swarm that is
+    /// a crowd where it has room, see [`Routes::lane_m`].
     #[must_use]
-    pub fn new(me: DroneId, course_y_m: f64) -> Self {
+    pub fn new(me: DroneId, course_y_m: f64, squeeze: Option<f64>) -> Self {
         Self {
             me,
             course_y_m,
+            squeeze,
             legs: Vec::new(),
             corridor: None,
             drawn_for: None,
-            heard: 0,
+            own_y_m: course_y_m,
             detours: Vec::new(),
             bodies: Vec::new(),
             blocked: false,
@@ -125,6 +127,9 @@ impl RouteFollower {
         let key = self.drawing_key(ledger, position);
         if self.drawn_for.is_none_or(|drawn| drawn.stamp != key.stamp) {
             self.detours.clear();
+            if !self.is_passing() {
+                self.own_y_m = position.y;
+            }
         }
         let detoured = self.find_detours(ledger, position, bodies);
         if self.drawn_for != Some(key) || moved || detoured {
@@ -132,19 +137,6 @@ impl RouteFollower {
             self.bodies.extend_from_slice(bodies);
             self.draw(ledger, position);
             self.drawn_for = Some(self.drawing_key(ledger, position));
-            self.heard = 0;
-        }
-        let heard = ledger.sets().iter().map(|set| set.parts.len()).sum();
-        if std::mem::replace(&mut self.heard, heard) != heard {
-            self.find_crowds(ledger);
-        }
-    }
-
-    /// Finds out on which of its routes the drone is in a crowd.
-    fn find_crowds(&mut self, ledger: &Ledger) {
-        for leg in &mut self.legs {
-            let set = ledger.sets().iter().find(|set| set.tag == leg.place.set);
-            leg.crowd = set.is_some_and(|set| set.passes_as_crowd(usize::from(leg.place.route)));
         }
     }
 
@@ -222,18 +214,21 @@ impl RouteFollower {
                 exit_x_m: routes.exit_x_m(),
                 open: position.x < routes.exit_x_m(),
                 between: routes.is_between(usize::from(place.route)),
-                crowd: false,
             })
             .collect();
-        let open: Vec<(&Routes, usize)> = passages
+        let lane_m =
+            |routes: &Routes, route| self.squeeze.map_or(0.0, |squeeze| routes.lane_m(route, self.own_y_m, squeeze));
+        let open: Vec<Passage<'_>> = passages
             .iter()
             .filter(|(_, routes)| position.x < routes.exit_x_m())
             .map(|&(place, routes)| (routes, usize::from(place.route)))
+            .map(|(routes, route)| Passage { routes, route, lane_m: lane_m(routes, route) })
             .collect();
-        let last_exit_x_m = open.iter().map(|(routes, _)| routes.exit_x_m()).reduce(f64::max);
-        let run_out_m = open.first().map_or(0.0, |(routes, _)| routes.run_out_m());
-        self.corridor = last_exit_x_m
-            .map(|exit_x_m| Corridor::new(&open, &self.bodies, Vec2::new(exit_x_m + run_out_m, self.course_y_m)));
+        let last_exit_x_m = open.iter().map(|passage| passage.routes.exit_x_m()).reduce(f64::max);
+        let run_out_m = open.first().map_or(0.0, |passage| passage.routes.run_out_m());
+        let end_y_m = self.squeeze.map_or(self.course_y_m, |_| self.own_y_m);
+        let end = last_exit_x_m.map(|exit_x_m| Vec2::new(exit_x_m + run_out_m, end_y_m));
+        self.corridor = end.map(|end| Corridor::in_lanes(&open, &self.bodies, end));
     }
 
     /// Direction and remaining length of the path from `position` (world frame, m); `None` if nothing lies ahead.
@@ -290,10 +285,11 @@ impl RouteFollower {
         self.legs.iter().any(|leg| leg.place.set == place.set && leg.between)
     }
 
-    /// Whether the drones on the route of a place pass side by side, as a crowd: it has no queue.
+    /// Of these places, those in a queue; the other entries get set 0. Drones that pass side by side, as a crowd, have no queue.
     #[must_use]
-    pub fn is_in_crowd(&self, place: QueuePlace) -> bool {
-        self.legs.iter().any(|leg| leg.place.set == place.set && leg.crowd)
+    pub fn queues(&self, places: &[QueuePlace; MAX_PLACES]) -> [QueuePlace; MAX_PLACES] {
+        let is_in_crowd = |place: QueuePlace| self.squeeze.is_some() && !self.leads_between(place);
+        places.map(|place| if is_in_crowd(place) { QueuePlace::default() } else { place })
     }
 
     /// Of these places, those whose sets the drone has still to leave; the other entries get set 0.

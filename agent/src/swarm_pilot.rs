@@ -92,7 +92,7 @@ impl SwarmPilot {
     fn with_leading(params: PilotParams, leading: Leading) -> Self {
         Self {
             leading,
-            route: RouteFollower::new(params.me, params.planner.course_y_m),
+            route: RouteFollower::new(params.me, params.planner.course_y_m, params.squeeze()),
             queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
             braking_filter: BrakingFilter::new(params.braking_filter()).with_errors(params.sensing),
@@ -350,7 +350,7 @@ impl SwarmPilot {
 
     /// A drone that cannot move would hold up the queue if it stayed first.
     fn give_up_first_place(&mut self, now: SimTime, open: &[QueuePlace; MAX_PLACES]) {
-        let first = open.iter().copied().find(|place| place.set != 0);
+        let first = self.route.queues(open).into_iter().find(|place| place.set != 0);
         if first.is_some_and(|place| self.queue.is_first(place, self.leading.peers(), now)) {
             self.route.give_up_place();
         }
@@ -361,12 +361,10 @@ impl SwarmPilot {
         if !self.params.queue {
             return nominal_mps;
         }
-        let places = open.iter().copied().filter(|place| place.set != 0);
+        let queues = self.route.queues(open);
+        let places = queues.iter().copied().filter(|place| place.set != 0);
         let peers = self.leading.peers();
-        let params = |place: QueuePlace| {
-            let between = self.route.leads_between(place);
-            (!self.route.is_in_crowd(place)).then(|| self.params.queueing(between, peers.delay_s()))
-        };
+        let params = |place: QueuePlace| self.params.queueing(self.route.leads_between(place), peers.delay_s());
         self.queue.speed_mps(places, peers, now, params).min(nominal_mps)
     }
 

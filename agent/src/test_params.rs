@@ -10,6 +10,7 @@ use skein_protocol::scale::Scale;
 /// The planning of a small swarm whose goal is 100 m ahead.
 pub(crate) fn planner() -> PlannerParams {
     PlannerParams {
+        drones: 8,
         strategy: Strategy::PaperRule,
         speed_mps: 10.0,
         headway_s: 4.0,

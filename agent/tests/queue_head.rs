@@ -11,6 +11,7 @@ use skein_protocol::payload::{Assignment, Plan, QueuePlace};
 use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, PlanStamp, SimTime, Vec2};
+use std::cell::Cell;
 
 const HERE: Vec2 = Vec2::new(100.0, -60.0);
 
@@ -33,14 +34,37 @@ fn first_place(route: &RouteFollower) -> (u16, u16) {
     (place.route, place.rank)
 }
 
+fn ledger() -> Ledger {
+    let routes = RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL };
+    Ledger::new(DroneId(1), 4, routes)
+}
+
+#[test]
+fn a_drone_of_a_crowd_has_no_queue_and_returns_to_where_it_was() {
+    let [alone, crowd] = [None, Some(0.5)].map(|squeeze| {
+        let (mut ledger, mut route) = (ledger(), RouteFollower::new(DroneId(1), 0.0, squeeze));
+        hear_plan(&mut ledger, 1);
+        route.update(&ledger, HERE, &[]);
+        let displaced = HERE + Vec2::new(20.0, -30.0);
+        // It is on its way past the wall when the next plan comes.
+        hear_plan(&mut ledger, 2);
+        route.update(&ledger, displaced, &[]);
+        let queues = route.queues(&route.open_places(route.places(displaced)));
+        let lowest_m = Cell::new(f64::INFINITY);
+        route.end_if_blocked(displaced, |_, to| {
+            lowest_m.set(lowest_m.get().min(to.y));
+            true
+        });
+        (queues.iter().filter(|place| place.set != 0).count(), route.end().unwrap().y, lowest_m.get())
+    });
+    assert_eq!(alone, (1, 0.0, -100.0));
+    assert_eq!(crowd, (0, HERE.y, -100.0 - 0.5 * 60.0), "half as far from the wall as it was from its middle");
+}
+
 #[test]
 fn a_place_that_was_given_up_comes_back_with_the_next_plan_alone() {
-    let mut ledger = Ledger::new(
-        DroneId(1),
-        4,
-        RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL },
-    );
-    let mut route = RouteFollower::new(DroneId(1), 0.0);
+    let mut ledger = ledger();
+    let mut route = RouteFollower::new(DroneId(1), 0.0, None);
     route.give_up_place();
     hear_plan(&mut ledger, 1);
     route.update(&ledger, HERE, &[]);

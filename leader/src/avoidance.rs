@@ -33,7 +33,7 @@ fn groupings(s: &Situation<'_>, survey: &Survey<'_>) -> Option<Vec<Grouping>> {
             chosen[i] = route;
         }
         let ranks = ranks(&chosen, &arrivals, &survey.kept_ranks());
-        let predicted_s = all.forecast_s(&all.assigned(&chosen).ok()?, &s.params.crowd(0.0));
+        let predicted_s = all.assigned(&chosen).ok()?.makespan_s;
         Some(Grouping { chosen, ranks, predicted_s })
     };
     splits.into_iter().map(grouping).collect()

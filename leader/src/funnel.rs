@@ -17,6 +17,23 @@ pub struct Corridor {
     scale: Scale,
 }
 
+/// How a path passes one set.
+#[derive(Clone, Copy, Debug)]
+pub struct Passage<'a> {
+    /// The routes past the set.
+    pub routes: &'a Routes,
+    /// The one taken, 0 = rightmost.
+    pub route: usize,
+    /// How far the path keeps away from the walls in y, m: see [`Routes::lane_m`].
+    pub lane_m: f64,
+}
+
+impl Passage<'_> {
+    fn constraints(&self) -> impl Iterator<Item = Constraint> {
+        self.routes.route(self.route).constraints().iter().map(|point| point.beside(self.lane_m))
+    }
+}
+
 /// The shortest path through a corridor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steering {
@@ -37,9 +54,16 @@ impl Corridor {
     /// there are several. Any other body stays on the side on which the path from the course line passes its centre.
     #[must_use]
     pub fn new(passages: &[(&Routes, usize)], bodies: &[Body], target: Vec2) -> Self {
-        let taken = || passages.iter().map(|&(routes, route)| routes.route(route));
-        let constraints = taken().flat_map(|route| route.constraints().iter().copied()).collect();
-        let scale = passages.first().map_or(Scale::FULL, |(routes, _)| routes.scale());
+        let passages: Vec<_> = passages.iter().map(|&(routes, route)| Passage { routes, route, lane_m: 0.0 }).collect();
+        Self::in_lanes(&passages, bodies, target)
+    }
+
+    /// As [`Self::new`], for a path that keeps away from the walls.
+    #[must_use]
+    pub fn in_lanes(passages: &[Passage<'_>], bodies: &[Body], target: Vec2) -> Self {
+        let taken = || passages.iter().map(|passage| passage.routes.route(passage.route));
+        let constraints = passages.iter().flat_map(Passage::constraints).collect();
+        let scale = passages.first().map_or(Scale::FULL, |passage| passage.routes.scale());
         let mut corridor = Self { constraints, target, scale };
         sort(&mut corridor.constraints);
         if !bodies.is_empty() {

@@ -108,7 +108,7 @@ impl JointPlanner {
         let (splits, saves) = splits(s, survey, &table, &union, coordinates);
         let replan = s.was_planned(set);
         let bundle = |split: &RouteAssignment| {
-            let mut bundle = own_grouping(s, &table, &union, survey, split).bundle(s, set, survey, replan);
+            let mut bundle = own_grouping(s, &table, survey, split).bundle(s, set, survey, replan);
             if looks_ahead && coordinates {
                 add_others(&mut bundle, s, &table, survey, split);
             } else if looks_ahead {
@@ -138,7 +138,7 @@ impl JointPlanner {
         let survey = Survey::new(s, &awaited.set)?.with_kept(s.members, &awaited.kept);
         let arrivals: Vec<Vec<f64>> = awaited.table.iter().map(arrivals_s).collect();
         let union = arrival_table(s, &arrivals, survey.routes())?;
-        let grouping = own_grouping(s, &awaited.table, &union, &survey, &union.assigned(&routes).ok()?);
+        let grouping = own_grouping(s, &awaited.table, &survey, &union.assigned(&routes).ok()?);
         Some(grouping.bundle(s, &awaited.set, &survey, awaited.replan))
     }
 
@@ -212,14 +212,8 @@ fn only_route(row: &Arrivals) -> Option<usize> {
     open.next().filter(|_| open.next().is_none())
 }
 
-/// The part of a split of the common table that is about the members. `union`: the arrivals in the table.
-fn own_grouping(
-    s: &Situation<'_>,
-    table: &[Arrivals],
-    union: &ArrivalTable,
-    survey: &Survey<'_>,
-    split: &RouteAssignment,
-) -> Grouping {
+/// The part of a split of the common table that is about the members.
+fn own_grouping(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &RouteAssignment) -> Grouping {
     let places = places(s, table, survey, split);
     let (mut chosen, mut ranks) = (vec![0; s.members.len()], vec![0; s.members.len()]);
     for (row, (route, rank)) in table.iter().zip(split.routes.iter().zip(places)) {
@@ -228,7 +222,7 @@ fn own_grouping(
         }
     }
     let now_s = s.now.since(SimTime::ZERO);
-    Grouping { chosen, ranks, predicted_s: union.forecast_s(split, &s.params.crowd(now_s)) - now_s }
+    Grouping { chosen, ranks, predicted_s: split.makespan_s - now_s }
 }
 
 /// The place in its queue of each drone in the table.

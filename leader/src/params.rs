@@ -1,13 +1,11 @@
 //! Parameters of planning and of leading.
 
 use crate::channel_params::ChannelParams;
+use crate::cost::Flight;
 use crate::election::ElectionParams;
 use crate::routes::RouteParams;
 use crate::slots::Reformation;
-use crate::split::Crowd;
-use crate::tuning::{
-    AGREEMENT_MESSAGES, CROWD_APPROACH, CROWD_DRONES, CROWD_INTERVAL, LEADER_SHARE, PRESENCE_REPEATS, STATES_PER_S,
-};
+use crate::tuning::{AGREEMENT_MESSAGES, CROWD_DRONES, LEADER_SHARE, PRESENCE_REPEATS, STATES_PER_S};
 use skein_protocol::formation::Shape;
 use skein_protocol::radio::HEAD_BYTES;
 use skein_protocol::{DroneId, SimTime, Vec2};
@@ -102,6 +100,8 @@ pub enum Between {
 /// Parameters of planning.
 #[derive(Clone, Debug)]
 pub struct PlannerParams {
+    /// Number of drones in the swarm.
+    pub drones: u32,
     /// How groupings are chosen.
     pub strategy: Strategy,
     /// Nominal speed, m/s.
@@ -138,23 +138,34 @@ pub struct PlannerParams {
 }
 
 impl PlannerParams {
-    /// How the drones of a crowd pass. `now_s`: the present, in the time of their arrivals, s.
+    /// Whether drones pass side by side on a route, as a crowd, and not one behind another: the swarm is large, and there is room beside
+    /// the route. `between`: whether the route leads between two obstacles.
     #[must_use]
-    pub(crate) fn crowd(&self, now_s: f64) -> Crowd {
-        let speed_mps = self.speed_mps.min(self.speed_on_sight_mps);
-        let interval_s = CROWD_INTERVAL * self.safe_distance_m / speed_mps;
-        // By words, a crowd is as slow as its messages, and the time of a queue comes closer.
-        let drones = if self.by_words { usize::MAX } else { CROWD_DRONES };
-        Crowd { now_s, approach: CROWD_APPROACH, interval_s, drones }
+    pub fn is_for_crowd(&self, between: bool) -> bool {
+        self.drones >= CROWD_DRONES && !between
     }
 
-    /// Time between two drones on one route, s. `between`: whether the route leads between two obstacles. `delay_s`: how long a message takes.
+    /// The nominal flight of a drone that is at `position` when it is planned for, world frame, m. A drone of a crowd does not return to the
+    /// course line, but to its own ordinate.
+    pub(crate) fn flight(&self, position: Vec2) -> Flight {
+        if self.is_for_crowd(false) {
+            Flight { speed_mps: self.speed_mps.min(self.speed_on_sight_mps), course_y_m: position.y }
+        } else {
+            Flight { speed_mps: self.speed_mps, course_y_m: self.course_y_m }
+        }
+    }
+
+    /// Time between two drones on one route, s; 0 for a crowd. `between`: whether the route leads between two obstacles. `delay_s`: how long
+    /// a message takes.
     ///
     /// By words, a drone follows another one into a gap only after the two have agreed on another line. That takes three messages: one that
     /// states where the other drone is now, one that states the line, and its answer. Drones that follow each other faster jam in front of
     /// the gap. Beside an outer route there is room.
     #[must_use]
     pub fn turn_s(&self, between: bool, delay_s: f64) -> f64 {
+        if self.is_for_crowd(between) {
+            return 0.0;
+        }
         let agreed_s = if self.by_words && between { AGREEMENT_MESSAGES * delay_s } else { 0.0 };
         self.headway_s.max(agreed_s)
     }

@@ -69,6 +69,7 @@ mod tests {
 
     fn params() -> PlannerParams {
         PlannerParams {
+            drones: 8,
             strategy: Strategy::PaperRule,
             speed_mps: 10.0,
             headway_s: 4.0,

@@ -45,6 +45,15 @@ pub struct Constraint {
 }
 
 impl Constraint {
+    /// The same point, for a path that passes this much farther away from the obstacle in y, m.
+    pub(crate) fn beside(self, lane_m: f64) -> Self {
+        let y_m = match self.side {
+            Side::Above => self.y_m + lane_m,
+            Side::Below => self.y_m - lane_m,
+        };
+        Self { y_m, ..self }
+    }
+
     /// Whether a drone at `position` (world frame, m) is behind the obstacle and on the wrong side of the point, so that it need not pass the
     /// point any more: it is in the strip behind the obstacle that paths avoid and drones may enter. A path past the point would lead back.
     #[must_use]
@@ -142,6 +151,8 @@ pub struct Routes {
     routes: Vec<Route>,
     gate_x_m: f64,
     exit_x_m: f64,
+    /// The lowest ordinate of a path on the rightmost route, and the highest of one on the leftmost route, m.
+    sides_m: (f64, f64),
     scale: Scale,
     /// The obstacles inflated by r_obs, by envelope, from right to left.
     blocks: Vec<Vec<Block>>,
@@ -155,12 +166,17 @@ impl Routes {
         let envelopes = ordered(merged(obstacles, params), params);
         if envelopes.is_empty() {
             let (routes, scale) = (vec![Route::default()], params.scale);
-            return Self { routes, gate_x_m: 0.0, exit_x_m: 0.0, scale, blocks: Vec::new() };
+            return Self { routes, gate_x_m: 0.0, exit_x_m: 0.0, sides_m: (0.0, 0.0), scale, blocks: Vec::new() };
         }
-        let routes = (0..=envelopes.len()).map(|route| Route::new(walls(&envelopes, route, params))).collect();
+        let routes: Vec<Route> =
+            (0..=envelopes.len()).map(|route| Route::new(walls(&envelopes, route, params))).collect();
         let centres = envelopes.iter().map(|envelope| (envelope.low.x + envelope.high.x) / 2.0);
         let rear_m = envelopes.iter().map(|envelope| envelope.high.x).fold(f64::NEG_INFINITY, f64::max);
+        let ordinates = |route: usize| routes[route].constraints.iter().map(|point| point.y_m);
+        let sides_m =
+            (ordinates(0).fold(f64::INFINITY, f64::min), ordinates(routes.len() - 1).fold(f64::NEG_INFINITY, f64::max));
         Self {
+            sides_m,
             routes,
             gate_x_m: centres.sum::<f64>() / envelopes.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
@@ -209,6 +225,21 @@ impl Routes {
     #[must_use]
     pub fn is_between(&self, route: usize) -> bool {
         route > 0 && route + 1 < self.count()
+    }
+
+    /// How far from the walls a drone of a crowd passes on an outermost route, m. `y_m`: the drone's ordinate, in the world frame, m.
+    /// `squeeze`: the least distance of two drones as a share of their distance in formation, at most 1.
+    ///
+    /// The drones in front of the obstacles need room beside them. Each drone makes way: one that flies at u from the middle of
+    /// obstacles of half-width w passes at w + u·squeeze, or at u if that is more. So no two drones come closer than the least distance, and
+    /// their order does not change.
+    #[must_use]
+    pub fn lane_m(&self, route: usize, y_m: f64, squeeze: f64) -> f64 {
+        let (right_m, left_m) = self.sides_m;
+        let (middle_m, half_m) = ((right_m + left_m) / 2.0, (left_m - right_m) / 2.0);
+        let from_middle_m = if route == 0 { middle_m - y_m } else { y_m - middle_m };
+        let lane_m = (from_middle_m * squeeze).max(from_middle_m - half_m);
+        if self.is_between(route) { 0.0 } else { lane_m.max(0.0) }
     }
 
     /// A route, 0 = rightmost. An index beyond the last gives the leftmost.

@@ -78,36 +78,6 @@ pub enum SplitError {
     },
 }
 
-/// How many drones pass on an outermost route, where there is room: side by side, as a crowd, without a queue. Of N drones that wait, one
-/// passes in each interval / N^¾: the more wait, the wider the crowd is. Between two obstacles there is no room, and each one waits for its
-/// turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crowd {
-    /// The present, in the time of the arrivals, s.
-    pub now_s: f64,
-    /// Part of its time to the gate after which a drone joins those that wait, at most 1.
-    pub approach: f64,
-    /// Time in which a drone passes that is the only one to wait, s.
-    pub interval_s: f64,
-    /// So many drones on one route are a crowd.
-    pub drones: usize,
-}
-
-impl Crowd {
-    /// When the last of these drones passes, which would arrive at these times alone (s, ascending).
-    fn last_s(&self, arrivals_s: impl Iterator<Item = f64>) -> f64 {
-        let (mut waiting, mut at_s) = (0.0_f64, self.now_s);
-        // While nobody joins, the fourth root of the number of those that wait falls evenly.
-        let root = |waiting: f64| waiting.sqrt().sqrt();
-        for arrival_s in arrivals_s {
-            let joins_s = (self.now_s + self.approach * (arrival_s - self.now_s)).max(at_s);
-            let left = (root(waiting) - (joins_s - at_s) / (4.0 * self.interval_s)).max(0.0);
-            (waiting, at_s) = (left * left * left * left + 1.0, joins_s);
-        }
-        at_s + (root(waiting) - 1.0) * 4.0 * self.interval_s
-    }
-}
-
 /// When each drone would pass on each route if it were alone, and the headway of each route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrivalTable {
@@ -201,23 +171,6 @@ impl ArrivalTable {
             return Err(SplitError::Assignment { drones: self.arrivals.len() });
         }
         Ok(self.queued(routes.to_vec()))
-    }
-
-    /// When the last drone of an assignment of this table passes as drones fly, s; 0 without drones. Unlike in
-    /// [`RouteAssignment::makespan_s`], many drones pass as a crowd where there is room.
-    ///
-    /// # Panics
-    /// If the assignment has more drones than this table.
-    #[must_use]
-    pub fn forecast_s(&self, split: &RouteAssignment, crowd: &Crowd) -> f64 {
-        let last_s = |route: usize| {
-            let queue = self.queue(&split.routes, route);
-            let turns_s = seconds(passes(&queue, self.by_headway(route)).last()?);
-            let has_room = (route == 0 || route + 1 == self.headways.len()) && queue.len() >= crowd.drones;
-            let crowd_s = || crowd.last_s(queue.iter().map(|&(arrival, _)| seconds(arrival)));
-            Some(if has_room { crowd_s().max(seconds(queue.last()?.0)).min(turns_s) } else { turns_s })
-        };
-        (0..self.headways.len()).filter_map(last_s).reduce(f64::max).unwrap_or(0.0)
     }
 
     /// The least makespan, s: [`ArrivalTable::split`] without its tie-break, in a fraction of the time.

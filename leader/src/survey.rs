@@ -1,6 +1,6 @@
 //! What a leader finds out about an obstacle set before it plans for it.
 
-use crate::cost::{Flight, Trip, shortest, trips};
+use crate::cost::{Trip, shortest, trips};
 use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::plan_exchange;
@@ -26,8 +26,10 @@ impl<'a> Survey<'a> {
     pub(crate) fn new(s: &Situation<'a>, set: &[ObstacleId]) -> Option<Self> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
-        let flight = Flight { speed_mps: s.params.speed_mps, course_y_m: s.params.course_y_m };
-        let member_trips = |m: &Member| trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight);
+        let member_trips = |m: &Member| {
+            let flight = s.params.flight(m.position);
+            trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight)
+        };
         let trips: Vec<Vec<Trip>> = s.members.iter().map(member_trips).collect();
         let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(m.id))).collect();
         Some(Self { routes, trips, kept })

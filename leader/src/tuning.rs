@@ -3,18 +3,12 @@
 //! "By hand" means that the value was chosen from watching single runs and that no sweep is on record. A number that was
 //! measured names the command that measures it again.
 
-// ---- Crowds and their forecasts (`planned_set.rs`, `split.rs`) ----
+// ---- Queues and crowds (`params.rs`) ----
 
-/// From this number of drones on one route, they pass side by side where there is room, and not one behind another. 33. By hand: in a longer
-/// queue most drones cannot wait for their turn, because they fly no slower than v − δ. Queues of up to 16 drones mostly can: in four of 100
-/// random scenes (`skein scene 900000` to `900099`) some drones could not.
-pub(crate) const CROWD_DRONES: usize = 33;
-/// Time in which the only drone of a crowd passes, in times of the safe distance over the speed. No unit. 4.0. Fitted to 21 flights with 80
-/// to 300 drones past one obstacle, together with the next one and the power ¾ of [`crate::split::Crowd`]. Arrivals were taken to be even.
-/// docs/paper.md, *Large swarms*, shows eight of these flights, and 14 that chose nothing.
-pub(crate) const CROWD_INTERVAL: f64 = 4.0;
-/// Part of its time to the gate after which a drone joins its crowd: most drones pass far beside the obstacle. No unit. 0.85. Fitted as above.
-pub(crate) const CROWD_APPROACH: f64 = 0.85;
+/// From this number of drones on, drones pass side by side where there is room, and not one behind another. 33. By hand: in a long queue most
+/// drones cannot wait for their turn, because they fly no slower than v − δ. Queues of up to 16 drones mostly can: in four of 100 random
+/// scenes (`skein scene 900000` to `900099`) some drones could not.
+pub(crate) const CROWD_DRONES: u32 = 33;
 /// By words, drones follow each other through a gap no faster than such a number of messages takes, one after the other. No unit. 3. By
 /// reasoning ([`crate::params::PlannerParams::turn_s`]), and compared with 4 in `scenarios/narrow/gap.toml`, seeds 1 to 8.
 pub(crate) const AGREEMENT_MESSAGES: f64 = 3.0;

@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use skein_leader::slots::{TooFewSlots, assign};
-use skein_leader::split::{ArrivalTable, Crowd, RouteAssignment, SplitError};
+use skein_leader::split::{ArrivalTable, RouteAssignment, SplitError};
 use skein_protocol::Vec2;
 use std::collections::BTreeSet;
 
@@ -237,64 +237,4 @@ fn a_thousand_drones_are_split_exactly() {
     // A thousand passes over four routes, three seconds apart, starting with the earliest arrival of all.
     assert!(split.makespan_s >= 249.0 * 3.0);
     assert_eq!(split.queues.iter().map(Vec::len).sum::<usize>(), 1000);
-}
-
-/// Sixteen drones arrive together after 10 s. As a crowd, they are fewer by the fourth power of a time that falls evenly.
-#[test]
-fn many_drones_pass_side_by_side_where_there_is_room() {
-    let crowd = |now_s: f64| Crowd { now_s, approach: 0.5, interval_s: 3.0, drones: 6 };
-    let table = |routes: usize, start_s: f64| {
-        ArrivalTable::new(&vec![vec![10.0 + start_s; routes]; 16], &vec![4.0; routes]).unwrap()
-    };
-    let (file_s, crowd_s) = (10.0 + 15.0 * 4.0, 5.0 + 4.0 * 3.0 * (16.0_f64.powf(0.25) - 1.0));
-    for (routes, route, last_s) in [(1, 0, crowd_s), (2, 0, crowd_s), (2, 1, crowd_s), (3, 1, file_s), (3, 2, crowd_s)]
-    {
-        for start_s in [0.0, 500.0] {
-            let table = table(routes, start_s);
-            let forecast_s = table.forecast_s(&table.assigned(&[route; 16]).unwrap(), &crowd(start_s));
-            assert!(
-                (forecast_s - start_s - last_s).abs() < 1e-6,
-                "{forecast_s}, route {route} of {routes}, from {start_s} s"
-            );
-        }
-    }
-    let last_s = |right: usize| {
-        let table = table(2, 0.0);
-        table.forecast_s(&table.assigned(&[vec![0; right], vec![1; 16 - right]].concat()).unwrap(), &crowd(0.0))
-    };
-    assert_eq!(last_s(11), 26.0, "five on the other route wait for their turns");
-    assert!((last_s(10) - 5.0 - 4.0 * 3.0 * (10.0_f64.powf(0.25) - 1.0)).abs() < 1e-6, "both are crowds");
-}
-
-/// Two drones join after 2 s, and one after 5 s, when one and a little more still wait.
-#[test]
-fn drones_join_a_crowd_as_they_arrive() {
-    let rows = [[2.0], [2.0], [5.0]].map(Vec::from);
-    let table = ArrivalTable::new(&rows, &[9.0]).unwrap();
-    let crowd = Crowd { now_s: 0.0, approach: 1.0, interval_s: 8.0, drones: 1 };
-    let waiting = (2.0_f64.powf(0.25) - 3.0 / 32.0).powi(4) + 1.0;
-    let last_s = 5.0 + 32.0 * (waiting.powf(0.25) - 1.0);
-    assert!((table.forecast_s(&table.shortest(), &crowd) - last_s).abs() < 1e-9);
-}
-
-proptest! {
-    /// The forecast lies between the last arrival of a drone alone and the makespan of the paper's queues, and is the latter for a
-    /// crowd that hardly moves, and for few drones.
-    #[test]
-    fn a_forecast_is_never_later_than_the_queues(
-        rows in prop::collection::vec(prop::collection::vec(-20.0..60.0f64, 3), 1..12),
-        picks in prop::collection::vec(0..3usize, 12),
-        approach in 0.1..1.0f64,
-        interval_s in 0.1..20.0f64,
-    ) {
-        let table = ArrivalTable::new(&rows, &[2.0; 3]).unwrap();
-        let chosen = &picks[..rows.len()];
-        let split = table.assigned(chosen).unwrap();
-        let forecast_s = table.forecast_s(&split, &Crowd { now_s: -20.0, approach, interval_s, drones: 1 });
-        let makespan_s = split.makespan_s;
-        let last_s = rows.iter().zip(chosen).map(|(row, &route)| row[route]).fold(f64::NEG_INFINITY, f64::max);
-        prop_assert!(last_s - 1e-6 <= forecast_s && forecast_s <= makespan_s, "{last_s} {forecast_s} {makespan_s}");
-        let slow = |drones| table.forecast_s(&split, &Crowd { now_s: -20.0, approach: 1.0, interval_s: 1e9, drones });
-        prop_assert_eq!((slow(1), slow(12)), (makespan_s, makespan_s));
-    }
 }

@@ -322,6 +322,40 @@ fn obstacles_that_are_exactly_behind_each_other_have_mirrored_routes() -> Result
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
+    /// Drones that fly side by side at a distance, past obstacles that leave room on both sides only.
+    #[test]
+    fn lanes_keep_the_order_and_the_least_distance_of_a_crowd(
+        shapes in shapes(),
+        ordinates in prop::collection::btree_set(-4000..4000i32, 2..40),
+        distance_m in 10.0..80.0f64,
+        squeeze in 0.2..1.0f64,
+    ) {
+        let routes = routes(&shapes);
+        let leftmost = routes.count() - 1;
+        let sides_m = |route: usize| routes.route(route).constraints().iter().map(|point| point.y_m);
+        let (right_m, left_m) = (sides_m(0).fold(f64::MAX, f64::min), sides_m(leftmost).fold(f64::MIN, f64::max));
+        // Each drone takes the nearer side. No two are closer than the distance.
+        let ordinates = ordinates.into_iter().map(|number| f64::from(number) * distance_m / 10.0).collect::<Vec<_>>();
+        let starts: Vec<f64> = ordinates.iter().scan(f64::MIN, |last, &y_m| {
+            *last = y_m.max(*last + distance_m);
+            Some(*last)
+        }).collect();
+        let lane = |y_m: f64| if y_m < (right_m + left_m) / 2.0 {
+            right_m - routes.lane_m(0, y_m, squeeze)
+        } else {
+            left_m + routes.lane_m(leftmost, y_m, squeeze)
+        };
+        for pair in starts.windows(2) {
+            let apart_m = lane(pair[1]) - lane(pair[0]);
+            let same_side = (pair[0] < (right_m + left_m) / 2.0) == (pair[1] < (right_m + left_m) / 2.0);
+            prop_assert!(!same_side || apart_m >= distance_m * squeeze - 1e-9, "{apart_m} m");
+            prop_assert!(apart_m > 0.0);
+        }
+        prop_assert!((1..leftmost).all(|route| routes.lane_m(route, starts[0], squeeze) == 0.0));
+        let far_m = left_m + (left_m - right_m) / (1.0 - squeeze).max(1e-3);
+        prop_assert!((lane(far_m) - far_m).abs() < 1e-6 || squeeze > 0.999, "a drone that is far away keeps its ordinate");
+    }
+
     #[test]
     fn no_path_is_shorter(shapes in shapes(), y in -200.0..200.0, pick in any::<prop::sample::Index>()) {
         let routes = routes(&shapes);

@@ -237,6 +237,7 @@ pub(crate) fn reaction_ticks(scenario: &Scenario) -> u32 {
 fn planner(scenario: &Scenario) -> PlannerParams {
     let (drone, avoidance) = (&scenario.drone, &scenario.avoidance);
     PlannerParams {
+        drones: scenario.formation.drones,
         strategy: match scenario.strategy {
             StrategyKey::LookAhead => Strategy::LookAhead(Objective {
                 energy_per_kj: scenario.objective.energy_per_kj,

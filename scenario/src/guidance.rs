@@ -20,8 +20,8 @@ pub struct Guidance {
     #[schemars(range(min = 0.5, max = 1.0))]
     pub precedence_share: f64,
     /// Whether drones that share a route form a single file before its gate, one headway apart. If false, only the safety
-    /// filter keeps them apart, and they pass side by side where there is room. So do 33 drones or more on an outermost route
-    /// in any case.
+    /// filter keeps them apart, and they pass side by side where there is room. So does a swarm of 33 drones or more in any
+    /// case, except between two obstacles.
     pub queue: bool,
 }
 

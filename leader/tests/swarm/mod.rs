@@ -61,6 +61,7 @@ pub(crate) fn params(p: &Periods, drones: u32, me: u32, incarnation: u32, start:
             wait_s: p.wait_s,
         },
         planner: PlannerParams {
+            drones: 8,
             strategy: Strategy::PaperRule,
             speed_mps: SPEED_MPS,
             headway_s: 4.0,
