@@ -51,10 +51,11 @@ fn a_drone_of_a_crowd_has_no_queue_and_returns_to_where_it_was() {
         route.update(&ledger, displaced, &[]);
         let queues = route.queues(&route.open_places(route.places(displaced)));
         let lowest_m = Cell::new(f64::INFINITY);
-        route.end_if_blocked(displaced, |_, to| {
+        let blocked = route.end_if_blocked(displaced, |_, to| {
             lowest_m.set(lowest_m.get().min(to.y));
             true
         });
+        assert_eq!(blocked, None);
         (queues.iter().filter(|place| place.set != 0).count(), route.end().unwrap().y, lowest_m.get())
     });
     assert_eq!(alone, (1, 0.0, -100.0));
