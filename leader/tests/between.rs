@@ -203,3 +203,14 @@ fn by_words_drones_follow_each_other_through_a_gap_no_faster_than_they_agree() {
     assert_eq!([false, true].map(|between| planner.turn_s(between, 2.0)), [2.75, 6.0]);
     assert_eq!(planner.turn_s(true, 0.5), 2.75, "a fast radio does not matter");
 }
+
+#[test]
+fn a_swarm_of_33_drones_has_a_headway_between_two_obstacles_only() {
+    let mut planner = params(&DEFAULT, DRONES, 0, 1, SimTime::ZERO).planner;
+    planner.headway_s = 2.75;
+    let mut turns_s = |drones| {
+        planner.drones = drones;
+        [false, true].map(|between| planner.turn_s(between, 0.0))
+    };
+    assert_eq!([32, 33].map(&mut turns_s), [[2.75, 2.75], [0.0, 2.75]]);
+}
