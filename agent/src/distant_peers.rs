@@ -21,9 +21,10 @@ pub(crate) struct Distant {
     pub(crate) speed_mps: f64,
 }
 
-/// Which of the peers ever heard may be within reach. A peer is taken to fly on with the velocity of its last beacon.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct DistantPeers {
+/// Which of the peers ever heard may be within reach. A peer is taken to fly on with the velocity of its last beacon. `T`: what is kept of those
+/// that may be within reach.
+#[derive(Clone, Debug)]
+pub(crate) struct DistantPeers<T> {
     /// Each peer is out of reach while [`Self::travelled_m`] is below this, m.
     until_m: Vec<f64>,
     /// The least of each [`BLOCK`] of peers, or less, without those that may be within reach, m.
@@ -32,6 +33,8 @@ pub(crate) struct DistantPeers {
     least_m: f64,
     /// The indices of the peers that were within reach, ascending.
     near: Vec<u32>,
+    /// What is kept of each of them, in the same order. Each tick reads it, so it is all in one place.
+    copies: Vec<T>,
     /// The indices of further peers that may be within reach.
     suspects: Vec<u32>,
     /// Number of changes of the peers at the last look.
@@ -44,7 +47,24 @@ pub(crate) struct DistantPeers {
     last: Option<(SimTime, Vec2)>,
 }
 
-impl DistantPeers {
+impl<T> Default for DistantPeers<T> {
+    fn default() -> Self {
+        Self {
+            until_m: Vec::new(),
+            blocks_m: Vec::new(),
+            least_m: 0.0,
+            near: Vec::new(),
+            copies: Vec::new(),
+            suspects: Vec::new(),
+            seen: 0,
+            speed_mps: 0.0,
+            travelled_m: 0.0,
+            last: None,
+        }
+    }
+}
+
+impl<T> DistantPeers<T> {
     /// Takes this drone's time and position, world frame, m. Call once per tick.
     pub(crate) fn advance(&mut self, now: SimTime, position: Vec2) {
         if let Some((then, from)) = self.last.replace((now, position)) {
@@ -53,9 +73,15 @@ impl DistantPeers {
     }
 
     /// Finds the peers that have come within reach. `count`: number of peers. `changes`: theirs. `distant`: whether the peer at
-    /// an index is out of reach.
-    pub(crate) fn look(&mut self, count: usize, changes: &Changes, distant: impl Fn(usize) -> Option<Distant>) {
-        self.suspect_changed(count, changes);
+    /// an index is out of reach. `copy`: what is kept of it if it is not.
+    pub(crate) fn look(
+        &mut self,
+        count: usize,
+        changes: &Changes,
+        distant: impl Fn(usize) -> Option<Distant>,
+        copy: impl Fn(usize) -> T,
+    ) {
+        self.suspect_changed(count, changes, &copy);
         if self.travelled_m >= self.least_m {
             self.suspect_near();
         }
@@ -65,30 +91,44 @@ impl DistantPeers {
                 None => {
                     let place = self.near.partition_point(|near| *near < index);
                     self.near.insert(place, index);
+                    self.copies.insert(place, copy(index as usize));
                 }
             }
         }
     }
 
-    /// Visits the peers within reach, by index. `visit` returns how far away one is that has left it.
-    pub(crate) fn visit(&mut self, mut visit: impl FnMut(usize) -> Option<Distant>) {
-        let mut near = std::mem::take(&mut self.near);
-        near.retain(|&index| {
-            let distant = visit(index as usize);
-            if let Some(distant) = distant {
+    /// Visits the peers within reach, by index, with what is kept of them. `visit` returns how far away one is that has left it.
+    pub(crate) fn visit(&mut self, mut visit: impl FnMut(usize, &T) -> Option<Distant>) {
+        let mut stay = 0;
+        for place in 0..self.near.len() {
+            let index = self.near[place];
+            if let Some(distant) = visit(index as usize, &self.copies[place]) {
                 self.note(index as usize, distant);
+                continue;
             }
-            distant.is_none()
-        });
-        self.near = near;
+            if stay < place {
+                self.near[stay] = index;
+                self.copies.swap(stay, place);
+            }
+            stay += 1;
+        }
+        self.near.truncate(stay);
+        self.copies.truncate(stay);
     }
 
-    /// The peers that have changed may be within reach.
-    fn suspect_changed(&mut self, count: usize, changes: &Changes) {
+    /// The peers that have changed may be within reach. Of those that were, what is kept is replaced.
+    fn suspect_changed(&mut self, count: usize, changes: &Changes, copy: impl Fn(usize) -> T) {
         let changed = changes.since(self.seen).filter(|_| self.until_m.len() == count);
         self.seen = changes.count();
         if let Some(changed) = changed {
-            changed.for_each(|index| self.suspect(index));
+            for index in changed {
+                if self.suspect(index) {
+                    continue;
+                }
+                if let Ok(place) = self.near.binary_search(&(index as u32)) {
+                    self.copies[place] = copy(index);
+                }
+            }
             return;
         }
         self.until_m.clear();
@@ -99,6 +139,8 @@ impl DistantPeers {
         self.suspects.clear();
         self.near.clear();
         self.near.extend(0..count as u32);
+        self.copies.clear();
+        self.copies.extend((0..count).map(copy));
     }
 
     /// The peers that can have come into reach may be within reach.
@@ -125,10 +167,13 @@ impl DistantPeers {
         least_m
     }
 
-    fn suspect(&mut self, index: usize) {
-        if std::mem::replace(&mut self.until_m[index], NEAR) != NEAR {
+    /// Notes that a peer may be within reach. Returns whether it was taken to be out of reach.
+    fn suspect(&mut self, index: usize) -> bool {
+        let was_distant = std::mem::replace(&mut self.until_m[index], NEAR) != NEAR;
+        if was_distant {
             self.suspects.push(index as u32);
         }
+        was_distant
     }
 
     fn note(&mut self, index: usize, distant: Distant) {
@@ -175,9 +220,10 @@ mod tests {
                 looked.set(looked.get() + 1);
                 of(index)
             };
-            peers.look(10, &changes, look);
+            peers.look(10, &changes, look, |_| tick);
             let mut near = Vec::new();
-            peers.visit(|index| {
+            peers.visit(|index, copied| {
+                assert!(tick - copied < 10, "each was heard since");
                 look(index).or_else(|| {
                     near.push(index);
                     None
@@ -192,28 +238,28 @@ mod tests {
     #[test]
     fn a_peer_that_changed_is_looked_at_and_all_are_when_they_moved() {
         let (mut peers, mut changes) = (DistantPeers::default(), Changes::default());
-        let near = |peers: &mut DistantPeers, away_m: f64| {
+        let near = |peers: &mut DistantPeers<()>, away_m: f64| {
             let mut near = Vec::new();
-            peers.visit(|index| {
+            peers.visit(|index, ()| {
                 near.push(index);
                 distant(away_m, 0.0)
             });
             near
         };
         changes.note_moved(9);
-        peers.look(9, &changes, |_| panic!("all are visited"));
+        peers.look(9, &changes, |_| panic!("all are visited"), |_| ());
         assert_eq!(near(&mut peers, 150.0).len(), 9);
         let nobody = |_| -> Option<Distant> { panic!("nothing has changed") };
-        peers.look(9, &changes, nobody);
+        peers.look(9, &changes, nobody, |_| ());
         assert!(near(&mut peers, 0.0).is_empty());
         changes.note(8);
         changes.note(3);
-        peers.look(9, &changes, |_| None);
+        peers.look(9, &changes, |_| None, |_| ());
         assert_eq!(near(&mut peers, 0.0), [3, 8]);
         changes.note_moved(9);
-        peers.look(9, &changes, nobody);
+        peers.look(9, &changes, nobody, |_| ());
         assert_eq!(near(&mut peers, 0.0).len(), 9);
-        peers.look(4, &changes, nobody);
+        peers.look(4, &changes, nobody, |_| ());
         assert_eq!(near(&mut peers, 0.0).len(), 4);
     }
 }

@@ -36,11 +36,33 @@ pub(crate) struct NeighbourView<'a> {
     pub(crate) places: &'a [QueuePlace],
 }
 
+/// A peer within reach, as its last beacon has it.
+#[derive(Clone, Copy, Debug)]
+struct NearPeer {
+    id: DroneId,
+    stamp: SimTime,
+    /// World frame, m.
+    position: Vec2,
+    /// World frame, m/s.
+    velocity: Vec2,
+}
+
+impl NearPeer {
+    fn new((id, pose): (DroneId, Beacon<'_>)) -> Self {
+        Self { id, stamp: pose.stamp(), position: pose.position(), velocity: pose.velocity() }
+    }
+
+    /// Where it is relative to this drone if it has kept its velocity, m.
+    fn away(&self, senses: &Senses<'_>) -> Vec2 {
+        self.position + self.velocity * senses.now.since(self.stamp) - senses.position()
+    }
+}
+
 /// Finds the neighbours of a drone.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourTable {
     params: NeighbourParams,
-    distant: DistantPeers,
+    distant: DistantPeers<NearPeer>,
 }
 
 impl NeighbourTable {
@@ -67,32 +89,29 @@ impl NeighbourTable {
         let reach_m = BEACON_REACH * self.params.safe_distance_m;
         let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         self.distant.advance(senses.now, senses.position());
-        let away_m = |pose: &Beacon<'_>| pose.extrapolated(senses.now) - senses.position();
-        let distant = |pose: &Beacon<'_>, position_m: Vec2| {
+        let distant = |position_m: Vec2, velocity: Vec2| {
             let far = position_m.norm_squared() > reach_m * reach_m;
-            far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: pose.velocity().norm() })
+            far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: velocity.norm() })
         };
         let mut peers = std::mem::take(&mut self.distant);
-        peers.look(view.peers.stamps().len(), view.peers.changes(), |index| {
-            let pose = view.peers.at(index).1;
-            distant(&pose, away_m(&pose))
-        });
+        let near = |index| NearPeer::new(view.peers.at(index));
+        let away = |index| distant(near(index).away(senses), near(index).velocity);
+        peers.look(view.peers.stamps().len(), view.peers.changes(), away, near);
         let mut ranged: Few<DroneId> = senses.neighbours.iter().map(|sensed| sensed.drone).collect();
         ranged.sort_unstable();
         let mut ranged = ranged.iter().peekable();
         // Peers are visited in the order of their ids.
-        peers.visit(|index| {
-            let (id, pose) = view.peers.at(index);
+        peers.visit(|index, peer| {
+            let id = peer.id;
             while ranged.next_if(|drone| **drone < id).is_some() {}
-            // Of a drone that is ranged, the beacon is not read: in a large swarm it is not in the cache.
             if ranged.peek() == Some(&&id) || !view.peers.is_living_at(index, view.now) {
                 return None;
             }
-            let position_m = away_m(&pose);
-            let far = distant(&pose, position_m);
+            let position_m = peer.away(senses);
+            let far = distant(position_m, peer.velocity);
             if far.is_none() {
-                let velocity_mps = pose.velocity() - senses.velocity();
-                let (age_s, share) = (senses.now.since(pose.stamp()), self.share(view, id));
+                let velocity_mps = peer.velocity - senses.velocity();
+                let (age_s, share) = (senses.now.since(peer.stamp), self.share(view, id));
                 neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
             }
             far
@@ -106,14 +125,14 @@ impl NeighbourTable {
     /// beacon shows that the other obeys the same plan.
     fn share(&self, view: &NeighbourView<'_>, other: DroneId) -> f64 {
         let Some(pose) = view.peers.last_of_living(other, view.now) else { return 1.0 };
-        let age_s = view.now.since(pose.stamp());
+        let is_fresh = || view.now.since(pose.stamp()) <= FRESH_BEACON_S;
         for mine in view.places.iter().filter(|place| place.set != 0) {
             let same = |place: &QueuePlace| place.set == mine.set && place.route == mine.route;
             let Some(theirs) = pose.queue().find(same) else { continue };
             if mine.rank > theirs.rank {
                 return self.params.precedence_share;
             }
-            if mine.rank < theirs.rank && age_s <= FRESH_BEACON_S && pose.obeyed() == view.obeyed {
+            if mine.rank < theirs.rank && is_fresh() && pose.obeyed() == view.obeyed {
                 return 1.0 - self.params.precedence_share;
             }
         }

@@ -43,6 +43,7 @@ use skein_leader::plan_bundle::PlanBundle;
 use skein_leader::routes::Routes;
 use skein_leader::set_place::SetPlace;
 use skein_pilot::{Command, Heard, Inbox, Out, Pilot, Status};
+use skein_protocol::digest::Digest;
 use skein_protocol::downlink::{SensedShape, Senses};
 use skein_protocol::payload::{Assignment, MAX_PLACES, Plan, QueuePlace, set_tag};
 use skein_protocol::shape::ConvexShape;
@@ -636,7 +637,8 @@ impl Pilot for SwarmPilot {
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         ages.clear();
-        self.leading.peers().ages_s(now, ages);
+        let first = Digest::chain(u64::from(self.params.me.0), now.0 as u64);
+        self.leading.peers().ages_s(now, first, ages);
     }
 }
 

@@ -62,9 +62,17 @@ impl Grouping {
 /// The table of these arrivals (s, by drone and route). `None` only if an arrival is not a number, which finite positions
 /// exclude.
 pub(crate) fn arrival_table(s: &Situation<'_>, arrivals: &[Vec<f64>], routes: &Routes) -> Option<ArrivalTable> {
-    let turn_s = |route| s.params.turn_s(routes.is_between(route), s.delay_s);
-    let turns_s: Vec<f64> = (0..routes.count()).map(turn_s).collect();
-    ArrivalTable::new(arrivals, &turns_s).ok()
+    ArrivalTable::new(arrivals, &turns_s(s, routes)).ok()
+}
+
+/// The least time between two drones on each route, s.
+fn turns_s(s: &Situation<'_>, routes: &Routes) -> Vec<f64> {
+    (0..routes.count()).map(|route| s.params.turn_s(routes.is_between(route), s.delay_s)).collect()
+}
+
+/// Whether no drone has to wait for another one on any route. Then it makes no difference to a drone which routes others fly.
+pub(crate) fn is_without_queues(s: &Situation<'_>, routes: &Routes) -> bool {
+    turns_s(s, routes).iter().all(|turn_s| *turn_s <= 0.0)
 }
 
 /// Place of each drone in the queue of its route. Drones that have a place already keep their order; the others follow by

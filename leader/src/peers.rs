@@ -12,8 +12,11 @@ use std::hint::black_box;
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
 
-/// Time between two looks at all peers for silent ones, in time-outs. Each look costs as much as a few beacons per peer.
+/// Time between two looks for silent peers, in time-outs. A look at all of them costs as much as a few beacons per peer.
 const LOOK_TIMEOUTS: f64 = 0.25;
+
+/// Of so many peers the age is told at a time.
+const AGES: usize = 64;
 
 /// Before every time of a mission.
 const NEVER: SimTime = SimTime(i64::MIN / 2);
@@ -40,12 +43,16 @@ impl Peer {
     /// The longest time without word of it after which it still counts as living, s. Where others pass its state on, it comes once per
     /// some time-outs at best, and at times not at all.
     fn absence_s(&self, base: Timeouts) -> f64 {
-        let relayed = self.timeout.last() > self.direct;
-        if relayed {
+        if self.is_relayed() {
             self.silence_s(base.relayed_s).max(RELAYED_TIMEOUTS * base.relayed_s)
         } else {
             self.silence_s(base.direct_s)
         }
+    }
+
+    /// Whether the last word of it was passed on.
+    fn is_relayed(&self) -> bool {
+        self.timeout.last() > self.direct
     }
 
     fn lives(&self, now: SimTime, base: Timeouts) -> bool {
@@ -78,9 +85,11 @@ pub struct Peers {
     base: Timeouts,
     /// Running mean of the beacons' delay, s.
     delay_s: f64,
-    /// No peer is silent for too long until then.
-    quiet_until: SimTime,
-    /// When all peers are looked at again.
+    /// None of `near` is silent for too long until then.
+    near_quiet_until: SimTime,
+    /// None of the other peers is, until then.
+    far_quiet_until: SimTime,
+    /// When peers are looked at again.
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
     ids: Vec<DroneId>,
@@ -108,7 +117,8 @@ impl Peers {
             drones,
             base: Timeouts { direct_s: timeout_s, relayed_s: timeout_s },
             delay_s: 0.0,
-            quiet_until: SimTime::MAX,
+            near_quiet_until: SimTime::MAX,
+            far_quiet_until: SimTime::MAX,
             next_look: SimTime::ZERO,
             ids: Vec::new(),
             all_but: None,
@@ -156,7 +166,7 @@ impl Peers {
                 }
                 let timeout = self.prior(now, direct.is_some());
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
-                self.quiet_until = self.quiet_until.min(peer.lives_until(self.base));
+                self.note_quiet(&peer);
                 self.ids.insert(place, source);
                 self.all_but = None;
                 self.beacons.insert(place, &pose);
@@ -174,7 +184,8 @@ impl Peers {
                 peer.timeout.hear(now, 0.0, longest_s);
                 self.beacons.replace(place, &pose);
                 self.changes.note(place);
-                self.quiet_until = self.quiet_until.min(peer.lives_until(self.base));
+                let peer = *peer;
+                self.note_quiet(&peer);
                 if direct.is_some() {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
                 }
@@ -199,19 +210,48 @@ impl Peers {
         if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.base.relayed_s) }
     }
 
-    /// Finds out anew until when no peer is silent for too long.
+    /// Notes that a peer was heard.
+    fn note_quiet(&mut self, peer: &Peer) {
+        let until = if peer.is_relayed() { &mut self.far_quiet_until } else { &mut self.near_quiet_until };
+        *until = (*until).min(peer.lives_until(self.base));
+    }
+
+    /// Finds out anew until when no peer is silent for too long. In a wide swarm most peers are far away. They may be silent for longer, and all of
+    /// them are looked at less often.
     fn look_for_silence(&mut self, now: SimTime) {
         self.next_look = now.after(LOOK_TIMEOUTS * self.base.direct_s);
-        self.quiet_until = self.last.iter().map(|peer| peer.lives_until(self.base)).min().unwrap_or(SimTime::MAX);
-        // No silence is significant only after longer.
-        let longest_s = MAX_TIMEOUTS * self.base.direct_s;
-        let mut near = std::mem::take(&mut self.near);
-        near.retain(|peer| self.get(*peer).is_some_and(|known| now.since(known.direct) <= longest_s));
-        let heard = near.iter().filter_map(|peer| Some(self.get(*peer)?.direct)).min();
-        self.direct_until = heard.map_or(SimTime::MAX, |heard| self.certain_until(heard));
-        self.near = near;
-        self.all_but = lowest_but_one(&self.ids);
+        self.look_near(now);
+        if self.far_quiet_until < self.next_look {
+            self.look_far(now);
+        }
+        self.all_but = self.all_but.or_else(|| lowest_but_one(&self.ids));
         self.beacons.tidy();
+    }
+
+    fn look_near(&mut self, now: SimTime) {
+        let mut near = std::mem::take(&mut self.near);
+        (self.near_quiet_until, self.direct_until) = (SimTime::MAX, SimTime::MAX);
+        near.retain(|id| {
+            let Some(peer) = self.get(*id).copied() else { return false };
+            let (quiet_until, stays) = (peer.lives_until(self.base), !self.is_far(&peer, now));
+            let until = if stays { &mut self.near_quiet_until } else { &mut self.far_quiet_until };
+            *until = (*until).min(quiet_until);
+            if stays {
+                self.direct_until = self.direct_until.min(self.certain_until(peer.direct));
+            }
+            stays
+        });
+        self.near = near;
+    }
+
+    fn look_far(&mut self, now: SimTime) {
+        let far = self.last.iter().filter(|peer| peer.is_relayed() || self.is_far(peer, now));
+        self.far_quiet_until = far.map(|peer| peer.lives_until(self.base)).min().unwrap_or(SimTime::MAX);
+    }
+
+    /// Whether a peer certainly does not count as heard without a relay: no silence is significant only after longer.
+    fn is_far(&self, peer: &Peer, now: SimTime) -> bool {
+        now.since(peer.direct) > MAX_TIMEOUTS * self.base.direct_s
     }
 
     /// Until when a peer that is heard at this time certainly counts as heard.
@@ -221,7 +261,7 @@ impl Peers {
 
     /// Whether no peer is silent for too long, which needs no look at each.
     fn all_live(&self, now: SimTime) -> bool {
-        now <= self.quiet_until
+        now <= self.near_quiet_until.min(self.far_quiet_until)
     }
 
     /// The index of a peer, or where it belongs. Once all drones have been heard, no search is needed: the index is the id,
@@ -263,7 +303,8 @@ impl Peers {
 
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
-        self.near(move |peer| peer.is_direct(now, self.base))
+        let all = now <= self.direct_until;
+        self.near(move |place| all || self.last[place].is_direct(now, self.base))
     }
 
     /// Number of peers that may count as heard without a relay.
@@ -273,13 +314,13 @@ impl Peers {
 
     /// The peers whose own beacon was heard within the last `within_s`, by id.
     pub(crate) fn heard_within(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
-        self.near(move |peer| now.since(peer.direct) <= within_s)
+        self.near(move |place| now.since(self.last[place].direct) <= within_s)
     }
 
-    /// Those of the peers that may count as heard without a relay which do, by id.
-    fn near(&self, counts: impl Fn(&Peer) -> bool + Clone) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
+    /// Those of the peers that may count as heard without a relay which do, by id. `counts`: whether the peer at an index does.
+    fn near(&self, counts: impl Fn(usize) -> bool + Clone) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let near = self.near.iter().filter_map(|&id| Some((id, self.place(id).ok()?)));
-        let near = near.filter(move |&(_, place)| counts(&self.last[place]));
+        let near = near.filter(move |&(_, place)| counts(place));
         near.map(|(id, place)| (id, self.beacons.get(place)))
     }
 
@@ -410,14 +451,14 @@ impl Peers {
         self.all_live(now) || self.last[index].lives(now, self.base)
     }
 
-    /// Adds how old the last beacons of the living peers are, s, by id.
-    pub fn ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
-        let age_s = |stamp: &SimTime| now.since(*stamp);
-        if self.all_live(now) {
-            return ages.extend(self.stamps().iter().map(age_s));
-        }
-        let living = self.stamps().iter().zip(&self.last).filter(|(_, peer)| peer.lives(now, self.base));
-        ages.extend(living.map(|(stamp, _)| age_s(stamp)));
+    /// Adds how old the last beacons of living peers are, s. Of more than [`AGES`] peers it looks at so many, in turn from the one at the index
+    /// `first` on, modulo the number of peers.
+    pub fn ages_s(&self, now: SimTime, first: u64, ages: &mut Vec<f64>) {
+        let count = self.ids.len();
+        let first = if count > AGES { (first % count as u64) as usize } else { 0 };
+        let places = (first..count).chain(0..first).take(AGES);
+        let living = places.filter(|&place| self.is_living_at(place, now));
+        ages.extend(living.map(|place| now.since(self.stamps()[place])));
     }
 
     fn known(&self) -> impl Iterator<Item = (DroneId, &Peer, Beacon<'_>)> + Clone {
@@ -544,7 +585,7 @@ mod tests {
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
             let mut found = Vec::new();
-            peers.ages_s(now, &mut found);
+            peers.ages_s(now, 0, &mut found);
             assert_eq!(found, ages);
             let direct: Vec<DroneId> = peers.direct(now).map(|(id, _)| id).collect();
             let hash = if [0, 9].contains(&direct.len()) { 0 } else { hash_of(direct.into_iter().chain([DroneId(9)])) };

@@ -3,6 +3,7 @@
 
 use crate::avoidance;
 use crate::formation_planner::FormationPlanner;
+use crate::grouping::is_without_queues;
 use crate::joint_planner::JointPlanner;
 use crate::onward::OnwardPlanner;
 use crate::params::LeadingParams;
@@ -69,7 +70,7 @@ impl Planner {
         let survey = Survey::new(s, set)?;
         let others = s.others_before(set);
         self.interim = 0;
-        if others.is_empty() {
+        if others.is_empty() || is_without_queues(s, survey.routes()) {
             return avoidance::alternatives(s, set, &survey);
         }
         let joint = self.joint.decide(s, set, &others, &survey, say)?;

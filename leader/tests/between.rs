@@ -146,7 +146,7 @@ fn all_drones_are_heard_of_where_bandwidth_is_short() {
         for _ in 0..40 {
             swarm.run(1.0);
             let mut ages_s = Vec::new();
-            swarm.drones[0].as_ref().unwrap().peers().ages_s(swarm.now(), &mut ages_s);
+            swarm.drones[0].as_ref().unwrap().peers().ages_s(swarm.now(), 0, &mut ages_s);
             let oldest_s = ages_s.iter().copied().fold(0.0, f64::max);
             assert!(ages_s.len() == 59 && oldest_s < limit_s, "{bandwidth_bytes_per_s} bytes/s: {ages_s:?}");
         }

@@ -160,6 +160,24 @@ fn a_drone_that_was_restarted_gets_its_assignment_again() {
     assert_eq!(middle.passes_on(100), BTreeSet::from([restarted]));
 }
 
+/// Assignments that all drones obeyed before this drone had its turn are never said, unless their drones fall silent: others may take those for
+/// members of no part.
+#[test]
+fn an_assignment_that_was_never_said_is_said_once_if_its_drone_falls_silent() {
+    let mut middle = Middle::new();
+    let seconds = |middle: &mut Middle, count: u32, silent: std::ops::Range<u32>| {
+        let second = |_| {
+            middle.hear_of((3..DRONES).filter(|drone| !silent.contains(drone)), PLAN);
+            middle.passes_on(50)
+        };
+        (0..count).flat_map(second).collect::<Vec<_>>()
+    };
+    seconds(&mut middle, 100, 0..0);
+    middle.hear_assignments();
+    assert_eq!(seconds(&mut middle, 5, 0..0), []);
+    assert_eq!(seconds(&mut middle, 24, 40..43), [40, 41, 42]);
+}
+
 /// Drone 1, which heard from drone 2 that `claimant` leads the first part of a split, and then learnt that it is in that part.
 fn told_of_a_part_led_by(claimant: u32) -> Middle {
     let mut middle = Middle::new();

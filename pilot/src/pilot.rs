@@ -12,8 +12,8 @@ pub trait Pilot: Send {
     /// Steps one tick. `inbox`: the messages received since the step before. The pilot says through `out` what it has to say.
     fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command;
 
-    /// Replaces the contents of `ages` with the ages at `now` of what it knows of its peers, s, one per known peer. They go
-    /// into the statistics. The default knows of none.
+    /// Replaces the contents of `ages` with the ages at `now` of what it knows of its peers, s: one per known peer, or those of a sample. They
+    /// go into the statistics. The default knows of none.
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         let _ = now;
         ages.clear();

@@ -1,8 +1,9 @@
-//! What a drone hears does not grow with the swarm, where radios have a limited range.
+//! What a drone hears does not grow with the swarm, where radios have a limited range, and a large swarm needs no more plans.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
 
+use skein_protocol::message::Topic;
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
 use skein_runtime::{PilotRegistry, inline};
 use support::scenario;
@@ -44,4 +45,25 @@ fn heard_per_tick(drones: u32) -> f64 {
 fn a_drone_of_a_large_swarm_hears_no_more_than_one_of_a_small_one() {
     let [small, large] = [100, 400].map(heard_per_tick);
     assert!(large < 1.1 * small, "{small} messages per tick with 100 drones, {large} with 400");
+}
+
+/// Counts rows of arrivals that are sent.
+#[derive(Default)]
+struct Rows(usize);
+
+impl RecordSink for Rows {
+    fn take(&mut self, record: RecordView<'_>) -> Result<(), SinkError> {
+        self.0 += record.frames.iter().filter(|air| air.frame.kind == Topic::Arrivals as u16).count();
+        Ok(())
+    }
+}
+
+/// The leaders of two parts would have to exchange when each of their drones can be where, which all drones of a large swarm pass on. But drones
+/// that pass in lanes of their own do not wait for each other.
+#[test]
+fn leaders_of_a_large_swarm_exchange_no_arrivals_where_drones_do_not_queue() {
+    let sets = [("formation.drones", "150"), ("obstacle.0.centre_m", "[420, 0]"), ("time.timeout_s", "31")];
+    let mut rows = Rows::default();
+    inline::run(&scenario("grid", &sets), &PilotRegistry::built_in().unwrap(), &mut rows, || None).unwrap();
+    assert_eq!(rows.0, 0);
 }
