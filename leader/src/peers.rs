@@ -245,7 +245,7 @@ impl Peers {
     }
 
     fn look_far(&mut self, now: SimTime) {
-        let far = self.last.iter().filter(|peer| peer.is_relayed() || self.is_far(peer, now));
+        let far = self.last.iter().filter(|peer| self.is_far(peer, now));
         self.far_quiet_until = far.map(|peer| peer.lives_until(self.base)).min().unwrap_or(SimTime::MAX);
     }
 
@@ -570,19 +570,27 @@ mod tests {
 
     #[test]
     fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
-        let mut peers = Peers::new(10, 1.0);
+        let mut peers = Peers::new(10, 1.0).relayed_less(2.0);
+        let mut was_silent = std::collections::BTreeSet::new();
         for tick in 0..600u32 {
             let now = SimTime::from_secs(0.1 * f64::from(tick));
-            for id in (0..9).filter(|id| tick.wrapping_mul(0x9e37_79b9).rotate_left(5 * id) % 16 < 2 + id) {
-                // Drone 5 falls silent.
-                if id != 5 || tick < 300 {
-                    peers.hear(now, DroneId(id), pose(0.1 * f64::from(tick), 0.0));
+            // Some are far away for a while, and for some of that time no word of them comes.
+            let away = |id: u32| (tick / 60 + id) % 3;
+            let heard = |id: u32| tick.wrapping_mul(0x9e37_79b9).rotate_left(5 * id) % 16 < 2 + id;
+            // Drone 5 falls silent.
+            for id in (0..9).filter(|id| heard(*id) && (*id != 5 || tick < 300)) {
+                let pose = pose(0.1 * f64::from(tick), 0.0);
+                match (id, away(id)) {
+                    (3.., 1) if id % 2 == 0 => {}
+                    (3.., 1 | 2) => peers.hear_of(now, DroneId(id), pose),
+                    _ => peers.hear(now, DroneId(id), pose),
                 }
             }
             let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
             let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, peers.base));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
+            was_silent.extend(silent.iter().copied());
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
             let mut found = Vec::new();
             peers.ages_s(now, 0, &mut found);
@@ -594,9 +602,24 @@ mod tests {
             assert!((0..12).map(DroneId).all(|id| finder(id) == peers.last(id).map(|beacon| beacon.stamp())));
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
+        assert!(was_silent.len() > 1 && was_silent.len() < 9, "{was_silent:?}");
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));
         peers.forget(DroneId(5));
         assert!(peers.last(DroneId(5)).is_none() && peers.last(DroneId(6)).is_some());
+    }
+
+    #[test]
+    fn the_ages_of_many_peers_are_told_in_turn() {
+        let mut peers = Peers::new(200, 1.0);
+        let now = SimTime::from_secs(2.0);
+        (0..200).for_each(|id| peers.hear(now, DroneId(id), pose(1.0 + 0.005 * f64::from(id), 0.0)));
+        let told = |first| {
+            let mut ages_s = Vec::new();
+            peers.ages_s(now, first, &mut ages_s);
+            ages_s.iter().map(|age_s| ((1.0 - age_s) / 0.005).round() as u32).collect::<Vec<_>>()
+        };
+        assert_eq!(told(100), (100..164).collect::<Vec<_>>());
+        assert_eq!(told(200 + 180), (180..200).chain(0..44).collect::<Vec<_>>());
     }
 
     #[test]

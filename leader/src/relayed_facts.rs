@@ -39,7 +39,7 @@ enum Need {
     Now,
     /// None needs it now, but time alone can change that.
     Later,
-    /// None needs it, unless what the drone obeys changes, or it falls silent.
+    /// None needs it, unless what the drone obeys changes.
     Over,
 }
 
@@ -53,7 +53,7 @@ struct Relayed {
     /// When it was last heard.
     heard: SimTime,
     gossip: Gossip,
-    /// When it is looked at next; `None` if it need not be passed on again, unless [`RelayedFacts::wake_some`] is called.
+    /// When it is looked at next; `None` if it need not be passed on again, unless [`RelayedFacts::wake`] is called.
     turn: Option<SimTime>,
 }
 
@@ -66,8 +66,6 @@ pub(crate) struct RelayedFacts {
     known: FactStore<Relayed>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
-    /// When it next looks for silent drones.
-    next_look: SimTime,
     /// No message is forgotten earlier than [`RELAY_MEMORY_S`] after this.
     heard_since: SimTime,
     /// For how long a passage is remembered, s. Its drone goes on saying it, so once it is forgotten it is passed on again. In a large swarm
@@ -85,7 +83,6 @@ impl RelayedFacts {
             room,
             known: FactStore::new(params.drones),
             turns: Turns::default(),
-            next_look: params.start,
             heard_since: params.start,
             passage_s: passage_s(params.drones),
         }
@@ -156,23 +153,8 @@ impl RelayedFacts {
 
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
-        self.wake_some(now, drone, |_| true);
-    }
-
-    /// The assignments of a drone that has fallen silent are said once, unless they were said.
-    fn wake_silent(&mut self, k: &Knowledge, now: SimTime) {
-        if now < self.next_look {
-            return;
-        }
-        self.next_look = now.after(self.repeat_s * UNWANTED_REPEATS);
-        for (drone, _) in k.peers().silent(now) {
-            self.wake_some(now, drone, |one| one.gossip.is_first());
-        }
-    }
-
-    fn wake_some(&mut self, now: SimTime, drone: DroneId, wakes: impl Fn(&Relayed) -> bool) {
         let turn = Gossip::varying(now, self.repeat_s, self.me).next_turn();
-        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn.is_none() && wakes(one)) {
+        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn.is_none()) {
             one.turn = Some(turn);
             self.turns.add(turn, Subject::Part(scope, drone));
         }
@@ -181,7 +163,6 @@ impl RelayedFacts {
     /// Says what is due, until `last` messages are said. Assignments of one group share messages. This drone is at `position`,
     /// world frame, m.
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
-        self.wake_silent(k, now);
         for subject in self.turns.due(now).take(DUE_AT_ONCE).filter(|_| say.len() < last) {
             if let Subject::Part(_, drone) = subject {
                 self.known.warm(drone, |one| one.heard);
@@ -288,6 +269,8 @@ fn need(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> Need {
         (Subject::Plan(scope), Fact::Plan(plan)) => now_or_later(is_plan_wanted(k, now, scope, plan)),
         (Subject::Part(..), Fact::Part(part)) => match k.peers().last_of_living(part.drone, now) {
             Some(pose) if is_late(&pose, part.id.ballot, part.id.epoch) => Need::Now,
+            // Unless it was said, it is said once if the drone falls silent.
+            Some(_) if one.gossip.is_first() => Need::Later,
             Some(_) => Need::Over,
             None => now_or_later(one.gossip.is_first()),
         },
@@ -329,7 +312,6 @@ mod tests {
             room: 64,
             known: FactStore::new(8),
             turns: Turns::default(),
-            next_look: SimTime::ZERO,
             heard_since: SimTime::ZERO,
             passage_s: RELAY_MEMORY_S,
         };
@@ -365,7 +347,6 @@ mod tests {
                 room: 64,
                 known: FactStore::new(9),
                 turns: Turns::default(),
-                next_look: SimTime::ZERO,
                 heard_since: SimTime::ZERO,
                 passage_s: passage_s(drones),
             };

@@ -133,7 +133,7 @@ pub(crate) const PASSAGES: f64 = 64.0;
 pub(crate) const FORGET_S: f64 = 3.0;
 /// Time between two counts of the drones that share the bandwidth, s. 1. By hand.
 pub(crate) const COUNT_S: f64 = 1.0;
-/// Time between two looks for drones that have fallen silent, to which assignments may have to be said, in repeat periods. No unit. 8: with the default period
+/// An assignment that its drone obeys is looked at again after this many repeat periods. No unit. 8: with the default period
 /// 1.6 s. By hand.
 pub(crate) const UNWANTED_REPEATS: f64 = 8.0;
 /// A message of a leader whose stamp lies further in the future is not believed, s. 2: twice the offset of two clocks that are

@@ -325,7 +325,8 @@ pub struct Messages {
     /// Time from sending to delivery.
     #[schemars(with = "PercentilesSchema")]
     pub delay_s: Percentiles,
-    /// Age of the last known pose of another drone.
+    /// Age of the last known pose of another drone, each time a drone sends its own. A drone that knows more than 64 others looks at 64 of
+    /// them each time.
     #[schemars(with = "PercentilesSchema")]
     pub age_s: Percentiles,
 }
