@@ -15,7 +15,7 @@ const MAX_DELAY_S: f64 = 60.0;
 /// Time between two looks for silent peers, in time-outs. A look at all of them costs as much as a few beacons per peer.
 const LOOK_TIMEOUTS: f64 = 0.25;
 
-/// Of so many peers the age is told at a time.
+/// Of so many peers the age is told at a time. By hand.
 const AGES: usize = 64;
 
 /// Before every time of a mission.
@@ -451,8 +451,8 @@ impl Peers {
         self.all_live(now) || self.last[index].lives(now, self.base)
     }
 
-    /// Adds how old the last beacons of living peers are, s. Of more than [`AGES`] peers it looks at so many, in turn from the one at the index
-    /// `first` on, modulo the number of peers.
+    /// Adds how old the last beacons of living peers are, s. Of more than 64 peers it looks at 64, in turn from the one at the index `first`
+    /// on, modulo the number of peers.
     pub fn ages_s(&self, now: SimTime, first: u64, ages: &mut Vec<f64>) {
         let count = self.ids.len();
         let first = if count > AGES { (first % count as u64) as usize } else { 0 };
