@@ -1,5 +1,5 @@
-//! Which drone flies which route past an obstacle set, if no other group has the set ahead (paper, Algorithm 3). Has no
-//! state: the groupings follow from the situation alone.
+//! Which drone flies which route past an obstacle set, if no other group has the set ahead, or if no drone has to wait for another one
+//! (paper, Algorithm 3). Has no state: the groupings follow from the situation alone.
 
 use crate::candidates::{candidates, shortest_and_rule};
 use crate::grouping::{Grouping, arrival_table, ranks};

@@ -1,4 +1,5 @@
-//! What a drone hears does not grow with the swarm, where radios have a limited range, and a large swarm needs no more plans.
+//! What a drone hears does not grow with the swarm, where radios have a limited range. Leaders exchange
+//! no arrivals that they do not need.
 #![allow(clippy::unwrap_used, reason = "a test fails where it cannot go on")]
 
 mod support;
