@@ -1,6 +1,6 @@
 //! Return of a drone that waits in vain for others that it has lost: where radios do not reach far, it flies back to where it heard them
-//! last. Drones that keep apart by words cannot go on past each other's lines until they hear each other again (docs/safety.md). Drones that
-//! range each other can, but parts of a swarm that settled out of each other's reach would stay apart.
+//! last, or to where it ranges them. Drones that keep apart by words cannot go on past each other's lines until they hear each other again
+//! (docs/safety.md). Drones that range each other can, but parts of a swarm that settled out of each other's reach would stay apart.
 
 use crate::tuning::{IN_REACH, LEAD_FOUND_S, LOOK_FOR_LOST_S, LOST_PACE};
 use skein_leader::beacons::Beacon;
@@ -33,13 +33,35 @@ pub(crate) struct Others<'a> {
     pub(crate) starts_m: &'a [Vec2],
     /// Deceleration of full braking, m/s².
     pub(crate) braking_mps2: f64,
+    /// Distance over which drones hear each other, m; infinite without a limit. Then none is lost.
+    pub(crate) range_m: f64,
     /// Whether it keeps apart from them by words.
     pub(crate) by_words: bool,
 }
 
 impl Others<'_> {
-    /// The drones that are lost: neither heard nor ranged.
+    /// The drones that are lost: those that are ranged but too far away to be heard, and those that are neither ranged nor heard.
     fn lost(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
+        self.ranged(senses).chain(self.unseen(senses))
+    }
+
+    /// The drones that are ranged but too far away to be heard.
+    fn ranged(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
+        let now = senses.now;
+        let silent = senses.neighbours.iter().filter(move |seen| !self.peers.is_living(seen.drone, now));
+        let far = silent.filter(|seen| seen.position().norm() > IN_REACH * self.range_m);
+        far.map(move |seen| Lost { drone: seen.drone, since: now, place: senses.position() + seen.position() })
+    }
+
+    /// Where to look for a drone, world frame, m: where it is ranged, but only into its reach; or else `place`.
+    fn place_of(&self, lost: DroneId, senses: &Senses<'_>, place: Vec2) -> Vec2 {
+        let Some(seen) = senses.neighbours.iter().find(|seen| seen.drone == lost) else { return place };
+        let is_far = seen.position().norm() > IN_REACH * self.range_m;
+        senses.position() + if is_far { seen.position() } else { Vec2::zeros() }
+    }
+
+    /// The drones that are neither ranged nor heard.
+    fn unseen(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
         let silent = self.peers.silent(senses.now);
         let stopped = move |pose: Beacon<'_>| pose.stopped(self.braking_mps2);
         let heard = silent.map(move |(drone, pose)| Lost { drone, since: pose.stamp(), place: stopped(pose) });
@@ -54,9 +76,9 @@ impl Others<'_> {
 #[derive(Clone, Copy, Debug)]
 struct Lost {
     drone: DroneId,
-    /// When it was heard last.
+    /// When it was ranged or heard last.
     since: SimTime,
-    /// Where it would have stopped then, world frame, m.
+    /// Where it is ranged, or would have stopped when it was heard last, world frame, m.
     place: Vec2,
 }
 
@@ -65,8 +87,6 @@ struct Lost {
 pub(crate) struct Reunion {
     /// Nominal speed, m/s.
     speed_mps: f64,
-    /// Distance over which drones hear each other, m; infinite without a limit. Then none is lost.
-    range_m: f64,
     /// How long the drone waits in one place before it looks for a lost one for the first time, s.
     patience_s: f64,
     task: Task,
@@ -79,7 +99,7 @@ pub(crate) struct Reunion {
 enum Task {
     /// Nothing: the drone goes its own way. Where it has been since when, world frame, m.
     Own { stay: Option<(SimTime, Vec2)> },
-    /// It flies to where a lost drone was heard last, world frame, m.
+    /// It flies to where a lost drone is or was heard last, world frame, m.
     Look { lost: DroneId, place: Vec2, until: SimTime },
     /// It goes its own way no faster than the drone that it has found.
     Lead { found: DroneId, until: SimTime },
@@ -90,7 +110,6 @@ impl Reunion {
     pub(crate) fn new(drones: u32, planner: &PlannerParams) -> Self {
         Self {
             speed_mps: planner.speed_mps,
-            range_m: planner.radio_range_m,
             // If all drones wait one behind another, the last one has passed.
             patience_s: LOOK_FOR_LOST_S + planner.file_s(drones),
             task: Task::Own { stay: None },
@@ -100,18 +119,17 @@ impl Reunion {
 
     /// The place to fly back to, world frame, m. `None` while the drone goes its own way.
     pub(crate) fn place(&mut self, senses: &Senses<'_>, others: &Others<'_>) -> Option<Vec2> {
-        if self.range_m.is_infinite() {
+        if others.range_m.is_infinite() {
             return None;
         }
         let (now, position) = (senses.now, senses.position());
         match self.task {
             Task::Own { stay } => self.wait(senses, others, stay),
             Task::Look { lost, place, until } => {
-                let mut all = others.lost(senses);
-                if all.all(|one| one.drone != lost) {
+                if others.peers.is_living(lost, now) {
                     (self.task, self.failed) = (Task::Lead { found: lost, until: now.after(LEAD_FOUND_S) }, 0);
                 } else if now < until {
-                    return Some(place);
+                    return Some(others.place_of(lost, senses, place));
                 } else {
                     (self.task, self.failed) = (Task::Own { stay: None }, self.failed + 1);
                 }
@@ -125,7 +143,7 @@ impl Reunion {
                     self.task = Task::Own { stay: None };
                 }
                 let place = others.peers.last_of_living(found, now)?.extrapolated(now);
-                Some(place).filter(|place| (place - position).norm() > IN_REACH * self.range_m)
+                Some(place).filter(|place| (place - position).norm() > IN_REACH * others.range_m)
             }
         }
     }
@@ -172,6 +190,7 @@ impl Reunion {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use skein_protocol::downlink::SensedNeighbour;
     use skein_protocol::payload::Pose;
 
     const RANGE_M: f64 = 100.0;
@@ -181,13 +200,14 @@ mod tests {
         reunion: Reunion,
         peers: Peers,
         starts_m: Vec<Vec2>,
+        range_m: f64,
         by_words: bool,
     }
 
     impl Searcher {
-        fn new(radio_range_m: f64) -> Self {
-            let planner = PlannerParams { radio_range_m, ..crate::test_params::planner() };
-            Self { reunion: Reunion::new(2, &planner), peers: Peers::new(2, 1.0), starts_m: Vec::new(), by_words: true }
+        fn new(range_m: f64) -> Self {
+            let reunion = Reunion::new(2, &crate::test_params::planner());
+            Self { reunion, peers: Peers::new(2, 1.0), starts_m: Vec::new(), range_m, by_words: true }
         }
 
         /// Hears drone 0 at this abscissa, m, at this speed, m/s.
@@ -199,13 +219,19 @@ mod tests {
 
         /// Where it looks for drone 0, if it is at this abscissa, m.
         fn looks_at(&mut self, now_s: f64, x_m: f64) -> Option<f64> {
+            self.looks_at_seen(now_s, x_m, &[])
+        }
+
+        /// The same, if it ranges these drones.
+        fn looks_at_seen(&mut self, now_s: f64, x_m: f64, seen: &[SensedNeighbour]) -> Option<f64> {
             let at = ([x_m, 0.0, 0.0], [0.0; 3]);
-            let senses = Senses::new((0, SimTime::from_secs(now_s)), at, &[], &[], &[]);
+            let senses = Senses::new((0, SimTime::from_secs(now_s)), at, &[], seen, &[]);
             let others = Others {
                 me: DroneId(1),
                 peers: &self.peers,
                 starts_m: &self.starts_m,
                 braking_mps2: 5.0,
+                range_m: self.range_m,
                 by_words: self.by_words,
             };
             self.reunion.place(&senses, &others).map(|place| place.x)
@@ -273,5 +299,31 @@ mod tests {
             searcher.looks_at(second.into(), 0.0).is_some()
         });
         assert_eq!(queues.count(), 0);
+    }
+
+    /// Where drone 1, which stands at x = 0, looks for a drone that it ranges at this abscissa, m, but does not hear, at each second.
+    fn looks_at_ranged(x_m: f64, hears_from_s: u32) -> Vec<(u32, f64)> {
+        let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
+        let mut looks = Vec::new();
+        for second in 1..=200 {
+            if second >= hears_from_s {
+                searcher.hear(second.into(), x_m, 0.0);
+            }
+            let seen = [SensedNeighbour { drone: DroneId(0), position_m: [x_m, 0.0, 0.0], ..Zeroable::zeroed() }];
+            looks.extend(searcher.looks_at_seen(second.into(), 0.0, &seen).map(|x_m| (second, x_m)));
+        }
+        looks
+    }
+
+    #[test]
+    fn a_drone_comes_into_reach_of_one_that_it_ranges_but_does_not_hear() {
+        let far = looks_at_ranged(90.0, 1000);
+        // It has three times the patience. The flight may take 27 s, and it waits for 10 s.
+        assert_eq!(far, (115..152).map(|second| (second, 90.0)).collect::<Vec<_>>());
+        assert_eq!(looks_at_ranged(70.0, 1000), [], "that drone would be heard, if it could speak");
+        assert_eq!(looks_at_ranged(90.0, 1), [], "it is heard");
+        let found = looks_at_ranged(90.0, 130);
+        assert_eq!(found[..15], far[..15]);
+        assert!(found[15..].iter().all(|(second, _)| (130..191).contains(second)), "it stays in reach for a minute");
     }
 }

@@ -469,7 +469,8 @@ impl SwarmPilot {
         }
         let starts_m: &[Vec2] = if self.params.apart_by_words { &self.params.starts_m } else { &[] };
         let braking_mps2 = self.params.guidance.braking_mps2;
-        let others = Others { me: self.params.me, peers: self.leading.peers(), starts_m, braking_mps2, by_words };
+        let (me, range_m) = (self.params.me, self.params.planner.radio_range_m);
+        let others = Others { me, peers: self.leading.peers(), starts_m, braking_mps2, range_m, by_words };
         self.reunion.place(senses, &others)
     }
 

@@ -10,10 +10,10 @@ use crate::situation::Situation;
 use crate::slots::{self, Reformation};
 use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, STALLED_S};
 use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
-use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
+use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{GroupId, Phase, SimTime, Vec2};
-use std::iter;
+use skein_protocol::{GroupId, ObstacleId, Phase, SimTime, Vec2};
+use std::{iter, slice};
 
 /// Most steps by which the anchor moves on. Obstacles without end do not hold up the leader.
 const MAX_ANCHOR_STEPS: u32 = 10_000;
@@ -157,7 +157,8 @@ impl FormationPlanner {
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
         let taken = assign_pinned(method, positions, places, pin)?;
-        let plan = draft(s, phase, &[], anchor);
+        let passed = if phase == Phase::Reform { newest_passed(s) } else { Vec::new() };
+        let plan = draft(s, phase, &passed, anchor);
         let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
         let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
         let leaders = group_leaders(s.members, &groups, &s.params.destination);
@@ -175,6 +176,18 @@ impl FormationPlanner {
         };
         Some(PlanBundle { plan, parts: s.members.iter().enumerate().map(part).collect() })
     }
+}
+
+/// The obstacles that all members have passed, as far as the leader knows obstacles, ascending: when the formation closes, all sets that
+/// it knows are passed. If they are more than a plan can name, those that end farthest on.
+fn newest_passed(s: &Situation<'_>) -> Vec<ObstacleId> {
+    let sets = s.obstacles.sets().iter().filter(|set| !s.is_behind_goal(set));
+    let mut ids: Vec<ObstacleId> = sets.flatten().copied().collect();
+    let rear_m = |id: &ObstacleId| s.exit_x_m(slice::from_ref(id));
+    ids.sort_by(|a, b| rear_m(b).total_cmp(&rear_m(a)).then(a.cmp(b)));
+    ids.truncate(MAX_SET);
+    ids.sort_unstable();
+    ids
 }
 
 /// The slots of the members, relative to the front slot, m. At the goal, slots beside which a dead drone hangs are left free. A drone that

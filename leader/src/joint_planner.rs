@@ -135,7 +135,7 @@ impl JointPlanner {
             self.awaited = Some(awaited);
             return None;
         };
-        let survey = Survey::new(s, &awaited.set)?.with_kept(s.members, &awaited.kept);
+        let survey = Survey::with_kept(s, &awaited.set, &awaited.kept)?;
         let arrivals: Vec<Vec<f64>> = awaited.table.iter().map(arrivals_s).collect();
         let union = arrival_table(s, &arrivals, survey.routes())?;
         let grouping = own_grouping(s, &awaited.table, &survey, &union.assigned(&routes).ok()?);

@@ -30,7 +30,7 @@ pub struct Ledger {
     /// The plan of an earlier leader that split the group, if this drone obeys a plan for a part.
     origin: Option<PlanBundle>,
     sets: Vec<PlannedSet>,
-    /// The obstacles of sets that a formation of the whole swarm has ended. Its leader knew that all its drones had passed them.
+    /// The obstacles of sets that a formation of the whole swarm has ended, and that its leader says all its drones have passed.
     ended: Vec<ObstacleId>,
     /// Hash of `mine`.
     part_hash: u64,
@@ -277,7 +277,11 @@ impl Ledger {
             self.sets.push(PlannedSet { ids, tag, stamp, made, members, scope, routes, parts });
             self.sets.sort_by(|a, b| a.routes.gate_x_m().total_cmp(&b.routes.gate_x_m()));
         } else {
-            let ended = self.sets.drain(..).filter(|_| plan.phase() == Phase::Reform && plan.group == GroupId::ALL);
+            // A leader may close the formation because it does not know an obstacle that drones still have ahead.
+            let named = set_ids(&plan.set, plan.set_count);
+            let is_named = |set: &PlannedSet| set.ids.iter().all(|id| named.contains(id));
+            let of_all = plan.phase() == Phase::Reform && plan.group == GroupId::ALL;
+            let ended = self.sets.drain(..).filter(|set| of_all && is_named(set));
             self.ended.extend(ended.flat_map(|set| set.ids));
         }
         let parts = std::mem::take(&mut self.parts);

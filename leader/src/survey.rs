@@ -1,6 +1,6 @@
 //! What a leader finds out about an obstacle set before it plans for it.
 
-use crate::cost::{Trip, shortest, trips};
+use crate::cost::{Trip, shortest, trip, trips};
 use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::plan_exchange;
@@ -24,21 +24,37 @@ pub(crate) struct Survey<'a> {
 impl<'a> Survey<'a> {
     /// Surveys a set. `None` if one of its obstacles is not known.
     pub(crate) fn new(s: &Situation<'a>, set: &[ObstacleId]) -> Option<Self> {
-        let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
         let before = s.ledger.sets().iter().find(|p| p.ids == *set);
-        let member_trips = |m: &Member| {
-            let flight = s.params.flight(m.position);
-            trips(&earlier_legs(s.ledger, m, &routes), &routes, m.position, &flight)
-        };
-        let trips: Vec<Vec<Trip>> = s.members.iter().map(member_trips).collect();
-        let kept = s.members.iter().map(|m| before.and_then(|p| p.parts.get(m.id))).collect();
-        Some(Self { routes, trips, kept })
+        Self::of(s, set, |drone| before.and_then(|p| p.parts.get(drone)))
     }
 
     /// The same survey, with the assignments that members had at an earlier time.
-    pub(crate) fn with_kept(mut self, members: &[Member], kept: &'a BTreeMap<DroneId, SetPlace>) -> Self {
-        self.kept = members.iter().map(|m| kept.get(&m.id)).collect();
-        self
+    pub(crate) fn with_kept(
+        s: &Situation<'a>,
+        set: &[ObstacleId],
+        kept: &'a BTreeMap<DroneId, SetPlace>,
+    ) -> Option<Self> {
+        Self::of(s, set, |drone| kept.get(&drone))
+    }
+
+    /// Surveys a set past which some members have these assignments already. A member stays on its route even if it could not take that
+    /// route any more from where it is now.
+    fn of(s: &Situation<'a>, set: &[ObstacleId], kept: impl Fn(DroneId) -> Option<&'a SetPlace>) -> Option<Self> {
+        let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
+        let kept: Vec<Option<&SetPlace>> = s.members.iter().map(|m| kept(m.id)).collect();
+        let member_trips = |(m, kept): (&Member, &Option<&SetPlace>)| {
+            let (flight, earlier) = (s.params.flight(m.position), earlier_legs(s.ledger, m, &routes));
+            let mut trips = trips(&earlier, &routes, m.position, &flight);
+            if let Some(route) = kept.map(|part| usize::from(part.route))
+                && let Some(flown) = trips.get_mut(route)
+                && flown.arrival_s.is_infinite()
+            {
+                *flown = trip(&earlier, &routes, route, m.position, &flight);
+            }
+            trips
+        };
+        let trips: Vec<Vec<Trip>> = s.members.iter().zip(&kept).map(member_trips).collect();
+        Some(Self { routes, trips, kept })
     }
 
     /// The routes past the set.

@@ -6,9 +6,10 @@ mod swarm;
 use bytemuck::Zeroable;
 use skein_leader::channel_params::ChannelParams;
 use skein_leader::leading::Leading;
+use skein_leader::obstacles::set_ids;
 use skein_leader::params::{Between, Destination};
 use skein_protocol::payload::{Leadership, Presence, Present};
-use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, Phase, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, ObstacleId, Phase, SimTime, Vec2};
 use std::collections::BTreeSet;
 use swarm::air::{Air, Swarm};
 use swarm::{DEFAULT, params, wall};
@@ -49,6 +50,8 @@ fn groups_close_up_between_two_sets() {
     swarm.run(50.0);
     assert_eq!(swarm.disunion(0), None);
     assert!(groups(&swarm).iter().all(|(_, _, scope, phase)| (*scope, *phase) == (GroupId::ALL, Phase::Reform)));
+    let plan = swarm.side(0)[0].1.obeyed().unwrap().plan;
+    assert_eq!(set_ids(&plan.set, plan.set_count), [ObstacleId(1)], "the formation names what its drones have passed");
 }
 
 #[test]

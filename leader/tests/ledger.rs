@@ -15,11 +15,17 @@ const PARAMS: RouteParams =
     RouteParams { clearance_m: 15.0, half_gap_m: 15.0, planning_distance_m: 20.0, scale: Scale::FULL };
 const STAMP: PlanStamp = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch: 3 };
 
-/// The ledger of drone 1, which heard the plan past obstacle 0 and only its own assignment.
-fn ledger() -> Ledger {
+/// Obstacle 0.
+fn obstacles() -> Obstacles {
     let mut obstacles = Obstacles::new(4, 40.0);
     let shape = ConvexShape::rectangle(Vec2::new(200.0, 0.0), Vec2::new(10.0, 80.0), 0.0).unwrap();
     obstacles.learn(SimTime::ZERO, ObstacleId(0), shape, DroneId(0));
+    obstacles
+}
+
+/// The ledger of drone 1, which heard the plan past obstacle 0 and only its own assignment.
+fn ledger() -> Ledger {
+    let obstacles = obstacles();
     let mut ledger = Ledger::new(DroneId(1), 4, PARAMS);
     let (set, set_count) = set_array(&[ObstacleId(0)]);
     let plan = Plan {
@@ -60,4 +66,20 @@ fn a_lost_assignment_is_recovered_from_the_drones_beacon() {
     ledger.hear_place(DroneId(1), &beacon(STAMP, 0));
     assert_eq!(place_of(&ledger, 1), Some((0, 1)), "what was heard as a part stays");
     assert!(!ledger.obeyed().unwrap().parts.contains(DroneId(2)), "it is not said as if its leader had said it");
+}
+
+/// The leader of a formation may not know an obstacle that others have planned for.
+#[test]
+fn a_formation_ends_the_sets_that_its_leader_says_are_passed() {
+    for (passed, ended) in [(vec![], vec![]), (vec![7], vec![]), (vec![0, 7], vec![ObstacleId(0)])] {
+        let (mut ledger, obstacles) = (ledger(), obstacles());
+        let id = PlanStamp { epoch: 4, ..STAMP };
+        let (set, set_count) = set_array(&passed.into_iter().map(ObstacleId).collect::<Vec<_>>());
+        let phase = Phase::Reform.to_wire();
+        let plan = Plan { id, group: GroupId::ALL, phase, members: 4, set, set_count, ..Plan::zeroed() };
+        ledger.hear_plan(&plan, &obstacles);
+        ledger.hear_assignment(&Assignment { id, drone: DroneId(1), ..Assignment::zeroed() }, &obstacles);
+        assert!(ledger.stamp() == id && ledger.sets().is_empty(), "the drone flies in formation");
+        assert_eq!(ledger.take_ended(), ended);
+    }
 }

@@ -267,7 +267,8 @@ pub struct Plan {
     pub routes: u32,
     /// Number of entries of `set` in use, at most [`MAX_SET`].
     pub set_count: u32,
-    /// The obstacles of the set, in ascending order.
+    /// In ascending order: the obstacles of the set while avoiding; the obstacles that all drones of the plan have passed, of more than
+    /// [`MAX_SET`] those that end farthest on, while re-forming; none while cruising.
     pub set: [ObstacleId; MAX_SET],
     /// Always 0.
     pub reserved: u32,

@@ -7,7 +7,11 @@ use skein_protocol::record::Outcome;
 use support::{fly_to_the_end, parse, scenario};
 
 fn assert_reached(name: &str, strategy: &str) {
-    let scenario = scenario(&format!("hard/{name}"), &[("strategy", &format!("\"{strategy}\""))]);
+    assert_reached_with(name, &[("strategy", &format!("\"{strategy}\""))]);
+}
+
+fn assert_reached_with(name: &str, keys: &[(&str, &str)]) {
+    let scenario = scenario(&format!("hard/{name}"), keys);
     let world = fly_to_the_end(&scenario, None);
     assert_eq!(world.ended(), Some(Outcome::Reached), "{name}");
     let (separation_m, clearance_m) = (world.min_separation_m(), world.min_clearance_m());
@@ -264,4 +268,13 @@ fn a_mission_without_a_way_is_stuck_at_once() {
     let text = format!("[formation]\ndrones = 1\n{}", walls.concat());
     let world = fly_to_the_end(&parse(&text, &[]), None);
     assert_eq!((world.ended(), world.tick()), (Some(Outcome::Stuck), 1));
+}
+
+/// With these seeds, drones waited for one that they ranged and that no drone heard (1, 38), or the formation closed before all drones
+/// had passed a wall that its leader did not know (4, 12).
+#[test]
+fn parts_of_a_restarted_swarm_find_each_other() {
+    for seed in ["1", "38", "4", "12"] {
+        assert_reached_with("restarts-in-a-corridor", &[("seed", seed)]);
+    }
 }

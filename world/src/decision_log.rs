@@ -6,7 +6,7 @@ use skein_protocol::message::Topic;
 use skein_protocol::payload::{Assignment, NO_ROUTE, Plan};
 use skein_protocol::record::EventKind;
 use skein_protocol::slot::Slot;
-use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, Phase, PlanStamp, SimTime};
 use std::collections::BTreeSet;
 
 /// What has been logged about one drone as a leader. Only its latest plan counts: a superseded plan never comes back.
@@ -92,13 +92,15 @@ impl DecisionLog {
 }
 
 fn grouping(plan: &Plan) -> EventKind {
+    // A formation names those that are passed.
+    let ahead = plan.set.iter().filter(|_| plan.phase() == Phase::Avoid);
     EventKind::Grouping {
         plan: plan.id,
         group: plan.group.to_string(),
         phase: plan.phase(),
         members: plan.members,
         routes: plan.routes,
-        obstacles: plan.set.iter().take(plan.set_count as usize).copied().collect(),
+        obstacles: ahead.take(plan.set_count as usize).copied().collect(),
         predicted_s: plan.predicted_s.is_finite().then_some(plan.predicted_s),
     }
 }
