@@ -2,7 +2,7 @@
 //! obey the same plan, and few wait in a queue.
 
 use crate::shared_values::SharedValues;
-use skein_protocol::payload::{MAX_PLACES, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
+use skein_protocol::payload::{MAX_PLACES, POSE_BEFORE, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
 use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, horizontal};
 use std::fmt;
 use std::hint::black_box;
@@ -260,6 +260,12 @@ impl Beacon<'_> {
     #[must_use]
     pub fn is_impaired(&self) -> bool {
         self.flags() & POSE_IMPAIRED != 0
+    }
+
+    /// See [`Pose::is_before`].
+    #[must_use]
+    pub fn is_before(&self) -> bool {
+        self.flags() & POSE_BEFORE != 0
     }
 
     /// A hash of the drones that the drone hears without a relay.

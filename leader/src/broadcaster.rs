@@ -11,7 +11,9 @@ use crate::params::LeadingParams;
 use crate::plan_bundle::PlanBundle;
 use crate::relays::Relays;
 use crate::tuning::{FAR_REPEATS, NEWS_TURNS, UNPACED};
-use skein_protocol::payload::{Assignment, MAX_PLACES, Obstacle, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace};
+use skein_protocol::payload::{
+    Assignment, MAX_PLACES, Obstacle, POSE_BEFORE, POSE_IMPAIRED, POSE_LEADS, Passed, Pose, QueuePlace,
+};
 use skein_protocol::{Ballot, DroneId, Message, ObstacleId, Phase, PlanStamp, SimTime, flag, raised};
 use std::collections::BTreeMap;
 
@@ -199,6 +201,7 @@ impl Broadcaster {
 
 /// The beacon of this drone, without what it hears.
 fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_PLACES]) -> Pose {
+    let (leads, impaired) = (flag(k.election().leads(), POSE_LEADS), flag(k.is_impaired(), POSE_IMPAIRED));
     Pose {
         stamp: now,
         position_m: raised(own.position, own.altitude_m),
@@ -208,7 +211,7 @@ fn pose(k: &Knowledge, now: SimTime, own: &OwnState, places: &[QueuePlace; MAX_P
         group: k.ledger().group(),
         term: k.election().obeyed(),
         incarnation: k.incarnation(),
-        flags: flag(k.election().leads(), POSE_LEADS) | flag(k.is_impaired(), POSE_IMPAIRED),
+        flags: leads | impaired | flag(k.is_before(), POSE_BEFORE),
         hears: 0,
     }
 }

@@ -63,6 +63,10 @@ impl FormationPlanner {
             if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
                 return self.assign(s, Phase::Reform);
             }
+            if obeyed.is_some_and(|bundle| ends_before_obstacle(bundle, s)) && self.pace.allows(s) {
+                self.pace.note(s);
+                return self.assign(s, Phase::Reform);
+            }
             if let Some(plan) = obeyed.and_then(|bundle| self.avoid_dead(s, bundle)) {
                 return Some(plan);
             }
@@ -204,7 +208,7 @@ fn slots_of(s: &Situation<'_>, phase: Phase) -> Vec<Vec2> {
 
 /// Where the front slot goes: the goal; or the mean position of the members, moved on until it is clear of obstacles and
 /// of dead drones. With a limited range, drones that are missing may be out of reach: the members do not wait farther on than where
-/// all parts of the swarm come.
+/// all parts of the swarm come. They wait there if one of them has an obstacle ahead.
 fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     if let (Destination::Goal { front_m }, Phase::Reform) = (s.params.destination, phase) {
         return front_m;
@@ -217,15 +221,21 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     }
     let misses = s.params.radio_range_m.is_finite() && !s.silent.is_empty();
     let x = if misses { x.min(meeting_x_m(s, shape)) } else { x };
+    let x = if is_before_obstacle(s) { x.max(past_x_m(s, shape)) } else { x };
     moved_on(s, shape, Vec2::new(x, s.params.course_y_m))
 }
 
 /// The least abscissa of the front slot beyond the stop for which all slots lie past all known obstacles, m.
 fn meeting_x_m(s: &Situation<'_>, shape: &[Vec2]) -> f64 {
+    past_x_m(s, shape).max(s.params.destination.stop_x_m())
+}
+
+/// The least abscissa of the front slot for which all slots lie past all known obstacles, m; −∞ without obstacles.
+fn past_x_m(s: &Situation<'_>, shape: &[Vec2]) -> f64 {
     let last = shape.iter().map(|slot| slot.x).fold(0.0, f64::min);
     let past = |rear_m: f64| rear_m + s.params.routes.planning_distance_m - last;
     let rears = s.obstacles.iter().map(|(_, known)| known.shape.bounds().1.x);
-    rears.map(past).fold(s.params.destination.stop_x_m(), f64::max)
+    rears.map(past).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The anchor, moved on until the slots of the shape are clear of obstacles and of dead drones.
@@ -309,6 +319,18 @@ fn has_stopped_short(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
     let Destination::Goal { front_m } = s.params.destination else { return false };
     let (anchor, velocity) = bundle.plan.anchor_at(s.now);
     bundle.plan.phase() == Phase::Cruise && velocity == Vec2::zeros() && (anchor - front_m).norm() > 0.0
+}
+
+/// Whether a member has an obstacle ahead that the formation leaves behind it.
+fn is_before_obstacle(s: &Situation<'_>) -> bool {
+    s.members.iter().any(|m| m.before)
+}
+
+/// Whether a member has an obstacle ahead, and its formation closes before the end of it.
+fn ends_before_obstacle(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
+    let planned = || bundle.parts.iter().map(|part| part.slot_m.into()).collect::<Vec<Vec2>>();
+    let (anchor, _) = bundle.plan.anchor_at(s.now);
+    is_before_obstacle(s) && anchor.x < past_x_m(s, &planned()) - ROUNDING_M
 }
 
 /// Whether a member acts on its own: it does not follow this leader, or there is no other drone.

@@ -49,7 +49,7 @@ impl Grouping {
                 drone: m.id,
                 leader: leaders[i],
                 slot_m: mine.map_or([0.0; 2], |part| part.slot_m),
-                arrival_s: survey.arrival_s(i, chosen[i]),
+                arrival_s: survey.arrival_s(s, i, chosen[i]),
                 route: chosen[i] as u16,
                 rank: ranks[i],
                 reserved: 0,

@@ -3,7 +3,7 @@
 use crate::election::{Election, Input};
 use crate::ledger::Ledger;
 use crate::member::Member;
-use crate::obstacles::Obstacles;
+use crate::obstacles::{Obstacles, set_ids};
 use crate::own_state::OwnState;
 use crate::params::{Destination, LeadingParams, PlannerParams};
 use crate::peers::Peers;
@@ -22,6 +22,8 @@ pub(crate) struct Knowledge {
     incarnation: u32,
     params: PlannerParams,
     impaired: bool,
+    /// The greatest abscissa at which this drone has been, m.
+    reached_x_m: f64,
     peers: Peers,
     obstacles: Obstacles,
     ledger: Ledger,
@@ -40,6 +42,7 @@ impl Knowledge {
             incarnation: params.incarnation,
             params: params.planner.clone(),
             impaired: false,
+            reached_x_m: f64::NEG_INFINITY,
             peers: Peers::new(params.drones, params.peer_timeout_s).relayed_less(params.thinning()),
             obstacles: Obstacles::new(params.drones, reach_m),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
@@ -52,6 +55,8 @@ impl Knowledge {
     /// group that this drone leads in its [`Self::first_term`].
     pub(crate) fn of_rollout_member(&self, params: &LeadingParams, now: SimTime, ledger: Ledger) -> Self {
         let mut other = Self::new(params);
+        // What the other drone has left behind is not known, and makes no difference to which routes are best.
+        other.reached_x_m = f64::INFINITY;
         other.obstacles = self.obstacles.clone();
         other.peers = self.peers.clone();
         other.peers.forget(params.me);
@@ -83,6 +88,17 @@ impl Knowledge {
     /// Whether a sensor of its own is broken.
     pub(crate) fn is_impaired(&self) -> bool {
         self.impaired
+    }
+
+    /// Whether it flies in a formation of the whole swarm that names an obstacle as passed, but has never reached the end of that one: its
+    /// leader may have taken it for a drone that stays where it is, or may have been told wrongly.
+    pub(crate) fn is_before(&self) -> bool {
+        let holds = matches!(self.params.destination, Destination::Hold { .. });
+        let formation =
+            self.ledger.obeyed().map(|bundle| &bundle.plan).filter(|plan| holds && is_formation_of_all(plan));
+        let named = formation.into_iter().flat_map(|plan| set_ids(&plan.set, plan.set_count));
+        let mut outlines = named.filter_map(|&id| self.obstacles.get(id));
+        outlines.any(|known| self.reached_x_m < known.shape.bounds().1.x)
     }
 
     /// The beacons it has heard.
@@ -129,7 +145,8 @@ impl Knowledge {
     pub(crate) fn myself(&self, own: &OwnState) -> Member {
         let OwnState { position, velocity, .. } = *own;
         let (speed_mps, group) = (velocity.norm(), self.ledger.group());
-        Member { id: self.me, position, speed_mps, velocity, group, follows: true, settled: false }
+        let before = self.is_before();
+        Member { id: self.me, position, speed_mps, velocity, group, follows: true, settled: false, before }
     }
 
     /// Living peers, extrapolated to `now`, by id. A peer's group is the one that the obeyed plan, or the plan that split
@@ -145,7 +162,7 @@ impl Knowledge {
             let (position, follows) = (pose.extrapolated(now), pose.term() == self.election.obeyed());
             let speed_mps = velocity.norm();
             let settled = pose.term() < self.election.obeyed() && self.rests_at_destination(position, speed_mps);
-            Member { id, position, speed_mps, velocity, group, follows, settled }
+            Member { id, position, speed_mps, velocity, group, follows, settled, before: pose.is_before() }
         })
     }
 
@@ -293,6 +310,7 @@ impl Knowledge {
 
     /// Notes which planned sets this drone has passed, being at `position`.
     pub(crate) fn note_passed(&mut self, position: Vec2) {
+        self.reached_x_m = self.reached_x_m.max(position.x);
         for set in self.ledger.sets().iter().filter(|set| position.x >= set.routes.exit_x_m()) {
             self.obstacles.note_passed(self.me, &set.ids);
         }

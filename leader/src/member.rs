@@ -22,6 +22,8 @@ pub struct Member {
     /// Whether it rests at the destination and obeys an older term: it does not hear this leader, so it will not pass what it does not
     /// know.
     pub settled: bool,
+    /// Whether it has never reached the end of an obstacle that its formation names as passed.
+    pub before: bool,
 }
 
 /// The leader of each member's group: the member of that group that is closest to the destination. The lower id wins a

@@ -98,6 +98,7 @@ mod tests {
             group: GroupId::ALL,
             follows: true,
             settled: false,
+            before: false,
         };
         ids.iter().map(member).collect()
     }

@@ -43,13 +43,13 @@ impl<'a> Survey<'a> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
         let kept: Vec<Option<&SetPlace>> = s.members.iter().map(|m| kept(m.id)).collect();
         let member_trips = |(m, kept): (&Member, &Option<&SetPlace>)| {
-            let (flight, earlier) = (s.params.flight(m.position), earlier_legs(s.ledger, m, &routes));
-            let mut trips = trips(&earlier, &routes, m.position, &flight);
+            let earlier = earlier_legs(s.ledger, m, &routes);
+            let mut trips = trips(&earlier, &routes, m.position, &s.params.flight(m.position));
             if let Some(route) = kept.map(|part| usize::from(part.route))
                 && let Some(flown) = trips.get_mut(route)
                 && flown.arrival_s.is_infinite()
             {
-                *flown = trip(&earlier, &routes, route, m.position, &flight);
+                *flown = trip_along(s, m, &routes, route);
             }
             trips
         };
@@ -77,9 +77,11 @@ impl<'a> Survey<'a> {
         self.trips.iter().map(|trips| trips.iter().map(|trip| trip.arrival_s).collect()).collect()
     }
 
-    /// Time of one member to the gate along one route, s from now.
-    pub(crate) fn arrival_s(&self, member: usize, route: usize) -> f64 {
-        self.trips[member][route].arrival_s
+    /// Time of one member to the gate along one route, s from now. Finite, also if the member could not take the route any more: it was
+    /// chosen a moment ago.
+    pub(crate) fn arrival_s(&self, s: &Situation<'_>, member: usize, route: usize) -> f64 {
+        let arrival_s = self.trips[member][route].arrival_s;
+        if arrival_s.is_finite() { arrival_s } else { trip_along(s, &s.members[member], &self.routes, route).arrival_s }
     }
 
     /// The route of a member that has no choice: it already flies one, or is past the gate, or joins a queue that is
@@ -109,6 +111,11 @@ impl<'a> Survey<'a> {
         let trips = self.trips[i].iter().enumerate();
         trips.map(|(route, trip)| if open(route) { trip.arrival_s } else { f64::INFINITY }).collect()
     }
+}
+
+/// A member's trip along one route, whether obstacles abreast of it close that route or not.
+fn trip_along(s: &Situation<'_>, member: &Member, routes: &Routes, route: usize) -> Trip {
+    trip(&earlier_legs(s.ledger, member, routes), routes, route, member.position, &s.params.flight(member.position))
 }
 
 /// The sets before `routes` that a member still has to leave, with its route past each.

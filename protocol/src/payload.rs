@@ -32,6 +32,9 @@ pub const MAX_SEPARATORS: usize = 7;
 pub const POSE_LEADS: u32 = 1;
 /// [`Pose::flags`]: a sensor of the drone is broken; another drone should lead if possible.
 pub const POSE_IMPAIRED: u32 = 2;
+/// [`Pose::flags`]: the drone flies in a formation of the whole swarm, but has never reached the end of an obstacle that the formation's
+/// plan names as passed.
+pub const POSE_BEFORE: u32 = 4;
 
 /// [`Assignment::route`] of a drone that has no obstacle to pass.
 pub const NO_ROUTE: u16 = u16::MAX;
@@ -81,7 +84,7 @@ pub struct Pose {
     pub term: Ballot,
     /// Number of the drone's current process, from 1; each restart adds 1.
     pub incarnation: u32,
-    /// Combination of [`POSE_LEADS`] and [`POSE_IMPAIRED`].
+    /// Combination of [`POSE_LEADS`], [`POSE_IMPAIRED`] and [`POSE_BEFORE`].
     pub flags: u32,
     /// A hash of the drones that the drone hears without a relay, itself included. Two drones that hear the same drones have
     /// the same hash. 0 if the drone hears nobody, hears all drones of the swarm, or does not say.
@@ -111,6 +114,12 @@ impl Pose {
     #[must_use]
     pub fn is_impaired(&self) -> bool {
         self.flags & POSE_IMPAIRED != 0
+    }
+
+    /// Whether the drone has never reached the end of an obstacle that its formation names as passed.
+    #[must_use]
+    pub fn is_before(&self) -> bool {
+        self.flags & POSE_BEFORE != 0
     }
 }
 

@@ -39,7 +39,7 @@ fn of_pose(pose: &Pose) -> Value {
     json!({
         "stamp_s": pose.stamp.secs(), "position_m": pose.position_m, "velocity_mps": pose.velocity_mps, "queue": queue,
         "obeyed": stamp(pose.obeyed), "group": pose.group.to_string(), "term": ballot(pose.term),
-        "incarnation": pose.incarnation, "leads": pose.leads(), "impaired": pose.is_impaired(),
+        "incarnation": pose.incarnation, "leads": pose.leads(), "impaired": pose.is_impaired(), "before": pose.is_before(),
     })
 }
 
@@ -111,7 +111,7 @@ fn of_presence(presence: &Presence) -> Value {
     let drone = |(id, pose): (DroneId, Pose)| {
         json!({
             "drone": id, "stamp_s": pose.stamp.secs(), "position_m": pose.position_m, "velocity_mps": pose.velocity_mps,
-            "incarnation": pose.incarnation, "leads": pose.leads(), "impaired": pose.is_impaired(),
+            "incarnation": pose.incarnation, "leads": pose.leads(), "impaired": pose.is_impaired(), "before": pose.is_before(),
         })
     };
     json!({
