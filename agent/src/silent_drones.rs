@@ -1,6 +1,6 @@
 //! Drones that send nothing any more: they may be dead and hover where they were.
 
-use crate::tuning::{HANGS_S, NEAR_RANGING, REDRAW_DRIFT, REDRAW_DRIFT_M, UNSEEN_S};
+use crate::tuning::{HANGS_S, HANGS_UNHEARD_S, NEAR_RANGING, REDRAW_DRIFT, REDRAW_DRIFT_M, UNSEEN_S};
 use skein_leader::peers::Peers;
 use skein_leader::routes::Body;
 use skein_protocol::downlink::Senses;
@@ -37,12 +37,14 @@ pub(crate) struct SilentDrones {
     positions: Vec<Vec2>,
     /// Those that hung still when this drone ranged them last, and that it has not heard since.
     hanging: BTreeMap<DroneId, Hanging>,
+    /// For how long a silent drone has to hang still until it counts as dead, s.
+    patience_s: f64,
 }
 
 impl SilentDrones {
     /// No silent drone yet.
     pub(crate) fn new(params: SilenceParams) -> Self {
-        Self { params, positions: Vec::new(), hanging: BTreeMap::new() }
+        Self { params, positions: Vec::new(), hanging: BTreeMap::new(), patience_s: HANGS_S }
     }
 
     /// Finds the silent drones. A ranged one is where it is ranged, whether it was ever heard or not. Another one is where it has come to
@@ -74,10 +76,9 @@ impl SilentDrones {
         if self.hanging.is_empty() {
             return;
         }
-        // A drone that hears no other may be deaf itself. Then the others live, and move.
-        if peers.living(senses.now).next().is_none() {
-            self.hanging.clear();
-        }
+        // A drone that hears no other may be deaf itself. Then the others live, and move sooner or later.
+        let hears = peers.living(senses.now).next().is_some();
+        self.patience_s = if hears { HANGS_S } else { HANGS_UNHEARD_S };
         let near_m = NEAR_RANGING * self.params.ranging_m;
         let is_gone = |hanging: &Hanging| {
             senses.now.since(hanging.seen) > UNSEEN_S && (hanging.place - senses.position()).norm() < near_m
@@ -98,7 +99,7 @@ impl SilentDrones {
     /// Discs of this radius around those that have hung still for long, for its own path. On a bad link, a drone that waits in a queue may be
     /// silent for a while.
     pub(crate) fn hanging(&self, radius_m: f64) -> Vec<Body> {
-        let dead = self.hanging.values().filter(|hanging| hanging.seen.since(hanging.since) >= HANGS_S);
+        let dead = self.hanging.values().filter(|hanging| hanging.seen.since(hanging.since) >= self.patience_s);
         discs(dead.map(|hanging| hanging.place), radius_m)
     }
 }
@@ -125,16 +126,17 @@ mod tests {
     const PARAMS: SilenceParams = SilenceParams { braking_mps2: 3.0, still_mps: 1.0, ranging_m: 60.0 };
     const DEAD: DroneId = DroneId(1);
 
-    /// A drone that hears drone 2 all the time, and looks from its place along x at a dead drone at x = 0.
+    /// A drone that hears drone 2 all the time, unless it is deaf, and looks from its place along x at a dead drone at x = 0.
     struct Watch {
         silent: SilentDrones,
         peers: Peers,
         now_s: f64,
+        hears: bool,
     }
 
     impl Watch {
         fn new() -> Self {
-            Self { silent: SilentDrones::new(PARAMS), peers: Peers::new(3, 1.5), now_s: 0.0 }
+            Self { silent: SilentDrones::new(PARAMS), peers: Peers::new(3, 1.5), now_s: 0.0, hears: true }
         }
 
         fn hear(&mut self, id: DroneId) {
@@ -147,7 +149,9 @@ mod tests {
         fn look(&mut self, x_m: f64, seconds: u32, seen: Option<f64>) -> usize {
             for _ in 0..seconds {
                 self.now_s += 1.0;
-                self.hear(DroneId(2));
+                if self.hears {
+                    self.hear(DroneId(2));
+                }
                 let ranged = seen.map(|speed_mps| SensedNeighbour {
                     position_m: [-x_m, 0.0, 0.0],
                     velocity_mps: [speed_mps, 0.0, 0.0],
@@ -182,14 +186,13 @@ mod tests {
     }
 
     #[test]
-    fn a_drone_that_hears_no_other_takes_none_for_dead() {
+    fn a_drone_that_hears_no_other_is_slow_to_take_one_for_dead() {
         let mut watch = Watch::new();
         assert_eq!(watch.look(40.0, 12, Some(0.0)), 1);
-        watch.peers.forget(DroneId(2));
+        watch.hears = false;
         watch.now_s += 10.0;
-        let now = SimTime::from_secs(watch.now_s);
-        let senses = Senses::new((0, now), ([40.0, 0.0, 0.0], [0.0; 3]), &[], &[], &[]);
-        watch.silent.update(&senses, &watch.peers);
-        assert!(watch.silent.hanging(20.0).is_empty());
+        assert_eq!(watch.look(40.0, 7, Some(0.0)), 0, "it may be deaf");
+        assert_eq!(watch.look(40.0, 3, Some(0.0)), 1);
+        assert_eq!(watch.look(80.0, 30, None), 1, "it is out of reach");
     }
 }

@@ -77,6 +77,10 @@ pub(crate) const HANGING_RADIUS: f64 = 1.04;
 /// a living drone that waits in a queue may be silent for a while on a bad link.
 pub(crate) const HANGS_S: f64 = 10.0;
 
+/// The same for a drone that hears no other, s. 30. By hand: it may be deaf, and the others wait in a queue. If it is the last one, the
+/// others hang for ever.
+pub(crate) const HANGS_UNHEARD_S: f64 = 30.0;
+
 /// A drone closer than this part of the ranging distance is ranged, unless something is between. No unit. 0.5. By hand.
 pub(crate) const NEAR_RANGING: f64 = 0.5;
 
