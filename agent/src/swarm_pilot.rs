@@ -394,6 +394,13 @@ impl SwarmPilot {
         self.keep_braking_path(smooth, now, senses)
     }
 
+    /// Whether the drone senses no obstacles, and no other one may report them: it hears none whose sensors work. What it remembers of an
+    /// outline may also be a part of it.
+    fn flies_blind(&self, senses: &Senses<'_>) -> bool {
+        let guides = || self.leading.peers().living(senses.now).any(|(_, pose)| !pose.is_impaired());
+        senses.broken.obstacles && (self.params.sensing.partial_outlines || !guides())
+    }
+
     /// How far the outlines that the drone keeps clear of may be displaced, m.
     fn obstacle_error_m(&self, senses: &Senses<'_>) -> f64 {
         let sensing = &self.params.sensing;
@@ -428,8 +435,7 @@ impl SwarmPilot {
         });
         let by_words_alone = self.params.apart_by_words || now.broken.ranging;
         let alone = by_words_alone && separations.is_some_and(|lines| !lines.has_agreed_with_all());
-        // What a drone remembers of an outline may be a part of it.
-        let hovers = alone || (now.broken.obstacles && self.params.sensing.partial_outlines);
+        let hovers = alone || self.flies_blind(now);
         let wanted = if hovers { self.braking_filter.params().law().braking(then.velocity()) } else { wanted };
         let error_m = self.obstacle_error_m(now);
         self.braking_filter.set_obstacle_error_m(error_m);

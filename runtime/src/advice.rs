@@ -201,7 +201,7 @@ fn outside_the_proof(scenario: &Scenario) -> impl Iterator<Item = String> {
                     && !scenario.obstacles.is_empty()
                     && scenario.sensors.outline == OutlineSensing::Whole =>
             {
-                "the drone may hit an obstacle that nobody has reported; with sensors.outline = \"seen\" it hovers"
+                "the drone may hit an obstacle that nobody has reported; while it hears no drone whose sensors work, or with sensors.outline = \"seen\", it hovers"
             }
             _ => return None,
         };

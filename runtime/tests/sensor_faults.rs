@@ -45,6 +45,16 @@ fn late_narrow_and_hidden_ranging_acts_and_is_flown_through() {
     }
 }
 
+/// While no drone senses obstacles, each hovers: none would tell it of one ahead. Then the mission goes on.
+#[test]
+fn a_swarm_in_which_no_drone_senses_obstacles_waits() {
+    for name in ["paper/forest", "narrow/gap"] {
+        let fault = r#"{ kind = "blind", sensor = "obstacles", at_s = 6, for_s = 30, target = "all" }"#;
+        let world = fly_to_the_end(&scenario(name, &[PAPERS_RULE, ("fault.0", fault)]), None);
+        assert_eq!((world.ended(), world.violations()), (Some(Outcome::Reached), 0), "{name}");
+    }
+}
+
 /// The process of a drone with a wrong position and clock is stopped, or replaced, while its faults begin and end.
 #[test]
 fn faults_of_sensors_outlive_the_process() {
