@@ -54,9 +54,9 @@ impl One {
     /// Whether the beacons of this many ticks at this abscissa, m, say that the drone is before an obstacle.
     fn says_before(&mut self, ticks: u32, x_m: f64) -> bool {
         let said = (0..ticks).flat_map(|_| self.step(x_m)).collect::<Vec<_>>();
-        let beacons =
+        let mut beacons =
             said.iter().filter_map(|message| if let Message::Pose(pose) = message { Some(pose) } else { None });
-        beacons.last().unwrap().is_before()
+        beacons.next_back().unwrap().is_before()
     }
 
     /// Where the front slot and the last one are, m.
