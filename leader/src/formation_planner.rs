@@ -8,7 +8,7 @@ use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, OPEN_RANKS, STALLED_S};
+use crate::tuning::{ANCHOR_STEP_M, FRONT_LOST_S, OPEN_RANKS, STALLED_S};
 use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
@@ -41,6 +41,8 @@ pub(crate) struct FormationPlanner {
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
+    /// Since when this drone, which hears no other, cannot come to the front slot at the goal.
+    front_taken: Option<SimTime>,
 }
 
 /// A member that already stands in a slot. Both are indices.
@@ -54,6 +56,7 @@ impl FormationPlanner {
     /// A plan to fly in formation: once all have passed all obstacles, whenever the members change, and when they are
     /// stuck.
     pub(crate) fn decide(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
+        self.front_taken = is_front_taken(s).then(|| self.front_taken.unwrap_or(s.now));
         let obeyed = s.ledger.obeyed().filter(|bundle| bundle.plan.id.ballot == s.ballot);
         let passed = !s.ledger.sets().is_empty();
         let same =
@@ -77,11 +80,16 @@ impl FormationPlanner {
             return None;
         }
         self.pace.note(s);
-        *self = Self { pace: self.pace, ..Self::default() };
+        *self = Self { pace: self.pace, front_taken: self.front_taken, ..Self::default() };
         // A part of the swarm cruises only between obstacle sets.
         let parted = |plan: &Plan| plan.group != GroupId::ALL;
         let avoided = s.ledger.obeyed().is_some_and(|b| b.plan.phase() != Phase::Cruise || parted(&b.plan));
         self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
+    }
+
+    /// Whether the front slot at the goal is taken for ever, as far as this drone can tell, which hears no other.
+    fn is_front_lost(&self, s: &Situation<'_>) -> bool {
+        self.front_taken.is_some_and(|since| s.now.since(since) >= FRONT_LOST_S)
     }
 
     /// The plan with other slots, if a dead drone has come to rest beside a slot at the goal, or not as near to one as it seemed.
@@ -91,7 +99,7 @@ impl FormationPlanner {
             return None;
         }
         let planned: Vec<Vec2> = bundle.parts.iter().map(|part| part.slot_m.into()).collect();
-        if slots_of(s, Phase::Reform).iter().all(|slot| planned.contains(slot)) {
+        if slots_of(s, Phase::Reform, self.is_front_lost(s)).iter().all(|slot| planned.contains(slot)) {
             return None;
         }
         self.pace.note(s);
@@ -136,7 +144,8 @@ impl FormationPlanner {
         let pinned = s.members.iter().any(|m| is_alone(m, s));
         let shut_out = self.shut_out || self.open;
         let closings = self.closings + u32::from(self.open);
-        let fresh = Self { pinned, shut_out, closings, pace: self.pace, ..Self::default() };
+        let (pace, front_taken) = (self.pace, self.front_taken);
+        let fresh = Self { pinned, shut_out, closings, pace, front_taken, ..Self::default() };
         if !pinned && !self.open && !self.swapped {
             let swapped = Self { swapped: true, ..fresh };
             let plan = swapped.assign(s, Phase::Reform);
@@ -151,7 +160,7 @@ impl FormationPlanner {
 
     /// The plan that assigns the slots. `None` without a slot for every member.
     fn assign(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
-        let close = slots_of(s, phase);
+        let close = slots_of(s, phase, self.is_front_lost(s));
         let (anchor, pin) = match s.members.iter().position(|m| self.pinned && is_alone(m, s)) {
             Some(member) => anchor_for(s, &close, phase, member),
             None => (anchor(s, &close, phase), None),
@@ -195,15 +204,21 @@ fn newest_passed(s: &Situation<'_>) -> Vec<ObstacleId> {
 }
 
 /// The slots of the members, relative to the front slot, m. At the goal, slots beside which a dead drone hangs are left free. A drone that
-/// hears no other flies to the front slot: if the others live, they leave that slot to it.
-fn slots_of(s: &Situation<'_>, phase: Phase) -> Vec<Vec2> {
+/// hears no other flies to the front slot, unless that one has been `taken` for long: if the others live, they leave it to that drone.
+fn slots_of(s: &Situation<'_>, phase: Phase, taken: bool) -> Vec<Vec2> {
     let (shape, spacing_m) = (&s.params.shape, s.params.spacing_m);
     match s.params.destination {
-        Destination::Goal { front_m } if phase == Phase::Reform && s.members.len() > 1 => {
+        Destination::Goal { front_m } if phase == Phase::Reform && (s.members.len() > 1 || taken) => {
             shape.free_slots(s.members.len(), spacing_m, front_m, s.silent, s.params.safe_distance_m)
         }
         _ => shape.slots(s.members.len(), spacing_m),
     }
+}
+
+/// Whether a silent drone is so near to the front slot at the goal that a drone which hears no other cannot come there.
+fn is_front_taken(s: &Situation<'_>) -> bool {
+    let Destination::Goal { front_m } = s.params.destination else { return false };
+    s.members.len() == 1 && s.silent.iter().any(|at| (at - front_m).norm() < s.params.safe_distance_m)
 }
 
 /// Where the front slot goes: the goal; or the mean position of the members, moved on until it is clear of obstacles and

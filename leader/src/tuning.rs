@@ -202,6 +202,9 @@ pub(crate) const ANCHOR_STEP_M: f64 = 5.0;
 pub(crate) const OPEN_RANKS: f64 = 1.6;
 /// A formation in which all drones have been stalled for this long is stuck, s. 3. By hand.
 pub(crate) const STALLED_S: f64 = 3.0;
+/// A drone that hears no other takes a slot farther back once another one has been in the front slot for this long, s. 30: others that live
+/// and that it does not hear have left it by then. By hand.
+pub(crate) const FRONT_LOST_S: f64 = 30.0;
 
 // ---- Routes (`routes.rs`) ----
 

@@ -97,6 +97,7 @@ fn scenes_of_an_independent_generator_are_reached() {
         "greedy-ranks",
         "head-on-at-a-gap",
         "identity-in-a-corridor",
+        "last-one-at-the-goal",
         "last-one-in-a-pocket",
         "late-first-command",
         "lines-that-bind-both",
