@@ -99,7 +99,7 @@ pub(crate) struct Reunion {
 enum Task {
     /// Nothing: the drone goes its own way. Where it has been since when, world frame, m.
     Own { stay: Option<(SimTime, Vec2)> },
-    /// It flies to where a lost drone is or was heard last, world frame, m.
+    /// It flies to where a lost drone is ranged, or else to where it was heard last: `place`, world frame, m.
     Look { lost: DroneId, place: Vec2, until: SimTime },
     /// It goes its own way no faster than the drone that it has found.
     Lead { found: DroneId, until: SimTime },
