@@ -4,11 +4,12 @@ use skein_scenario::{Fault, FaultKind};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// Hunts in an experiment whose drones are all blind from the start: some fly into obstacles.
+/// Hunts in an experiment with more wind than drones can resist: some are blown into obstacles.
 fn hunted(text: &str, flights: usize, workers: usize) -> HuntReport {
     let experiment = Experiment::parse(text, "test", Path::new("")).unwrap();
-    let blind = [("fault.0.kind", "blind"), ("fault.0.at_s", "0"), ("fault.0.target", "all")];
-    let overrides = blind.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let wind =
+        [("fault.0.kind", "wind"), ("fault.0.wind_mps2", "[12, 0]"), ("fault.0.at_s", "0"), ("fault.0.target", "all")];
+    let overrides = wind.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let grid = Grid::new(&experiment, &overrides);
     Hunt::new(&grid, &skein_runtime::PilotRegistry::built_in().unwrap())
         .flights(flights)
@@ -19,7 +20,7 @@ fn hunted(text: &str, flights: usize, workers: usize) -> HuntReport {
 }
 
 /// Small random scenes.
-const BLIND: &str = r#"
+const SCENES: &str = r#"
     scenario = "random"
     seeds = 6
     [random]
@@ -29,16 +30,16 @@ const BLIND: &str = r#"
 
 #[test]
 fn a_hunt_finds_a_failure_and_makes_it_small() {
-    let report = hunted(BLIND, 12, 2);
+    let report = hunted(SCENES, 12, 2);
     let finding = report.findings.iter().find(|finding| finding.failure.kind == FailureKind::Clearance);
-    let finding = finding.expect("a blind swarm flies into an obstacle");
-    assert!(finding.failure.value < 1.0 && finding.toml.contains("blind"), "{}", finding.toml);
+    let finding = finding.expect("a swarm is blown into an obstacle");
+    assert!(finding.failure.value < 1.0 && finding.toml.contains("wind"), "{}", finding.toml);
     assert!(finding.toml.matches("[[obstacle]]").count() == 1 && finding.toml.len() < 1500, "{}", finding.toml);
 }
 
 #[test]
 fn the_number_of_workers_does_not_change_what_is_found() {
-    assert_eq!(hunted(BLIND, 10, 1), hunted(BLIND, 10, 2));
+    assert_eq!(hunted(SCENES, 10, 1), hunted(SCENES, 10, 2));
 }
 
 #[test]
