@@ -19,6 +19,11 @@ const WAITS: f64 = 2.0;
 const LOOK_S: f64 = 10.0;
 /// By ranging, a drone has this many times the patience: the others can go on.
 const RANGING_PATIENCE: f64 = 3.0;
+/// By ranging, a drone that hears more drones than it has lost waits this many times its patience longer: the lost ones may be dead, and while
+/// it looks for them it leaves a gap.
+const MAJORITY_TURNS: u32 = 3;
+/// A beacon that is older than this does not show how a drone flies now, s.
+const OLD_S: f64 = 3.0;
 /// A flight back may take this many times as long as a straight flight would.
 const DETOUR_FACTOR: f64 = 3.0;
 
@@ -60,6 +65,20 @@ impl Others<'_> {
         senses.position() + if is_far { seen.position() } else { Vec2::zeros() }
     }
 
+    /// How many living drones are closer to where a lost one may be (world frame, m): those look for it first. By words, drones do not wait for
+    /// each other: two that have lost each other look at the same time.
+    fn closer(&self, place: Vec2, senses: &Senses<'_>) -> u32 {
+        let own_m = (place - senses.position()).norm();
+        let living = self.peers.living(senses.now).filter(|_| !self.by_words);
+        living.map(|(_, pose)| u32::from((place - pose.position()).norm() < own_m)).sum()
+    }
+
+    /// How many turns longer a drone waits that hears more drones than it has lost: those that have lost more look for the others first.
+    fn majority_turns(&self, senses: &Senses<'_>, lost: usize) -> u32 {
+        let hears_most = !self.by_words && self.peers.living(senses.now).count() > lost;
+        if hears_most { MAJORITY_TURNS } else { 0 }
+    }
+
     /// The drones that are neither ranged nor heard.
     fn unseen(&self, senses: &Senses<'_>) -> impl Iterator<Item = Lost> {
         let silent = self.peers.silent(senses.now);
@@ -70,6 +89,11 @@ impl Others<'_> {
         let unheard = unheard.map(|(drone, &place)| Lost { drone, since: SimTime::ZERO, place });
         heard.chain(unheard).filter(|lost| !senses.neighbours.iter().any(|seen| seen.drone == lost.drone))
     }
+}
+
+/// Where a drone that was found is by now, world frame, m. What is passed on may be old: it does not fly on as it did then.
+fn expected(pose: Beacon<'_>, now: SimTime) -> Vec2 {
+    pose.position() + pose.velocity() * now.since(pose.stamp()).min(OLD_S)
 }
 
 /// A lost drone.
@@ -129,6 +153,9 @@ impl Reunion {
                 if others.peers.is_living(lost, now) {
                     (self.task, self.failed) = (Task::Lead { found: lost, until: now.after(LEAD_FOUND_S) }, 0);
                 } else if now < until {
+                    if !others.by_words && (place - position).norm() <= IN_REACH * others.range_m {
+                        self.task = Task::Look { lost, place, until: until.min(now.after(LOOK_S)) };
+                    }
                     return Some(others.place_of(lost, senses, place));
                 } else {
                     (self.task, self.failed) = (Task::Own { stay: None }, self.failed + 1);
@@ -142,7 +169,7 @@ impl Reunion {
                 if now >= until {
                     self.task = Task::Own { stay: None };
                 }
-                let place = others.peers.last_of_living(found, now)?.extrapolated(now);
+                let place = expected(others.peers.last_of_living(found, now)?, now);
                 Some(place).filter(|place| (place - position).norm() > IN_REACH * others.range_m)
             }
         }
@@ -159,11 +186,15 @@ impl Reunion {
         }
         let mut lost: Vec<Lost> = others.lost(senses).collect();
         lost.sort_by_key(|lost| (Reverse(lost.since), lost.drone));
-        let next = lost.get(self.failed as usize % lost.len().max(1));
-        if next.is_none() {
+        let Some(next) = lost.get(self.failed as usize % lost.len().max(1)) else {
             self.task = Task::Own { stay: None };
+            return None;
+        };
+        let turn = others.closer(next.place, senses) + others.majority_turns(senses, lost.len());
+        if now.since(stay.0) < f64::from(1 + turn) * self.patience_s(others.by_words) {
+            return None;
         }
-        next.map(|next| self.look_for(next, now, position, others.by_words))
+        Some(self.look_for(next, now, position, others.by_words))
     }
 
     /// Waits no longer: the drone is in a queue that moves without word from others.
@@ -207,7 +238,7 @@ mod tests {
     impl Searcher {
         fn new(range_m: f64) -> Self {
             let reunion = Reunion::new(2, &crate::test_params::planner());
-            Self { reunion, peers: Peers::new(2, 1.0), starts_m: Vec::new(), range_m, by_words: true }
+            Self { reunion, peers: Peers::new(3, 1.0), starts_m: Vec::new(), range_m, by_words: true }
         }
 
         /// Hears drone 0 at this abscissa, m, at this speed, m/s.
@@ -215,6 +246,13 @@ mod tests {
             let now = SimTime::from_secs(now_s);
             let (position_m, velocity_mps) = ([x_m, 0.0, 0.0], [speed_mps, 0.0, 0.0]);
             self.peers.hear(now, DroneId(0), Pose { stamp: now, position_m, velocity_mps, ..Pose::zeroed() });
+        }
+
+        /// Hears of drone 0 as it was `old_s` ago, at this abscissa, m, at this speed, m/s.
+        fn hear_late(&mut self, now_s: f64, old_s: f64, x_m: f64, speed_mps: f64) {
+            let (stamp, now) = (SimTime::from_secs(now_s - old_s), SimTime::from_secs(now_s));
+            let (position_m, velocity_mps) = ([x_m, 0.0, 0.0], [speed_mps, 0.0, 0.0]);
+            self.peers.hear_of(now, DroneId(0), Pose { stamp, position_m, velocity_mps, ..Pose::zeroed() });
         }
 
         /// Where it looks for drone 0, if it is at this abscissa, m.
@@ -291,7 +329,7 @@ mod tests {
         let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
         searcher.hear(0.0, -50.0, 0.0);
         let looks: Vec<i32> = (1..200).filter(|&second| searcher.looks_at(second.into(), 0.0).is_some()).collect();
-        assert_eq!(looks, (115..140).collect::<Vec<_>>());
+        assert_eq!(looks, (115..126).collect::<Vec<_>>(), "it would hear the lost one from where it is");
         let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
         searcher.hear(0.0, -50.0, 0.0);
         let queues = (1..200).filter(|&second| {
@@ -299,6 +337,49 @@ mod tests {
             searcher.looks_at(second.into(), 0.0).is_some()
         });
         assert_eq!(queues.count(), 0);
+    }
+
+    #[test]
+    fn the_drone_that_is_closest_to_a_lost_one_looks_for_it_first() {
+        let looks = |other_x_m: f64, by_words: bool| {
+            let mut searcher = Searcher { by_words, ..Searcher::new(RANGE_M) };
+            searcher.hear(0.0, -50.0, 0.0);
+            let mut look = |second: u32| {
+                let now = SimTime::from_secs(second.into());
+                let other = Pose { stamp: now, position_m: [other_x_m, 0.0, 0.0], ..Pose::zeroed() };
+                searcher.peers.hear(now, DroneId(2), other);
+                searcher.looks_at(second.into(), 0.0)
+            };
+            (1..400).find_map(|second| look(second).map(|_| second))
+        };
+        let [behind, ahead] = [20.0, -20.0].map(|x_m| looks(x_m, false));
+        assert_eq!((behind, ahead), (Some(115), Some(229)));
+        assert_eq!(looks(-20.0, true), looks(20.0, true), "by words, drones that have lost each other meet");
+    }
+
+    #[test]
+    fn a_drone_that_is_where_the_lost_one_was_waits_there_for_ten_seconds() {
+        let mut searcher = Searcher { by_words: false, ..Searcher::new(RANGE_M) };
+        searcher.hear(0.0, -2000.0, 0.0);
+        let there = |second: u32| if second < 300 { 0.0 } else { -2000.0 };
+        let looks = (1..500).filter(|&second| searcher.looks_at(second.into(), there(second)).is_some());
+        assert_eq!(looks.collect::<Vec<_>>(), (115..310).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_drone_does_not_follow_one_that_it_found_farther_than_it_can_have_heard_it_fly() {
+        let mut searcher = Searcher::new(RANGE_M);
+        searcher.hear(0.0, -50.0, 0.0);
+        searcher.looks_at(1.0, 0.0);
+        assert_eq!(searcher.looks_at(40.0, 0.0), Some(-50.0));
+        // What it hears is passed on, and 20 s old from then on. The drone flew at 10 m/s.
+        (0..20).for_each(|beacon| searcher.hear_late(40.0 + f64::from(beacon), 20.0, -60.0, 10.0));
+        assert_eq!(searcher.looks_at(60.0, 0.0), None);
+        assert_eq!(
+            searcher.looks_at(60.1, 0.0),
+            None,
+            "it was 60 m away, and flew 30 m at most before it was heard no more"
+        );
     }
 
     /// Where drone 1, which stands at x = 0, looks for a drone that it ranges at this abscissa, m, but does not hear, at each second.

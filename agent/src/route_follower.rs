@@ -2,7 +2,8 @@
 
 use crate::emergency_route::EmergencyRoute;
 use crate::silent_drones::have_moved;
-use skein_leader::cost::{Flight, shortest, trips};
+use crate::tuning::LONG_ROUTE;
+use skein_leader::cost::{Flight, Trip, shortest, trips};
 use skein_leader::funnel::{Corridor, Passage, Steering};
 use skein_leader::ledger::Ledger;
 use skein_leader::planned_set::PlannedSet;
@@ -131,7 +132,8 @@ impl RouteFollower {
                 self.own_y_m = position.y;
             }
         }
-        let detoured = self.find_detours(ledger, position, bodies);
+        let grown = self.drawn_for.is_some_and(|drawn| drawn.stamp == key.stamp && drawn.redrawn != key.redrawn);
+        let detoured = self.find_detours(ledger, position, bodies, grown);
         if self.drawn_for != Some(key) || moved || detoured {
             self.bodies.clear();
             self.bodies.extend_from_slice(bodies);
@@ -157,8 +159,8 @@ impl RouteFollower {
     }
 
     /// Finds another route wherever the drone was driven to the wrong side of an obstacle, or a body blocks its route, or the route is
-    /// gone because outlines have grown. Returns whether a route has changed.
-    fn find_detours(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body]) -> bool {
+    /// gone or has become much longer than another one because outlines have `grown`. Returns whether a route has changed.
+    fn find_detours(&mut self, ledger: &Ledger, position: Vec2, bodies: &[Body], grown: bool) -> bool {
         let (mut detoured, course_y_m) = (false, self.course_y_m);
         self.blocked = false;
         for set in ledger.sets().iter().filter(|set| position.x < set.routes.exit_x_m()) {
@@ -166,7 +168,14 @@ impl RouteFollower {
                 continue;
             }
             let state = match self.place(set) {
-                Some(place) => route_state(&set.routes, usize::from(place.route), course_y_m, position, bodies),
+                Some(place) => {
+                    let route = usize::from(place.route);
+                    match route_state(&set.routes, route, course_y_m, position, bodies) {
+                        RouteState::Clear if grown => shorter_route(&set.routes, route, course_y_m, position, bodies)
+                            .map_or(RouteState::Clear, RouteState::Detour),
+                        state => state,
+                    }
+                }
                 None => RouteState::Detour(open_route(&set.routes, course_y_m, position, bodies)),
             };
             match state {
@@ -334,11 +343,23 @@ fn route_state(routes: &Routes, route: usize, course_y_m: f64, position: Vec2, b
 
 /// The shortest of the routes that are open to a drone and that no body blocks, or the rightmost one if there is none.
 fn open_route(routes: &Routes, course_y_m: f64, position: Vec2, bodies: &[Body]) -> usize {
+    shortest(&open_trips(routes, course_y_m, position, bodies))
+}
+
+/// The shortest of the same routes, if `route` is much longer.
+fn shorter_route(routes: &Routes, route: usize, course_y_m: f64, position: Vec2, bodies: &[Body]) -> Option<usize> {
+    let trips = open_trips(routes, course_y_m, position, bodies);
+    let best = shortest(&trips);
+    (trips[route].total_s > LONG_ROUTE * trips[best].total_s).then_some(best)
+}
+
+/// The trips along all routes. Those along routes that are not open to a drone, or that a body blocks, take for ever.
+fn open_trips(routes: &Routes, course_y_m: f64, position: Vec2, bodies: &[Body]) -> Vec<Trip> {
     let mut trips = trips(&[], routes, position, &Flight { speed_mps: 1.0, course_y_m });
     for (route, trip) in trips.iter_mut().enumerate() {
         if !routes.is_open(route, position) || routes.is_barred(route, position, bodies) {
             trip.total_s = f64::INFINITY;
         }
     }
-    shortest(&trips)
+    trips
 }

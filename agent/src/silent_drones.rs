@@ -3,6 +3,7 @@
 use crate::tuning::{HANGS_S, HANGS_UNHEARD_S, NEAR_RANGING, REDRAW_DRIFT, REDRAW_DRIFT_M, UNSEEN_S};
 use skein_leader::peers::Peers;
 use skein_leader::routes::Body;
+use skein_leader::silent::Silent;
 use skein_protocol::downlink::Senses;
 use skein_protocol::{DroneId, SimTime, Vec2};
 use std::collections::BTreeMap;
@@ -33,8 +34,7 @@ pub(crate) struct SilenceParams {
 #[derive(Clone, Debug)]
 pub(crate) struct SilentDrones {
     params: SilenceParams,
-    /// World frame, m.
-    positions: Vec<Vec2>,
+    all: Vec<Silent>,
     /// Those that hung still when this drone ranged them last, and that it has not heard since.
     hanging: BTreeMap<DroneId, Hanging>,
     /// For how long a silent drone has to hang still until it counts as dead, s.
@@ -44,20 +44,16 @@ pub(crate) struct SilentDrones {
 impl SilentDrones {
     /// No silent drone yet.
     pub(crate) fn new(params: SilenceParams) -> Self {
-        Self { params, positions: Vec::new(), hanging: BTreeMap::new(), patience_s: HANGS_S }
+        Self { params, all: Vec::new(), hanging: BTreeMap::new(), patience_s: HANGS_S }
     }
 
     /// Finds the silent drones. A ranged one is where it is ranged, whether it was ever heard or not. Another one is where it has come to
     /// rest since its last beacon.
     pub(crate) fn update(&mut self, senses: &Senses<'_>, peers: &Peers) {
-        self.positions.clear();
         for ranged in senses.neighbours {
             let place = senses.position() + ranged.position();
             let still = (senses.velocity() + ranged.velocity()).norm() < self.params.still_mps;
             let silent = !peers.is_living(ranged.drone, senses.now);
-            if silent {
-                self.positions.push(place);
-            }
             if silent && still {
                 let since = self.hanging.get(&ranged.drone).map_or(senses.now, |hanging| hanging.since);
                 self.hanging.insert(ranged.drone, Hanging { place, since, seen: senses.now });
@@ -65,10 +61,34 @@ impl SilentDrones {
                 self.hanging.remove(&ranged.drone);
             }
         }
-        for (_, pose) in peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id)) {
-            self.positions.push(pose.stopped(self.params.braking_mps2));
-        }
         self.forget(senses, peers);
+        self.list(senses, peers);
+    }
+
+    /// Lists all silent drones: first those that are ranged.
+    fn list(&mut self, senses: &Senses<'_>, peers: &Peers) {
+        self.all.clear();
+        let is_living = |drone| peers.is_living(drone, senses.now);
+        for ranged in senses.neighbours.iter().filter(|ranged| !is_living(ranged.drone)) {
+            let since = peers.last(ranged.drone).map_or(SimTime::ZERO, |beacon| beacon.stamp());
+            let place = senses.position() + ranged.position();
+            self.all.push(Silent { place, since, hangs: self.hangs(ranged.drone) });
+        }
+        for (drone, pose) in
+            peers.silent(senses.now).filter(|(id, _)| !senses.neighbours.iter().any(|n| n.drone == *id))
+        {
+            let place = pose.stopped(self.params.braking_mps2);
+            self.all.push(Silent { place, since: pose.stamp(), hangs: self.hangs(drone) });
+        }
+    }
+
+    /// Whether a silent drone has hung still for long.
+    fn hangs(&self, drone: DroneId) -> bool {
+        self.hanging.get(&drone).is_some_and(|hanging| self.is_dead(hanging))
+    }
+
+    fn is_dead(&self, hanging: &Hanging) -> bool {
+        hanging.seen.since(hanging.since) >= self.patience_s
     }
 
     /// Forgets the drones that are heard again, and those that are not where they hung.
@@ -86,20 +106,20 @@ impl SilentDrones {
         self.hanging.retain(|&drone, hanging| !peers.is_living(drone, senses.now) && !is_gone(hanging));
     }
 
-    /// Their positions, world frame, m.
-    pub(crate) fn positions(&self) -> &[Vec2] {
-        &self.positions
+    /// All of them.
+    pub(crate) fn all(&self) -> &[Silent] {
+        &self.all
     }
 
     /// Discs of this radius around them, for path planning.
     pub(crate) fn bodies(&self, radius_m: f64) -> Vec<Body> {
-        discs(self.positions.iter().copied(), radius_m)
+        discs(self.all.iter().map(|silent| silent.place), radius_m)
     }
 
     /// Discs of this radius around those that have hung still for long, for its own path. On a bad link, a drone that waits in a queue may be
     /// silent for a while.
     pub(crate) fn hanging(&self, radius_m: f64) -> Vec<Body> {
-        let dead = self.hanging.values().filter(|hanging| hanging.seen.since(hanging.since) >= self.patience_s);
+        let dead = self.hanging.values().filter(|hanging| self.is_dead(hanging));
         discs(dead.map(|hanging| hanging.place), radius_m)
     }
 }

@@ -27,8 +27,8 @@ use crate::stale_formation::StaleFormation;
 use crate::state_predictor::StatePredictor;
 use crate::straggler::{OwnPlan, Straggler};
 use crate::tuning::{
-    BACK_OUT_SPEED, HANGING_RADIUS, LEAST_ESCAPE_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S, ROUTE_CHECK_S,
-    SILENT_DRONE_RADIUS,
+    BACK_OUT_SPEED, GUIDE_S, HANGING_RADIUS, LEAST_ESCAPE_SPEED, PATIENCE_IN_FORMATION_S, PATIENCE_ON_ROUTE_S,
+    ROUTE_CHECK_S, SILENT_DRONE_RADIUS,
 };
 use bytemuck::Zeroable;
 use skein_leader::candidates::MAX_ROLLOUT_DRONES;
@@ -143,7 +143,7 @@ impl SwarmPilot {
             self.look_ahead(now, own.tick, rollout);
             return;
         }
-        let alternatives = self.leading.decide(now, self.silent.positions(), say);
+        let alternatives = self.leading.decide(now, self.silent.all(), say);
         match self.params.planner.strategy {
             Strategy::LookAhead(objective)
                 if alternatives.len() > 1 && self.leading.living().len() <= MAX_ROLLOUT_DRONES =>
@@ -397,7 +397,9 @@ impl SwarmPilot {
     /// Whether the drone senses no obstacles, and no other one may report them: it hears none whose sensors work. What it remembers of an
     /// outline may also be a part of it.
     fn flies_blind(&self, senses: &Senses<'_>) -> bool {
-        let guides = || self.leading.peers().living(senses.now).any(|(_, pose)| !pose.is_impaired());
+        let peers = self.leading.peers();
+        let oldest = senses.now.after(-GUIDE_S - peers.delay_s());
+        let guides = || peers.living(senses.now).any(|(_, pose)| !pose.is_impaired() && pose.stamp() >= oldest);
         senses.broken.obstacles && (self.params.sensing.partial_outlines || !guides())
     }
 

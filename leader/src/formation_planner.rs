@@ -6,9 +6,10 @@ use crate::geometry::{nearest, separation};
 use crate::member::{Member, group_leaders};
 use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
+use crate::silent::Silent;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, FRONT_LOST_S, OPEN_RANKS, STALLED_S};
+use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, OPEN_RANKS, STALLED_S};
 use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
@@ -41,6 +42,8 @@ pub(crate) struct FormationPlanner {
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
+    /// Number of slots that the newest plan keeps for drones that may be out of reach.
+    kept: usize,
     /// Since when this drone, which hears no other, cannot come to the front slot at the goal.
     front_taken: Option<SimTime>,
 }
@@ -56,12 +59,20 @@ impl FormationPlanner {
     /// A plan to fly in formation: once all have passed all obstacles, whenever the members change, and when they are
     /// stuck.
     pub(crate) fn decide(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
+        let plan = self.choose(s);
+        if let Some(bundle) = &plan {
+            self.kept = if bundle.plan.phase() == Phase::Reform { missing(s) } else { 0 };
+        }
+        plan
+    }
+
+    fn choose(&mut self, s: &Situation<'_>) -> Option<PlanBundle> {
         self.front_taken = is_front_taken(s).then(|| self.front_taken.unwrap_or(s.now));
         let obeyed = s.ledger.obeyed().filter(|bundle| bundle.plan.id.ballot == s.ballot);
         let passed = !s.ledger.sets().is_empty();
         let same =
             obeyed.is_some_and(|bundle| bundle.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
-        if !passed && same {
+        if !passed && same && missing(s) >= self.kept {
             self.changed = None;
             if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
                 return self.assign(s, Phase::Reform);
@@ -92,11 +103,17 @@ impl FormationPlanner {
         self.front_taken.is_some_and(|since| s.now.since(since) >= FRONT_LOST_S)
     }
 
-    /// The plan with other slots, if a dead drone has come to rest beside a slot at the goal, or not as near to one as it seemed.
+    /// The plan with other slots, if a dead drone has come to rest beside a slot at the goal, or not as near to one as it seemed; or the plan with
+    /// slots farther on, if a drone that hangs beside one has turned out to be dead.
     fn avoid_dead(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
-        let fixed = matches!(s.params.destination, Destination::Goal { .. }) && !self.open;
-        if !fixed || s.silent.is_empty() || bundle.plan.phase() != Phase::Reform || !self.pace.allows(s) {
+        if self.open || s.silent.is_empty() || bundle.plan.phase() != Phase::Reform || !self.pace.allows(s) {
             return None;
+        }
+        if let Destination::Hold { .. } = s.params.destination {
+            let plan =
+                (s.params.radio_range_m.is_finite() && hits_dead(bundle, s)).then(|| self.assign(s, Phase::Reform))?;
+            self.pace.note(s);
+            return plan;
         }
         let planned: Vec<Vec2> = bundle.parts.iter().map(|part| part.slot_m.into()).collect();
         if slots_of(s, Phase::Reform, self.is_front_lost(s)).iter().all(|slot| planned.contains(slot)) {
@@ -130,6 +147,11 @@ impl FormationPlanner {
         s.now.since(since) >= self.patience_s()
     }
 
+    /// Whether members have been stuck since the formation began to close: a drone may hang in a slot where the leader does not see it.
+    fn was_stuck(&self) -> bool {
+        self.swapped || self.open || self.shut_out
+    }
+
     /// For how long all members are at rest before they are stuck, s. Drones that only move once others have answered them over a slow
     /// radio may rest for longer than usual. Therefore the time doubles whenever the ranks have opened and closed in vain.
     fn patience_s(&self) -> f64 {
@@ -161,11 +183,12 @@ impl FormationPlanner {
     /// The plan that assigns the slots. `None` without a slot for every member.
     fn assign(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
         let close = slots_of(s, phase, self.is_front_lost(s));
+        let occupied = if self.was_stuck() { Occupied::of(s) } else { Occupied::seen(s) };
         let (anchor, pin) = match s.members.iter().position(|m| self.pinned && is_alone(m, s)) {
             Some(member) => anchor_for(s, &close, phase, member),
-            None => (anchor(s, &close, phase), None),
+            None => (anchor(s, &close, phase, &occupied), None),
         };
-        let shape = if self.open { opened(&close, anchor, &Occupied::of(s)) } else { close };
+        let shape = if self.open { opened(&close, anchor, &occupied) } else { close };
         let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
@@ -207,24 +230,26 @@ fn newest_passed(s: &Situation<'_>) -> Vec<ObstacleId> {
 /// hears no other flies to the front slot, unless that one has been `taken` for long: if the others live, they leave it to that drone.
 fn slots_of(s: &Situation<'_>, phase: Phase, taken: bool) -> Vec<Vec2> {
     let (shape, spacing_m) = (&s.params.shape, s.params.spacing_m);
+    let count = s.members.len() + if phase == Phase::Reform { missing(s) } else { 0 };
     match s.params.destination {
         Destination::Goal { front_m } if phase == Phase::Reform && (s.members.len() > 1 || taken) => {
-            shape.free_slots(s.members.len(), spacing_m, front_m, s.silent, s.params.safe_distance_m)
+            shape.free_slots(count, spacing_m, front_m, &dead(s), s.params.safe_distance_m)
         }
-        _ => shape.slots(s.members.len(), spacing_m),
+        Destination::Goal { .. } => shape.slots(s.members.len(), spacing_m),
+        Destination::Hold { .. } => shape.slots(count, spacing_m),
     }
 }
 
 /// Whether a silent drone is so near to the front slot at the goal that a drone which hears no other cannot come there.
 fn is_front_taken(s: &Situation<'_>) -> bool {
     let Destination::Goal { front_m } = s.params.destination else { return false };
-    s.members.len() == 1 && s.silent.iter().any(|at| (at - front_m).norm() < s.params.safe_distance_m)
+    s.members.len() == 1 && s.silent.iter().any(|silent| (silent.place - front_m).norm() < s.params.safe_distance_m)
 }
 
 /// Where the front slot goes: the goal; or the mean position of the members, moved on until it is clear of obstacles and
 /// of dead drones. With a limited range, drones that are missing may be out of reach: the members do not wait farther on than where
 /// all parts of the swarm come. They wait there if one of them has an obstacle ahead.
-fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
+fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase, occupied: &Occupied) -> Vec2 {
     if let (Destination::Goal { front_m }, Phase::Reform) = (s.params.destination, phase) {
         return front_m;
     }
@@ -237,7 +262,7 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase) -> Vec2 {
     let misses = s.params.radio_range_m.is_finite() && !s.silent.is_empty();
     let x = if misses { x.min(meeting_x_m(s, shape)) } else { x };
     let x = if is_before_obstacle(s) { x.max(past_x_m(s, shape)) } else { x };
-    moved_on(s, shape, Vec2::new(x, s.params.course_y_m))
+    clear_anchor(s, shape, Vec2::new(x, s.params.course_y_m), occupied)
 }
 
 /// The least abscissa of the front slot beyond the stop for which all slots lie past all known obstacles, m.
@@ -254,8 +279,12 @@ fn past_x_m(s: &Situation<'_>, shape: &[Vec2]) -> f64 {
 }
 
 /// The anchor, moved on until the slots of the shape are clear of obstacles and of dead drones.
-pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2) -> Vec2 {
-    let (mut steps, occupied) = (0, Occupied::of(s));
+pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], anchor: Vec2) -> Vec2 {
+    clear_anchor(s, shape, anchor, &Occupied::of(s))
+}
+
+fn clear_anchor(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2, occupied: &Occupied) -> Vec2 {
+    let mut steps = 0;
     while steps < MAX_ANCHOR_STEPS && shape.iter().any(|slot| occupied.blocks(slot + anchor)) {
         anchor.x += s.params.routes.scale.length(ANCHOR_STEP_M);
         steps += 1;
@@ -264,29 +293,40 @@ pub(crate) fn moved_on(s: &Situation<'_>, shape: &[Vec2], mut anchor: Vec2) -> V
 }
 
 /// Where no slot can be: near obstacles and near dead drones.
-struct Occupied<'a> {
+struct Occupied {
     keep_m: f64,
     clear_m: f64,
     /// The vertices of each obstacle's core, m, and the radius around it, m.
     shapes: Vec<(Vec<Vec2>, f64)>,
-    silent: &'a [Vec2],
+    /// Where drones hang that are dead, as far as the leader knows.
+    dead: Vec<Vec2>,
 }
 
-impl<'a> Occupied<'a> {
-    fn of(s: &Situation<'a>) -> Self {
+impl Occupied {
+    fn of(s: &Situation<'_>) -> Self {
         let core = |shape: &ConvexShape| (shape.vertices().collect(), shape.radius_m);
         Self {
             keep_m: SLOT_BERTH * s.params.safe_distance_m,
             clear_m: s.params.routes.planning_distance_m,
             shapes: s.obstacles.iter().map(|(_, known)| core(&known.shape)).collect(),
-            silent: s.silent,
+            dead: dead(s),
         }
+    }
+
+    /// The same, but of dead drones only those that are known to hang where they are. A drone that was not heard for long may be anywhere.
+    fn seen(s: &Situation<'_>) -> Self {
+        let hang = s.silent.iter().filter(|silent| s.params.radio_range_m.is_infinite() || silent.hangs);
+        Self { dead: hang.map(|silent| silent.place).collect(), ..Self::of(s) }
     }
 
     /// Whether a slot is too near to an obstacle or to a dead drone. World frame, m.
     fn blocks(&self, slot: Vec2) -> bool {
-        self.silent.iter().any(|dead| (slot - dead).norm() < self.keep_m)
+        self.is_near_dead(slot)
             || self.shapes.iter().any(|(core, radius_m)| (nearest(core, slot) - slot).norm() < radius_m + self.clear_m)
+    }
+
+    fn is_near_dead(&self, place: Vec2) -> bool {
+        self.dead.iter().any(|dead| (place - dead).norm() < self.keep_m)
     }
 
     /// Whether a straight way leads nearer to an obstacle than a slot can be and than it begins, or its end is too near to a dead
@@ -296,21 +336,37 @@ impl<'a> Occupied<'a> {
             let begins_m = (nearest(core, from) - from).norm();
             separation(&[from, to], core).norm() < begins_m.min(radius_m + self.clear_m) - ROUNDING_M
         };
-        self.silent.iter().any(|dead| (to - dead).norm() < self.keep_m) || self.shapes.iter().any(nearer)
+        self.is_near_dead(to) || self.shapes.iter().any(nearer)
     }
+}
+
+/// Number of drones that may be out of reach. The formation has slots for them, so that they need not be made room for when they come back.
+fn missing(s: &Situation<'_>) -> usize {
+    s.silent.iter().filter(|silent| !is_dead(s, silent)).count()
+}
+
+/// Where dead drones hang, world frame, m.
+fn dead(s: &Situation<'_>) -> Vec<Vec2> {
+    s.silent.iter().filter(|silent| is_dead(s, silent)).map(|silent| silent.place).collect()
+}
+
+/// Whether a silent drone counts as dead. With a limited range, one that has not been silent for long may be out of reach. Then it does not stay
+/// where it was.
+fn is_dead(s: &Situation<'_>, silent: &Silent) -> bool {
+    s.params.radio_range_m.is_infinite() || silent.hangs || s.now.since(silent.since) >= DEAD_S
 }
 
 /// Where the front slot goes so that a member that follows no leader has a slot, and which slot that is: the one it
 /// stands in, or else the goal's front slot, to which it flies if it hears no other drone.
 fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) -> (Vec2, Option<Pin>) {
-    let (usual, stands) = (anchor(s, shape, phase), s.members[member].position);
+    let occupied = Occupied::of(s);
+    let (usual, stands) = (anchor(s, shape, phase, &occupied), s.members[member].position);
     let off = |slot: &usize| (stands - shape[*slot] - usual).norm();
     let nearest_of = |slots: &mut dyn Iterator<Item = usize>| slots.min_by(|a, b| off(a).total_cmp(&off(b)));
     let Destination::Hold { stop_x_m } = s.params.destination else {
         let here = nearest_of(&mut (0..shape.len())).filter(|slot| off(slot) <= s.params.arrival_error_m);
         return (usual, Some(Pin { member, slot: here.unwrap_or(0) }));
     };
-    let occupied = Occupied::of(s);
     // A drone that hears no other, though there were others, may stand in a slot whose front is beyond the stop.
     let least_x_m = if s.members.len() == 1 && !s.silent.is_empty() { f64::NEG_INFINITY } else { stop_x_m };
     let free = |slot: &usize| {
@@ -346,6 +402,13 @@ fn ends_before_obstacle(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
     let planned = || bundle.parts.iter().map(|part| part.slot_m.into()).collect::<Vec<Vec2>>();
     let (anchor, _) = bundle.plan.anchor_at(s.now);
     is_before_obstacle(s) && anchor.x < past_x_m(s, &planned()) - ROUNDING_M
+}
+
+/// Whether a dead drone hangs beside a slot of a formation.
+fn hits_dead(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
+    let (anchor, _) = bundle.plan.anchor_at(s.now);
+    let occupied = Occupied::seen(s);
+    bundle.parts.iter().any(|part| occupied.is_near_dead(anchor + Vec2::from(part.slot_m)))
 }
 
 /// Whether a member acts on its own: it does not follow this leader, or there is no other drone.
@@ -386,7 +449,7 @@ fn group_of(member: &Member, split: &[&Member]) -> GroupId {
 /// The shape, widened about its own centre, or else about the corner or the side of its bounding box for which the fewest drones meet
 /// an obstacle on the way. `front`: position of the front slot, world frame, m. A drone that is shut out finds a way in. When the ranks
 /// close again, all drones move in proportion.
-fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied<'_>) -> Vec<Vec2> {
+fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied) -> Vec<Vec2> {
     let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
     let (low, high) = shape.iter().fold((centre, centre), |(low, high), slot| (low.inf(slot), high.sup(slot)));
     let middle = (low + high) / 2.0;
@@ -423,7 +486,7 @@ mod tests {
         let square = [(0.0, -5.0), (0.0, 5.0), (-10.0, -5.0), (-10.0, 5.0)].map(|(x, y)| Vec2::new(x, y));
         let wall = [(-1.0, -100.0), (1.0, -100.0), (1.0, 100.0), (-1.0, 100.0)];
         let wall = wall.map(|(x, y)| Vec2::new(x + wall_x_m, y)).to_vec();
-        let occupied = Occupied { keep_m: 5.0, clear_m: 1.0, shapes: vec![(wall, 0.0)], silent: &[] };
+        let occupied = Occupied { keep_m: 5.0, clear_m: 1.0, shapes: vec![(wall, 0.0)], dead: Vec::new() };
         opened(&square, Vec2::zeros(), &occupied)
     }
 

@@ -1,5 +1,6 @@
 //! What a drone knows of its swarm, and how messages change it: peers, obstacles, plans and terms.
 
+use crate::beacons::Beacon;
 use crate::election::{Election, Input};
 use crate::ledger::Ledger;
 use crate::member::Member;
@@ -8,7 +9,7 @@ use crate::own_state::OwnState;
 use crate::params::{Destination, LeadingParams, PlannerParams};
 use crate::peers::Peers;
 use crate::plan_bundle::PlanBundle;
-use crate::tuning::MAX_REJECTIONS;
+use crate::tuning::{MAX_REJECTIONS, OLD_S};
 use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
 use skein_protocol::shape::ConvexShape;
@@ -159,11 +160,28 @@ impl Knowledge {
             let group = pending.filter_map(|bundle| bundle.parts.get(id)).map(|part| part.group).next();
             let group = group.unwrap_or_else(|| pose.group());
             let velocity = pose.velocity();
-            let (position, follows) = (pose.extrapolated(now), pose.term() == self.election.obeyed());
+            let (position, follows) = (self.expected(now, id, pose), pose.term() == self.election.obeyed());
             let speed_mps = velocity.norm();
             let settled = pose.term() < self.election.obeyed() && self.rests_at_destination(position, speed_mps);
             Member { id, position, speed_mps, velocity, group, follows, settled, before: pose.is_before() }
         })
+    }
+
+    /// Where a peer is by now, world frame, m, if it has kept the velocity of its last beacon. It does not fly on past the slot in which it
+    /// is to stay.
+    fn expected(&self, now: SimTime, id: DroneId, pose: Beacon<'_>) -> Vec2 {
+        let flown_s = now.since(pose.stamp());
+        let closes = |bundle: &&PlanBundle| bundle.plan.phase() == Phase::Reform && bundle.plan.id == pose.obeyed();
+        let Some(bundle) = self.ledger.obeyed().filter(|_| flown_s > OLD_S).filter(closes) else {
+            return pose.extrapolated(now);
+        };
+        let (anchor, anchor_mps) = bundle.plan.anchor_at(now);
+        let Some(part) = bundle.parts.get(id).filter(|_| anchor_mps == Vec2::zeros()) else {
+            return pose.extrapolated(now);
+        };
+        let (way, velocity) = (anchor + Vec2::from(part.slot_m) - pose.position(), pose.velocity());
+        let abreast_s = way.dot(&velocity) / velocity.norm_squared().max(f64::MIN_POSITIVE);
+        pose.position() + velocity * abreast_s.clamp(0.0, flown_s)
     }
 
     /// Whether a drone with this position (world frame, m) and speed is where it stays if it hears no other drone.

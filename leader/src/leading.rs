@@ -21,6 +21,7 @@ use crate::planned_set::PlannedSet;
 use crate::planner::Planner;
 use crate::relays::Relays;
 use crate::roles::Roles;
+use crate::silent::Silent;
 use crate::situation::Situation;
 use skein_protocol::payload::{Assignment, Leadership, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
@@ -367,8 +368,8 @@ impl Leading {
     }
 
     /// What a leader decides now: nothing, one plan, or alternatives to choose among. Messages to other leaders go into
-    /// `say`. `silent`: where silent drones may hover, world frame, m.
-    pub fn decide(&mut self, now: SimTime, silent: &[Vec2], say: &mut Vec<Message>) -> Vec<PlanBundle> {
+    /// `say`. `silent`: drones that are not heard any more.
+    pub fn decide(&mut self, now: SimTime, silent: &[Silent], say: &mut Vec<Message>) -> Vec<PlanBundle> {
         let mut rows = Vec::new();
         let k = &self.knowledge;
         let situation = Situation {

@@ -239,7 +239,7 @@ impl Ledger {
     pub fn redraw(&mut self, id: ObstacleId, obstacles: &Obstacles) {
         for set in self.sets.iter_mut().filter(|set| set.ids.contains(&id)) {
             if let Some(shapes) = obstacles.shapes(&set.ids) {
-                set.routes = Routes::new(&shapes, &self.params);
+                set.routes = set.routes.redrawn(&shapes, &self.params);
                 self.redrawn += 1;
             }
         }

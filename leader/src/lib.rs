@@ -86,6 +86,7 @@ pub mod roster;
 pub mod routes;
 pub mod set_place;
 mod shared_values;
+pub mod silent;
 mod situation;
 pub mod slots;
 pub mod split;

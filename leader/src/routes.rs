@@ -149,6 +149,11 @@ pub(crate) fn sort(constraints: &mut [Constraint]) {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Routes {
     routes: Vec<Route>,
+    /// The index of each route in `routes`, by its number. After outlines have grown, obstacles may be merged, and several numbers may stand for
+    /// one route.
+    numbers: Vec<usize>,
+    /// The obstacles of each envelope, from right to left.
+    order: Vec<Vec<ObstacleId>>,
     gate_x_m: f64,
     exit_x_m: f64,
     /// The lowest ordinate of a path on the rightmost route, and the highest of one on the leftmost route, m.
@@ -163,13 +168,49 @@ impl Routes {
     /// [`ConvexShape::check`] are left out. Without obstacles there is one free route, with gate and exit at x = 0.
     #[must_use]
     pub fn new(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
-        let envelopes = ordered(merged(obstacles, params), params);
+        Self::past(&ordered(merged(obstacles, params), params, Envelope::lateral_m), params)
+    }
+
+    /// The same routes, past obstacles whose outlines have grown. A number stands for the route with the same obstacles on its right as before,
+    /// as far as there is one: the order of obstacles does not change because more of one has been seen.
+    #[must_use]
+    pub fn redrawn(&self, obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Self {
+        let place = |id: &ObstacleId| self.order.iter().position(|envelope| envelope.contains(id));
+        let mean = |places: Vec<usize>| places.iter().sum::<usize>() as f64 / places.len().max(1) as f64;
+        let before = |envelope: &Envelope| mean(envelope.ids.iter().filter_map(place).collect());
+        let mut new = Self::past(&ordered(merged(obstacles, params), params, before), params);
+        new.numbers = (0..self.count()).map(|number| new.like(self, number)).collect();
+        new
+    }
+
+    /// The route that has most obstacles on the same side as a route of `other`.
+    pub(crate) fn like(&self, other: &Self, number: usize) -> usize {
+        let was_right: Vec<&ObstacleId> = other.order.iter().take(other.index(number)).flatten().collect();
+        let ids = |envelopes: &[Vec<ObstacleId>]| envelopes.iter().flatten().copied().collect::<Vec<_>>();
+        let moved = |&route: &usize| {
+            let (right, left) = self.order.split_at(route.min(self.order.len()));
+            let missed = ids(right).iter().filter(|id| !was_right.contains(id)).count();
+            missed + ids(left).iter().filter(|id| was_right.contains(id)).count()
+        };
+        (0..self.routes.len()).min_by_key(moved).unwrap_or(0)
+    }
+
+    /// The routes past these envelopes, which are ordered from right to left.
+    fn past(envelopes: &[Envelope], params: &RouteParams) -> Self {
         if envelopes.is_empty() {
-            let (routes, scale) = (vec![Route::default()], params.scale);
-            return Self { routes, gate_x_m: 0.0, exit_x_m: 0.0, sides_m: (0.0, 0.0), scale, blocks: Vec::new() };
+            return Self {
+                routes: vec![Route::default()],
+                numbers: vec![0],
+                order: Vec::new(),
+                gate_x_m: 0.0,
+                exit_x_m: 0.0,
+                sides_m: (0.0, 0.0),
+                scale: params.scale,
+                blocks: Vec::new(),
+            };
         }
         let routes: Vec<Route> =
-            (0..=envelopes.len()).map(|route| Route::new(walls(&envelopes, route, params))).collect();
+            (0..=envelopes.len()).map(|route| Route::new(walls(envelopes, route, params))).collect();
         let centres = envelopes.iter().map(|envelope| (envelope.low.x + envelope.high.x) / 2.0);
         let rear_m = envelopes.iter().map(|envelope| envelope.high.x).fold(f64::NEG_INFINITY, f64::max);
         let ordinates = |route: usize| routes[route].constraints.iter().map(|point| point.y_m);
@@ -177,6 +218,8 @@ impl Routes {
             (ordinates(0).fold(f64::INFINITY, f64::min), ordinates(routes.len() - 1).fold(f64::NEG_INFINITY, f64::max));
         Self {
             sides_m,
+            numbers: (0..routes.len()).collect(),
+            order: envelopes.iter().map(|envelope| envelope.ids.clone()).collect(),
             routes,
             gate_x_m: centres.sum::<f64>() / envelopes.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
@@ -189,7 +232,7 @@ impl Routes {
     /// the route.
     #[must_use]
     pub fn is_open(&self, route: usize, position: Vec2) -> bool {
-        let (right, left) = self.blocks.split_at(route.min(self.blocks.len()));
+        let (right, left) = self.blocks.split_at(self.index(route).min(self.blocks.len()));
         let above = |block: &Block| block.extent(position.x).is_some_and(|(low, _)| position.y < low);
         let below = |block: &Block| block.extent(position.x).is_some_and(|(_, high)| position.y > high);
         !right.iter().flatten().any(above) && !left.iter().flatten().any(below)
@@ -218,13 +261,19 @@ impl Routes {
     /// Number of routes: number of envelopes plus one (paper, E5).
     #[must_use]
     pub fn count(&self) -> usize {
-        self.routes.len()
+        self.numbers.len()
+    }
+
+    /// The index of a route, by its number. A number beyond the last is that of the leftmost route.
+    fn index(&self, number: usize) -> usize {
+        self.numbers.get(number).copied().unwrap_or(self.routes.len() - 1)
     }
 
     /// Whether a route leads between two obstacles. The first and the last one have nothing on their outer side.
     #[must_use]
     pub fn is_between(&self, route: usize) -> bool {
-        route > 0 && route + 1 < self.count()
+        let index = self.index(route);
+        index > 0 && index + 1 < self.routes.len()
     }
 
     /// How far from the walls a drone of a crowd passes on an outermost route, m. `y_m`: the drone's ordinate, in the world frame, m.
@@ -237,7 +286,7 @@ impl Routes {
     pub fn lane_m(&self, route: usize, y_m: f64, squeeze: f64) -> f64 {
         let (right_m, left_m) = self.sides_m;
         let (middle_m, half_m) = ((right_m + left_m) / 2.0, (left_m - right_m) / 2.0);
-        let from_middle_m = if route == 0 { middle_m - y_m } else { y_m - middle_m };
+        let from_middle_m = if self.index(route) == 0 { middle_m - y_m } else { y_m - middle_m };
         let lane_m = (from_middle_m * squeeze).max(from_middle_m - half_m);
         if self.is_between(route) { 0.0 } else { lane_m.max(0.0) }
     }
@@ -245,7 +294,7 @@ impl Routes {
     /// A route, 0 = rightmost. An index beyond the last gives the leftmost.
     #[must_use]
     pub fn route(&self, index: usize) -> &Route {
-        &self.routes[index.min(self.routes.len() - 1)]
+        &self.routes[self.index(index)]
     }
 
     /// The gate: abscissa at which the set counts as passed (paper, C1). It is the mean of the envelopes' centres, m.
@@ -275,7 +324,8 @@ impl Routes {
 /// An envelope of one or several obstacles: all points within `radius_m` of `core`.
 #[derive(Clone, Debug)]
 struct Envelope {
-    id: ObstacleId,
+    /// Its obstacles, ascending.
+    ids: Vec<ObstacleId>,
     core: Vec<Vec2>,
     radius_m: f64,
     low: Vec2,
@@ -309,11 +359,16 @@ fn height(chain: &[Vec2], x_m: f64) -> Option<f64> {
 }
 
 impl Envelope {
-    fn new(id: ObstacleId, core: Vec<Vec2>, radius_m: f64) -> Self {
+    fn new(ids: Vec<ObstacleId>, core: Vec<Vec2>, radius_m: f64) -> Self {
         let margin = Vec2::repeat(radius_m);
         let low = core.iter().fold(Vec2::repeat(f64::INFINITY), |low, p| low.inf(p)) - margin;
         let high = core.iter().fold(Vec2::repeat(f64::NEG_INFINITY), |high, p| high.sup(p)) + margin;
-        Self { id, core, radius_m, low, high, blocks: Vec::new() }
+        Self { ids, core, radius_m, low, high, blocks: Vec::new() }
+    }
+
+    /// The ordinate of its middle, m.
+    fn lateral_m(&self) -> f64 {
+        (self.low.y + self.high.y) / 2.0
     }
 
     /// The shortest vector between the cores, and the gap between the outlines, m.
@@ -334,7 +389,9 @@ impl Envelope {
         let mut points = inflate(&self.core, self.radius_m - radius_m);
         points.extend(inflate(&other.core, other.radius_m - radius_m));
         let blocks = self.blocks.iter().chain(&other.blocks).cloned().collect();
-        Self { blocks, ..Self::new(self.id.min(other.id), hull(&points), radius_m) }
+        let mut ids = [self.ids.as_slice(), &other.ids].concat();
+        ids.sort_unstable();
+        Self { blocks, ..Self::new(ids, hull(&points), radius_m) }
     }
 }
 
@@ -344,10 +401,10 @@ fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<
     let envelope = |(id, shape): &(ObstacleId, ConvexShape)| {
         let core = hull(&shape.vertices().collect::<Vec<_>>());
         let block = Block::new(&inflate(&core, shape.radius_m + params.clearance_m));
-        Envelope { blocks: vec![block], ..Envelope::new(*id, core, shape.radius_m) }
+        Envelope { blocks: vec![block], ..Envelope::new(vec![*id], core, shape.radius_m) }
     };
     let mut envelopes: Vec<Envelope> = valid.map(envelope).collect();
-    envelopes.sort_by_key(|envelope| envelope.id);
+    envelopes.sort_by(|a, b| a.ids.cmp(&b.ids));
     let least_m = 2.0 * params.half_gap_m;
     let closed = |a: &Envelope, b: &Envelope| a.is_near(b, least_m) && a.gap(b).1 <= least_m;
     let pair = |envelopes: &[Envelope]| {
@@ -362,25 +419,23 @@ fn merged(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams) -> Vec<
     envelopes
 }
 
-/// The envelopes from right to left, by lateral position. If a line across the flight can meet two of them, the one that
+/// The envelopes from right to left, by a key, such as their lateral position. If a line across the flight can meet two of them, the one that
 /// lies to the right on that line comes first, so that there is a route between them. Ranks from the right and from the
 /// left count alike, so that a mirrored set has the reverse order. Two of them that are exactly behind each other are ordered
-/// by lateral position alone: the sign of a rounding error is not mirrored.
-fn ordered(envelopes: Vec<Envelope>, params: &RouteParams) -> Vec<Envelope> {
+/// by the key alone: the sign of a rounding error is not mirrored.
+fn ordered(envelopes: Vec<Envelope>, params: &RouteParams, key: impl Fn(&Envelope) -> f64) -> Vec<Envelope> {
     let reach_m = 2.0 * params.planning_distance_m;
     let right_of = |a: &Envelope, b: &Envelope| {
         let apart_m = (b.low.x - a.high.x).max(a.low.x - b.high.x);
         apart_m < reach_m && a.gap(b).0.y > ROUNDING_M
     };
-    let lateral_m: Vec<f64> = envelopes.iter().map(|envelope| (envelope.low.y + envelope.high.y) / 2.0).collect();
+    let keys: Vec<f64> = envelopes.iter().map(key).collect();
     let right: Vec<Vec<bool>> = envelopes.iter().map(|a| envelopes.iter().map(|b| right_of(a, b)).collect()).collect();
-    let from_right = ranks(&lateral_m, |i, j| right[i][j]);
-    let from_left = ranks(&lateral_m.iter().map(|y| -y).collect::<Vec<_>>(), |i, j| right[j][i]);
+    let from_right = ranks(&keys, |i, j| right[i][j]);
+    let from_left = ranks(&keys.iter().map(|key| -key).collect::<Vec<_>>(), |i, j| right[j][i]);
     let mut sorted: Vec<(usize, Envelope)> = envelopes.into_iter().enumerate().collect();
     let place = |i: usize| from_right[i] as i64 - from_left[i] as i64;
-    sorted.sort_by(|(a, _), (b, _)| {
-        place(*a).cmp(&place(*b)).then(lateral_m[*a].total_cmp(&lateral_m[*b])).then(a.cmp(b))
-    });
+    sorted.sort_by(|(a, _), (b, _)| place(*a).cmp(&place(*b)).then(keys[*a].total_cmp(&keys[*b])).then(a.cmp(b)));
     sorted.into_iter().map(|(_, envelope)| envelope).collect()
 }
 

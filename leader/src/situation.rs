@@ -4,8 +4,9 @@ use crate::ledger::Ledger;
 use crate::member::Member;
 use crate::obstacles::Obstacles;
 use crate::params::PlannerParams;
+use crate::silent::Silent;
 use crate::tuning::MAX_ROLLOUT_DRONES;
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, SimTime};
 
 /// What a leader knows when it decides: a read-only view, made anew for each decision.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +27,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) delay_s: f64,
     /// Whether some drones do not hear each other, so that messages are passed on.
     pub(crate) wide: bool,
-    /// Where silent drones may hover, world frame, m.
-    pub(crate) silent: &'a [Vec2],
+    /// Drones that are not heard any more.
+    pub(crate) silent: &'a [Silent],
     /// Known obstacles.
     pub(crate) obstacles: &'a Obstacles,
     /// What was planned so far.

@@ -19,6 +19,8 @@ pub(crate) struct Survey<'a> {
     /// One trip per member and route.
     trips: Vec<Vec<Trip>>,
     kept: Vec<Option<&'a SetPlace>>,
+    /// The number that each route of the assignments which members already have bears now.
+    numbers: Vec<usize>,
 }
 
 impl<'a> Survey<'a> {
@@ -42,10 +44,15 @@ impl<'a> Survey<'a> {
     fn of(s: &Situation<'a>, set: &[ObstacleId], kept: impl Fn(DroneId) -> Option<&'a SetPlace>) -> Option<Self> {
         let routes = Routes::new(&s.obstacles.shapes(set)?, &s.params.routes);
         let kept: Vec<Option<&SetPlace>> = s.members.iter().map(|m| kept(m.id)).collect();
+        let before = s.ledger.sets().iter().find(|p| p.ids == *set);
+        let numbers: Vec<usize> = match before {
+            Some(p) => (0..p.routes.count()).map(|number| routes.like(&p.routes, number)).collect(),
+            None => (0..routes.count()).collect(),
+        };
         let member_trips = |(m, kept): (&Member, &Option<&SetPlace>)| {
             let earlier = earlier_legs(s.ledger, m, &routes);
             let mut trips = trips(&earlier, &routes, m.position, &s.params.flight(m.position));
-            if let Some(route) = kept.map(|part| usize::from(part.route))
+            if let Some(&route) = kept.and_then(|part| numbers.get(usize::from(part.route)))
                 && let Some(flown) = trips.get_mut(route)
                 && flown.arrival_s.is_infinite()
             {
@@ -54,7 +61,7 @@ impl<'a> Survey<'a> {
             trips
         };
         let trips: Vec<Vec<Trip>> = s.members.iter().zip(&kept).map(member_trips).collect();
-        Some(Self { routes, trips, kept })
+        Some(Self { routes, trips, kept, numbers })
     }
 
     /// The routes past the set.
@@ -88,7 +95,7 @@ impl<'a> Survey<'a> {
     /// already flying.
     pub(crate) fn settled(&self, members: &[Member], i: usize) -> Option<usize> {
         match self.kept[i] {
-            Some(part) if usize::from(part.route) < self.routes.count() => Some(usize::from(part.route)),
+            Some(part) if usize::from(part.route) < self.numbers.len() => Some(self.numbers[usize::from(part.route)]),
             _ if members[i].position.x >= self.routes.gate_x_m() => Some(shortest(&self.trips[i])),
             _ if self.kept.iter().any(Option::is_some) => Some(shortest(&self.trips[i])),
             _ => None,

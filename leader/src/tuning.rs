@@ -205,6 +205,11 @@ pub(crate) const STALLED_S: f64 = 3.0;
 /// A drone that hears no other takes a slot farther back once another one has been in the front slot for this long, s. 30: others that live
 /// and that it does not hear have left it by then. By hand.
 pub(crate) const FRONT_LOST_S: f64 = 30.0;
+/// A beacon that is older than this shows how a drone flew, but not how it goes on flying, if it is to stay in a slot, s. 2. By hand.
+pub(crate) const OLD_S: f64 = 2.0;
+/// Where drones may be out of reach, one that was not heard for this long counts as dead if a formation is to close, s. 60: the others come back
+/// within that time. By hand.
+pub(crate) const DEAD_S: f64 = 60.0;
 
 // ---- Routes (`routes.rs`) ----
 

@@ -405,3 +405,62 @@ proptest! {
         routes_are_mirrored(&shapes, y)?;
     }
 }
+
+/// The obstacles on the right of a route, of those whose middles have these abscissas, m.
+fn on_the_right(routes: &Routes, route: usize, middles_m: &[f64]) -> Vec<bool> {
+    let walls = routes.route(route).walls();
+    let covers = |wall: &&skein_leader::routes::Wall, x_m: f64| {
+        let xs = wall.outline.iter().map(|point| point.x);
+        xs.clone().fold(f64::INFINITY, f64::min) < x_m && x_m < xs.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let side = |&x_m: &f64| walls.iter().find(|wall| covers(wall, x_m)).map(|wall| wall.side == Side::Above);
+    middles_m.iter().filter_map(side).collect()
+}
+
+/// Of the wall behind a circle, more and more is seen. Its middle was to the right of the circle, and is to the left of it now.
+#[test]
+fn a_route_stays_on_the_same_side_of_each_obstacle_while_outlines_grow() {
+    let middles_m = [0.0, 130.0];
+    let numbered = |low_m: f64, high_m: f64| {
+        let wall = rectangle(130.0, f64::midpoint(low_m, high_m), 5.0, (high_m - low_m) / 2.0);
+        [(ObstacleId(0), circle(0.0, 0.0, 40.0)), (ObstacleId(1), wall)]
+    };
+    let before = Routes::new(&numbered(-60.0, 30.0), &PARAMS);
+    assert_eq!(
+        on_the_right(&before, 1, &middles_m),
+        [false, true],
+        "past the circle on its right, past the wall on its left"
+    );
+    let grown = before.redrawn(&numbered(-60.0, 90.0), &PARAMS);
+    assert_eq!(on_the_right(&grown, 1, &middles_m), [false, true]);
+    assert_eq!(on_the_right(&Routes::new(&numbered(-60.0, 90.0), &PARAMS), 1, &middles_m), [true, false]);
+    assert_eq!(grown.redrawn(&numbered(-60.0, 120.0), &PARAMS).count(), 3);
+}
+
+/// The gap on whose right two of three obstacles lie is closed.
+#[test]
+fn the_routes_past_obstacles_that_have_grown_together_keep_their_numbers() {
+    let shapes = |half_m: f64| {
+        let middle = rectangle(100.0, 0.0, 5.0, half_m);
+        [rectangle(0.0, -150.0, 5.0, 40.0), middle, rectangle(200.0, 100.0, 105.0, 10.0)]
+            .into_iter()
+            .enumerate()
+            .map(|(i, shape)| (ObstacleId(i as u32), shape))
+            .collect::<Vec<_>>()
+    };
+    let before = Routes::new(&shapes(40.0), &PARAMS);
+    let grown = before.redrawn(&shapes(80.0), &PARAMS);
+    let sides = |routes: &Routes, route| on_the_right(routes, route, &[0.0, 200.0]);
+    assert_eq!((before.count(), grown.count()), (4, 4));
+    assert_eq!(
+        (0..4).map(|route| sides(&before, route)).collect::<Vec<_>>(),
+        [[false, false], [true, false], [true, false], [true, true]]
+    );
+    assert_eq!(
+        (0..4).map(|route| sides(&grown, route)).collect::<Vec<_>>(),
+        [[false, false], [true, false], [true, false], [true, true]]
+    );
+    assert_eq!(grown.route(1), grown.route(2), "no gap is left between the second and the third");
+    assert!(before.route(1) != before.route(2));
+    assert!(grown.is_between(2) && !grown.is_between(3));
+}

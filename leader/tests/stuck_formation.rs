@@ -6,6 +6,7 @@ mod swarm;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
 use skein_leader::params::Destination;
+use skein_leader::silent::Silent;
 use skein_protocol::{Phase, PlanStamp, SimTime, Vec2};
 use swarm::air::{Air, Swarm};
 use swarm::{DEFAULT, params};
@@ -61,7 +62,8 @@ fn lone_slots_m(beside_m: f64, times_s: [f64; 3]) -> [Vec2; 3] {
             leading.elect(now, &own, &mut said);
             if leading.is_leader() {
                 leading.refresh_members(now, &own);
-                let silent = [front_m + Vec2::new(0.0, beside_m)];
+                let place = front_m + Vec2::new(0.0, beside_m);
+                let silent = [Silent { place, since: SimTime::ZERO, hangs: false }];
                 if let Some(bundle) = leading.decide(now, &silent, &mut said).pop() {
                     leading.adopt(now, bundle);
                 }
