@@ -1,4 +1,4 @@
-//! A drone that gives up its place in a queue keeps its route and flies behind all others.
+//! A drone that gives up its place in a queue keeps its route and flies behind all others. One that leaves its route has no place either.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -15,11 +15,18 @@ use std::cell::Cell;
 
 const HERE: Vec2 = Vec2::new(100.0, -60.0);
 
+/// A wall from this ordinate to y = 80 m.
+fn wall(low_m: f64) -> Obstacles {
+    let mut obstacles = Obstacles::new(4, 40.0);
+    let (middle_m, half_m) = (f64::midpoint(low_m, 80.0), (80.0 - low_m) / 2.0);
+    let shape = ConvexShape::rectangle(Vec2::new(200.0, middle_m), Vec2::new(10.0, half_m), 0.0).unwrap();
+    obstacles.learn(SimTime::ZERO, ObstacleId(0), shape, DroneId(0));
+    obstacles
+}
+
 /// The ledger of drone 1 after the plan with this epoch past a wall: it is first on route 0.
 fn hear_plan(ledger: &mut Ledger, epoch: u32) {
-    let mut obstacles = Obstacles::new(4, 40.0);
-    let wall = ConvexShape::rectangle(Vec2::new(200.0, 0.0), Vec2::new(10.0, 80.0), 0.0).unwrap();
-    obstacles.learn(SimTime::ZERO, ObstacleId(0), wall, DroneId(0));
+    let obstacles = wall(-80.0);
     let id = PlanStamp { ballot: Ballot { round: 1, incarnation: 1, claimant: DroneId(0) }, epoch };
     let (set, set_count) = set_array(&[ObstacleId(0)]);
     let phase = Phase::Avoid.to_wire();
@@ -81,4 +88,17 @@ fn a_place_that_was_given_up_comes_back_with_the_next_plan_alone() {
     hear_plan(&mut ledger, 2);
     route.update(&ledger, HERE, &[]);
     assert_eq!(first_place(&route), (0, 0));
+}
+
+#[test]
+fn a_drone_leaves_a_route_that_has_become_much_longer_than_another_one() {
+    let mut ledger = ledger();
+    let mut route = RouteFollower::new(DroneId(1), 0.0, None);
+    hear_plan(&mut ledger, 1);
+    route.update(&ledger, HERE, &[]);
+    for (low_m, place) in [(-250.0, (0, 0)), (-1000.0, (1, QueuePlace::NO_RANK))] {
+        ledger.redraw(ObstacleId(0), &wall(low_m));
+        route.update(&ledger, HERE, &[]);
+        assert_eq!(first_place(&route), place, "a wall that ends at y = {low_m} m");
+    }
 }
