@@ -87,8 +87,8 @@ pub(crate) const NEAR_RANGING: f64 = 0.5;
 /// A dead drone that is near and was not ranged for this long has landed, s. 1. By hand: longer than a sensor drops out.
 pub(crate) const UNSEEN_S: f64 = 1.0;
 
-/// Once an outline has grown, a drone leaves its route if that is longer than another one by this factor. No unit. 1.5. By hand: less would
-/// undo what was decided about congestion, and would turn a drone round beside a wall of which it sees more and more.
+/// Once an outline has grown, a drone leaves its route if that is longer than another one by this factor. No unit. 3. By hand: with
+/// 1.5 so many drones lose their places in queues that narrow gaps jam.
 pub(crate) const LONG_ROUTE: f64 = 3.0;
 
 /// A drone without an obstacle sensor flies on others' word of obstacles if it has heard of one whose sensors work within this time, beside the
