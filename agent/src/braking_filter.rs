@@ -387,29 +387,21 @@ impl Candidate {
         }
         let keep_m = params.clear_m() + errors.obstacle_m;
         let (from, to) = (own.position + self.path.start(), own.position + self.path.end());
-        let mut nearest = segment_to_core(shape, from, to);
-        if errors.partial_outlines {
-            // Only a convex set that holds the place from which the drone looks is certainly nearest to a point in view.
-            let looks = own.sensed_position;
-            let swept = [segment_to_core(shape, looks, to), segment_to_core(shape, looks, from)];
-            nearest = swept.into_iter().fold(nearest, |a, b| if b.distance_m < a.distance_m { b } else { a });
-        }
+        // Only a convex set that holds the place from which the drone looks is certainly nearest to a point in view.
+        let looks = errors.partial_outlines.then_some(own.sensed_position);
+        let nearest = swept_to_core(shape, looks, from, to);
         let distance_m = nearest.distance_m - shape.radius_m;
         if distance_m >= keep_m {
             return Default::default();
         }
-        if errors.partial_outlines && own.lag > 0 {
-            return [
-                Some(Hit { normal: nearest.normal, share: nearest.share, missing_m: keep_m - distance_m }),
-                None,
-                None,
-                None,
-            ];
-        }
         let braked = BrakingPath::new(own.position, own.velocity, params.law());
-        let near = segment_to_core(shape, braked.start(), braked.end());
+        let near = swept_to_core(shape, looks, braked.start(), braked.end());
         let braked_m = near.distance_m - shape.radius_m;
         if errors.obstacle_m > 0.0 && braked_m < keep_m {
+            if looks.is_some() && own.lag > 0 {
+                let hit = Hit { normal: nearest.normal, share: nearest.share, missing_m: keep_m - distance_m };
+                return [(hit.missing_m > MET_M).then_some(hit), None, None, None];
+            }
             let way_m = (braked.end() - braked.start()).norm();
             let moved = [(0.0, from - braked.at(1)), (1.0, to - braked.end())];
             return near.aside(errors.obstacle_m + way_m, moved);
@@ -461,6 +453,14 @@ impl Nearest {
         let [begin, end] = moved;
         [hit(limits[0], begin), hit(limits[1], begin), hit(limits[0], end), hit(limits[1], end)]
     }
+}
+
+/// The nearest point to the core of a shape on the segment, or on the sides of the triangle of it and the place from which the drone `looks`.
+fn swept_to_core(shape: &ConvexShape, looks: Option<Vec2>, from: Vec2, to: Vec2) -> Nearest {
+    let sides = looks.into_iter().flat_map(|looks| [(looks, to), (looks, from)]);
+    sides
+        .map(|(from, to)| segment_to_core(shape, from, to))
+        .fold(segment_to_core(shape, from, to), |a, b| if b.distance_m < a.distance_m { b } else { a })
 }
 
 /// Distance between a segment and the core of a shape, m. Negative if the segment enters the core.

@@ -1,6 +1,6 @@
 //! What the stamps of other drones mean by this drone's clock.
 
-use skein_protocol::payload::{Leadership, Pose};
+use skein_protocol::payload::{Pose, Presence};
 use skein_protocol::{DroneId, MessageRef, SimTime};
 use std::collections::BTreeMap;
 
@@ -43,14 +43,14 @@ impl Least {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Restamped {
     Pose(Pose),
-    Leadership(Leadership),
+    Presence(Presence),
 }
 
 impl Restamped {
     pub(crate) fn message(&self) -> MessageRef<'_> {
         match self {
             Self::Pose(pose) => MessageRef::Pose(pose),
-            Self::Leadership(leadership) => MessageRef::Leadership(leadership),
+            Self::Presence(presence) => MessageRef::Presence(presence),
         }
     }
 }
@@ -61,7 +61,8 @@ impl PeerClocks {
         Self { bound_ns: (2.0 * error_s * 1e9).ceil() as i64, least: BTreeMap::new() }
     }
 
-    /// The same message with its stamp by this drone's clock; `None` if its stamps need no change.
+    /// The same message with its stamp by this drone's clock; `None` if its stamps need no change. Those of a leader number its messages, and
+    /// are only compared with each other.
     pub(crate) fn restamp(&mut self, now: SimTime, source: DroneId, message: MessageRef<'_>) -> Option<Restamped> {
         if self.bound_ns == 0 {
             return None;
@@ -70,11 +71,16 @@ impl PeerClocks {
             MessageRef::Pose(pose) => {
                 Some(Restamped::Pose(Pose { stamp: self.by_own_clock(now, source, pose.stamp), ..*pose }))
             }
-            MessageRef::Leadership(said) => {
-                // The stamp of a message that was passed on is by the clock of another drone.
-                let direct = said.ballot.claimant == source;
-                let stamp = if direct { self.by_own_clock(now, source, said.stamp) } else { said.stamp.min(now) };
-                Some(Restamped::Leadership(Leadership { stamp, ..*said }))
+            MessageRef::Presence(said) => {
+                // These stamps are by the clocks of others, too. What is from the future by no more than clocks may differ is of now.
+                let latest = SimTime(now.0.saturating_add(self.bound_ns));
+                let mut presence = *said;
+                presence
+                    .drones
+                    .iter_mut()
+                    .filter(|one| one.stamp <= latest)
+                    .for_each(|one| one.stamp = one.stamp.min(now));
+                Some(Restamped::Presence(presence))
             }
             _ => None,
         }
@@ -97,8 +103,23 @@ mod tests {
         let pose = Pose { stamp: SimTime::from_secs(stamp_s), ..Pose::zeroed() };
         match clocks.restamp(SimTime::from_secs(now_s), DroneId(1), MessageRef::Pose(&pose))? {
             Restamped::Pose(pose) => Some(pose.stamp.secs()),
-            Restamped::Leadership(_) => None,
+            Restamped::Presence(_) => None,
         }
+    }
+
+    #[test]
+    fn a_state_that_was_passed_on_is_not_from_the_future() {
+        let mut said = Presence { count: 3, ..Presence::zeroed() };
+        for (one, stamp_s) in said.drones.iter_mut().zip([9.0, 11.5, 12.5]) {
+            one.stamp = SimTime::from_secs(stamp_s);
+        }
+        let (now, message) = (SimTime::from_secs(10.0), MessageRef::Presence(&said));
+        let Some(Restamped::Presence(heard)) = PeerClocks::new(1.0).restamp(now, DroneId(1), message) else {
+            panic!("clocks are not exact")
+        };
+        let stamps: Vec<f64> = heard.present().iter().map(|one| one.stamp.secs()).collect();
+        assert_eq!(stamps, [9.0, 10.0, 12.5], "no clock is 2.5 s ahead");
+        assert!(PeerClocks::new(0.0).restamp(now, DroneId(1), message).is_none(), "clocks are exact");
     }
 
     #[test]

@@ -25,11 +25,11 @@ pub(crate) struct OwnPlan {
 }
 
 impl Straggler {
-    /// Notes the formation that a message announces.
-    pub(crate) fn hear(&mut self, message: MessageRef<'_>) {
+    /// Notes the formation that a message announces, in a swarm of `drones`.
+    pub(crate) fn hear(&mut self, drones: u32, message: MessageRef<'_>) {
         let MessageRef::Plan(plan) = message else { return };
         let later = self.formation.is_none_or(|known| plan.stamp > known.stamp);
-        if later && plan.phase() != Phase::Avoid && plan.group == GroupId::ALL {
+        if later && plan.members <= drones && plan.phase() != Phase::Avoid && plan.group == GroupId::ALL {
             self.formation = Some(*plan);
         }
     }
@@ -63,7 +63,9 @@ mod tests {
         };
         assert_eq!(slot(&mut straggler, 0.0, true), None);
         assert_eq!(slot(&mut straggler, 6.0, true), None, "it knows of no formation");
-        straggler.hear(MessageRef::Plan(&plan));
+        straggler.hear(3, MessageRef::Plan(&Plan { members: u32::MAX, stamp: SimTime::from_secs(1.0), ..plan }));
+        assert_eq!(slot(&mut straggler, 6.0, true), None, "a formation of more drones than the swarm has");
+        straggler.hear(3, MessageRef::Plan(&plan));
         assert_eq!(slot(&mut straggler, 6.1, true), Some((Vec2::new(30.0, 12.0), Vec2::zeros())));
         assert_eq!(slot(&mut straggler, 6.2, false), None);
         assert_eq!(slot(&mut straggler, 6.3, true), None, "it may last a moment only");
@@ -80,10 +82,10 @@ mod tests {
         let shape = Shape::Offsets(vec![[0.0, 0.0], [-10.0, 0.0]]);
         let own = OwnPlan { unfollowed: true, apart_since: Some(SimTime::from_secs(2.0)) };
         let mut straggler = Straggler::default();
-        straggler.hear(MessageRef::Plan(&made(1.0)));
+        straggler.hear(3, MessageRef::Plan(&made(1.0)));
         straggler.slot(SimTime::from_secs(3.0), own, &shape, 10.0);
         assert_eq!(straggler.slot(SimTime::from_secs(60.0), own, &shape, 10.0), None);
-        straggler.hear(MessageRef::Plan(&made(50.0)));
+        straggler.hear(3, MessageRef::Plan(&made(50.0)));
         assert!(straggler.slot(SimTime::from_secs(60.0), own, &shape, 10.0).is_some());
     }
 }

@@ -67,6 +67,8 @@ pub struct SwarmPilot {
     reaction: ReactionDelay,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
+    /// If its first step is in this tick or later, its failsafe has braked it before.
+    late_from: u64,
     escape: Escape,
     straggler: Straggler,
     stale_formation: StaleFormation,
@@ -106,6 +108,7 @@ impl SwarmPilot {
             turn: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
             stepped: None,
+            late_from: u64::from(params.incarnation == 1),
             escape: Escape::default(),
             straggler: Straggler::default(),
             stale_formation: StaleFormation::default(),
@@ -220,7 +223,7 @@ impl SwarmPilot {
         params.apart_by_words = false;
         params.sensing = SensingErrors::default();
         let leading = self.leading.rollout_member(&params.leading(), now, ledger.of_member(me));
-        Self::with_leading(params, leading)
+        Self { late_from: u64::MAX, ..Self::with_leading(params, leading) }
     }
 
     /// Takes the shortest route past an obstacle that is in the danger zone and that no plan covers.
@@ -258,39 +261,37 @@ impl SwarmPilot {
         urgent.min_by(sooner).map(|(_, id)| id)
     }
 
-    /// The velocity to fly if no other drone were near, m/s. `open`: the places in the queues of the sets still to leave.
-    fn wanted_velocity(&mut self, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
+    /// The velocity to fly if no other drone were near, m/s. `now`: the present time. `senses`: predicted for the moment at which the command
+    /// takes effect; at that time, drones that are heard would seem silent. `open`: the places in the queues of the sets still to leave.
+    fn wanted_velocity(&mut self, now: SimTime, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
         let guidance = self.params.guidance;
         if self.route.is_blocked() {
             return Vec2::new(-BACK_OUT_SPEED * guidance.speed_mps, 0.0);
         }
         if let Some(steering) = self.route.steering(senses.position()) {
             let direction = self.detour(senses, steering.total_m).unwrap_or(steering.direction);
-            return direction * self.queue_speed_mps(senses.now, open);
+            return direction * self.queue_speed_mps(now, open);
         }
         let (shape, spacing_m) = (&self.params.planner.shape, self.params.planner.spacing_m);
         let is_apart = |plan: &Plan| plan.phase() == Phase::Avoid || plan.group != GroupId::ALL;
         let apart = self.leading.obeyed().filter(|bundle| is_apart(&bundle.plan));
-        let own = OwnPlan {
-            unfollowed: self.leading.is_unfollowed(senses.now),
-            apart_since: apart.map(|bundle| bundle.plan.stamp),
-        };
+        let own =
+            OwnPlan { unfollowed: self.leading.is_unfollowed(now), apart_since: apart.map(|bundle| bundle.plan.stamp) };
         if let Some((slot, velocity)) = self.straggler.slot(senses.now, own, shape, spacing_m) {
             return self.velocity_to_slot(senses, slot, velocity);
         }
-        let stale = self.stale_formation.is_stale(senses.now, self.leading.obeyed(), self.leading.term());
+        let stale = self.stale_formation.is_stale(now, self.leading.obeyed(), self.leading.term());
         match (self.leading.obeyed(), self.leading.part()) {
             (Some(bundle), Some(part)) if bundle.plan.phase() != Phase::Avoid && !stale => {
                 let (anchor, velocity) = anchor(&bundle.plan, senses.now);
                 self.velocity_to_slot(senses, anchor + Vec2::from(part.slot_m), velocity)
             }
-            _ => self.lone_velocity(senses),
+            _ => self.lone_velocity(now, senses.position()),
         }
     }
 
     /// The velocity of a drone that has nothing left to pass and no formation to join, m/s.
-    fn lone_velocity(&mut self, senses: &Senses<'_>) -> Vec2 {
-        let (now, position) = (senses.now, senses.position());
+    fn lone_velocity(&mut self, now: SimTime, position: Vec2) -> Vec2 {
         let others = lone_flight::Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
         let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
         let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
@@ -455,7 +456,10 @@ impl SwarmPilot {
         } else {
             *senses
         };
-        let wanted = match self.lost_place(&then) {
+        // Whether others are heard depends on the present time.
+        let mut seen = then;
+        seen.now = senses.now;
+        let wanted = match self.lost_place(&seen) {
             Some(place) => self.velocity_to_slot(&then, place, Vec2::zeros()),
             None => self.unstuck_velocity(senses.now, &then, open),
         };
@@ -485,7 +489,7 @@ impl SwarmPilot {
     /// The velocity to fly if no other drone were near, or if the drone is stuck, the one by which it escapes, m/s. `then`: the senses,
     /// predicted for the moment at which the command takes effect.
     fn unstuck_velocity(&mut self, now: SimTime, then: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
-        let wanted = self.wanted_velocity(then, open);
+        let wanted = self.wanted_velocity(now, then, open);
         let nominal_mps = self.params.guidance.speed_mps;
         let slow_mps = (nominal_mps - self.params.guidance.speed_change_mps).max(LEAST_ESCAPE_SPEED * nominal_mps);
         let patience_s = if self.route.is_passing() { PATIENCE_ON_ROUTE_S } else { PATIENCE_IN_FORMATION_S };
@@ -510,11 +514,12 @@ impl SwarmPilot {
         path.with_clock_error(self.params.sensing.clock_s)
     }
 
-    /// After ticks without a step, and after a restart, the drone has been braked by its failsafe. Its pending commands are void.
+    /// After ticks without a step, the first ones included, and after a restart, the drone has been braked by its failsafe. Its pending
+    /// commands are void.
     fn brake_after_a_gap(&mut self, senses: &Senses<'_>) {
         let missed = match self.stepped.replace(senses.tick) {
             Some(before) => senses.tick > before + 1,
-            None => self.params.incarnation > 1,
+            None => senses.tick >= self.late_from,
         };
         if missed {
             self.reaction.brake(senses.tick, senses.velocity(), self.braking_filter.params().law());
@@ -601,7 +606,7 @@ impl SwarmPilot {
                 continue;
             }
             self.leading.hear(senses.now, source, message, say);
-            self.straggler.hear(message);
+            self.straggler.hear(self.params.drones, message);
         }
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);

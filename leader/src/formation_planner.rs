@@ -9,7 +9,7 @@ use crate::plan_bundle::PlanBundle;
 use crate::silent::Silent;
 use crate::situation::Situation;
 use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, OPEN_RANKS, STALLED_S};
+use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, OPEN_RANKS, OPENINGS, STALLED_S};
 use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
@@ -39,6 +39,8 @@ pub(crate) struct FormationPlanner {
     shut_out: bool,
     /// How often the ranks were closed again since the formation began to close.
     closings: u32,
+    /// Whether a drone that was shut out has been given the slot that is nearest to it since the ranks were last closed.
+    pushed: bool,
     /// Whether the formation is built around a member that follows no leader, or that is the only one.
     pinned: bool,
     pace: FormationPace,
@@ -48,7 +50,7 @@ pub(crate) struct FormationPlanner {
     front_taken: Option<SimTime>,
 }
 
-/// A member that already stands in a slot. Both are indices.
+/// A member that is to have a certain slot. Both are indices.
 #[derive(Clone, Copy, Debug)]
 struct Pin {
     member: usize,
@@ -115,12 +117,13 @@ impl FormationPlanner {
             self.pace.note(s);
             return plan;
         }
-        let planned: Vec<Vec2> = bundle.parts.iter().map(|part| part.slot_m.into()).collect();
-        if slots_of(s, Phase::Reform, self.is_front_lost(s)).iter().all(|slot| planned.contains(slot)) {
+        let free = slots_of(s, Phase::Reform, self.is_front_lost(s));
+        if bundle.parts.iter().all(|part| free.contains(&part.slot_m.into())) {
             return None;
         }
+        let plan = self.assign(s, Phase::Reform).filter(|plan| takes_other_slots(plan, bundle))?;
         self.pace.note(s);
-        self.assign(s, Phase::Reform).filter(|plan| takes_other_slots(plan, bundle))
+        Some(plan)
     }
 
     /// Whether all members have been at rest for a while although one is not in its slot, or although the ranks are open. A formation that
@@ -161,7 +164,7 @@ impl FormationPlanner {
 
     /// The plan for members that are stuck. A drone that has reached its slot may shut others out of theirs: first each takes the slot that
     /// is best from where it stands now. If that changes nothing, the ranks open, and then they close again, with the slots that are best
-    /// for all.
+    /// for all. If that does not help either, a drone that is shut out takes the slot that is nearest to it, and the drone there goes on.
     fn loosen(&mut self, s: &Situation<'_>, bundle: &PlanBundle) -> Option<PlanBundle> {
         let pinned = s.members.iter().any(|m| is_alone(m, s));
         let shut_out = self.shut_out || self.open;
@@ -176,12 +179,31 @@ impl FormationPlanner {
                 return plan;
             }
         }
+        if !pinned && !self.open && self.closings > 0 && !self.pushed {
+            let pushed = Self { pushed: true, ..fresh };
+            let pin = |places: &[Vec2]| nearest_for_shut_out(s, bundle, places);
+            let plan = pushed.assign_with(s, Phase::Reform, pin);
+            if plan.as_ref().is_some_and(|plan| takes_other_slots(plan, bundle)) {
+                *self = pushed;
+                return plan;
+            }
+        }
         *self = Self { open: !pinned && !self.open, ..fresh };
         self.assign(s, Phase::Reform)
     }
 
     /// The plan that assigns the slots. `None` without a slot for every member.
     fn assign(&self, s: &Situation<'_>, phase: Phase) -> Option<PlanBundle> {
+        self.assign_with(s, phase, |_| None)
+    }
+
+    /// The same. `given`: the slot of one member, if it is chosen beforehand, from the places of the slots, world frame, m.
+    fn assign_with(
+        &self,
+        s: &Situation<'_>,
+        phase: Phase,
+        given: impl Fn(&[Vec2]) -> Option<Pin>,
+    ) -> Option<PlanBundle> {
         let close = slots_of(s, phase, self.is_front_lost(s));
         let occupied = if self.was_stuck() { Occupied::of(s) } else { Occupied::seen(s) };
         let (anchor, pin) = match s.members.iter().position(|m| self.pinned && is_alone(m, s)) {
@@ -192,6 +214,7 @@ impl FormationPlanner {
         let places: Vec<Vec2> = shape.iter().map(|slot| slot + anchor).collect();
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
+        let pin = pin.or_else(|| given(&places));
         let taken = assign_pinned(method, positions, places, pin)?;
         let passed = if phase == Phase::Reform { newest_passed(s) } else { Vec::new() };
         let plan = draft(s, phase, &passed, anchor);
@@ -253,16 +276,21 @@ fn anchor(s: &Situation<'_>, shape: &[Vec2], phase: Phase, occupied: &Occupied) 
     if let (Destination::Goal { front_m }, Phase::Reform) = (s.params.destination, phase) {
         return front_m;
     }
-    let count = s.members.len().max(1) as f64;
-    let mean = |points: &mut dyn Iterator<Item = f64>| points.sum::<f64>() / count;
-    let x = mean(&mut s.members.iter().map(|m| m.position.x)) - mean(&mut shape.iter().map(|slot| slot.x));
+    let x = mean_x_m(s.members.iter().map(|m| m.position)) - mean_x_m(shape.iter().copied());
     if phase != Phase::Reform {
         return Vec2::new(x, s.params.course_y_m);
     }
     let misses = s.params.radio_range_m.is_finite() && !s.silent.is_empty();
-    let x = if misses { x.min(meeting_x_m(s, shape)) } else { x };
+    // All parts of the swarm are to close at one place.
+    let x = if misses { x.min(meeting_x_m(s, shape)).max(past_x_m(s, shape)) } else { x };
     let x = if is_before_obstacle(s) { x.max(past_x_m(s, shape)) } else { x };
     clear_anchor(s, shape, Vec2::new(x, s.params.course_y_m), occupied)
+}
+
+/// The mean abscissa of these points, m; 0 without points.
+fn mean_x_m(points: impl ExactSizeIterator<Item = Vec2>) -> f64 {
+    let count = points.len().max(1) as f64;
+    points.map(|point| point.x).sum::<f64>() / count
 }
 
 /// The least abscissa of the front slot beyond the stop for which all slots lie past all known obstacles, m.
@@ -380,6 +408,18 @@ fn anchor_for(s: &Situation<'_>, shape: &[Vec2], phase: Phase, member: usize) ->
     }
 }
 
+/// The member that is farthest from its slot, and the slot that is nearest to it. `places`: of the slots, world frame, m.
+fn nearest_for_shut_out(s: &Situation<'_>, bundle: &PlanBundle, places: &[Vec2]) -> Option<Pin> {
+    let (anchor, _) = bundle.plan.anchor_at(s.now);
+    let off_m =
+        |m: &Member| bundle.parts.get(m.id).map_or(0.0, |part| (anchor + Vec2::from(part.slot_m) - m.position).norm());
+    let members = s.members.iter().enumerate();
+    let (member, shut_out) = members.max_by(|(_, a), (_, b)| off_m(a).total_cmp(&off_m(b)))?;
+    let away_m = |slot: &usize| (places[*slot] - shut_out.position).norm();
+    let slot = (0..places.len()).min_by(|a, b| away_m(a).total_cmp(&away_m(b)))?;
+    Some(Pin { member, slot })
+}
+
 /// Whether a drone has another slot than before.
 fn takes_other_slots(plan: &PlanBundle, before: &PlanBundle) -> bool {
     plan.parts.iter().any(|part| before.parts.get(part.drone).is_none_or(|old| old.slot_m != part.slot_m))
@@ -447,7 +487,7 @@ fn group_of(member: &Member, split: &[&Member]) -> GroupId {
 }
 
 /// The shape, widened about its own centre, or else about the corner or the side of its bounding box for which the fewest drones meet
-/// an obstacle on the way. `front`: position of the front slot, world frame, m. A drone that is shut out finds a way in. When the ranks
+/// an obstacle on the way. If some meet one in any case, it is widened by less. `front`: position of the front slot, world frame, m. A drone that is shut out finds a way in. When the ranks
 /// close again, all drones move in proportion.
 fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied) -> Vec<Vec2> {
     let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
@@ -455,14 +495,17 @@ fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied) -> Vec<Vec2> {
     let middle = (low + high) / 2.0;
     let xs = [middle.x, low.x, high.x];
     let sides = xs.into_iter().flat_map(|x| [middle.y, low.y, high.y].map(|y| Vec2::new(x, y)));
-    let widened = |fixed: Vec2| move |slot: &Vec2| fixed + (slot - fixed) * OPEN_RANKS;
-    let met = |fixed: &Vec2| {
-        let meets = |slot: &&Vec2| occupied.blocks_way(*slot + front, widened(*fixed)(slot) + front);
+    let widened = |(fixed, factor): (Vec2, f64)| move |slot: &Vec2| fixed + (slot - fixed) * factor;
+    let met = |way: &(Vec2, f64)| {
+        let meets = |slot: &&Vec2| occupied.blocks_way(*slot + front, widened(*way)(slot) + front);
         shape.iter().filter(meets).count()
     };
-    // Of equals the first: the centre.
-    let fixed = iter::once(centre).chain(sides).min_by_key(met).unwrap_or(centre);
-    shape.iter().map(widened(fixed)).collect()
+    let about = iter::once(centre).chain(sides);
+    let factors = (0..OPENINGS).map(|less| OPEN_RANKS - (OPEN_RANKS - 1.0) * f64::from(less) / f64::from(OPENINGS));
+    let ways = factors.flat_map(|factor| about.clone().map(move |fixed| (fixed, factor)));
+    // Of equals the first: the widest, about the centre.
+    let way = ways.min_by_key(met).unwrap_or((centre, 1.0));
+    shape.iter().map(widened(way)).collect()
 }
 
 #[cfg(test)]

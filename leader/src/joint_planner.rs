@@ -74,6 +74,12 @@ impl JointPlanner {
         self.exchange.repeat(s.now, say);
     }
 
+    /// Whether [`Self::decide`] would only wait for the arrivals of these drones of other groups. A survey of many obstacles takes long, and a
+    /// slow radio lets a leader wait for many ticks.
+    pub(crate) fn waits(&self, s: &Situation<'_>, set: &[ObstacleId], others: &[DroneId]) -> bool {
+        self.exchange.waits(s.now, (set_tag(set), s.ballot), s.members.iter().map(|m| m.id), others, s.delay_s)
+    }
+
     /// Plans past a set that drones of other groups, `others`, have ahead too. `None` until their arrivals are known, or
     /// the wait for them is over.
     pub(crate) fn decide(
@@ -85,7 +91,8 @@ impl JointPlanner {
         say: &mut Vec<Arrivals>,
     ) -> Option<Alternatives> {
         let tag = set_tag(set);
-        self.exchange.ask(s.now, tag, || survey.rows(s, tag), say);
+        let members = s.members.iter().map(|m| m.id);
+        self.exchange.ask(s.now, (tag, s.ballot), members, || survey.rows(s, tag), say);
         let table = self.exchange.answer(s.now, others, survey.routes().count(), s.delay_s)?;
         self.exchange.close(s.now, say);
         self.split_jointly(s, set, table, survey)
@@ -212,15 +219,28 @@ fn only_route(row: &Arrivals) -> Option<usize> {
     open.next().filter(|_| open.next().is_none())
 }
 
-/// The part of a split of the common table that is about the members.
+/// The part of a split of the common table that is about the members. Members without a row came to the group after the table was made: they
+/// are last on their shortest routes.
 fn own_grouping(s: &Situation<'_>, table: &[Arrivals], survey: &Survey<'_>, split: &RouteAssignment) -> Grouping {
     let places = places(s, table, survey, split);
-    let (mut chosen, mut ranks) = (vec![0; s.members.len()], vec![0; s.members.len()]);
+    let own_route = |i: usize| survey.settled(s.members, i).unwrap_or_else(|| survey.shortest(i));
+    let mut chosen: Vec<usize> = (0..s.members.len()).map(own_route).collect();
+    let mut ranks = survey.kept_ranks();
     for (row, (route, rank)) in table.iter().zip(split.routes.iter().zip(places)) {
         if let Ok(i) = s.members.binary_search_by_key(&row.drone, |m| m.id) {
-            (chosen[i], ranks[i]) = (*route, rank);
+            (chosen[i], ranks[i]) = (*route, Some(rank));
         }
     }
+    let mut next: BTreeMap<usize, u16> = BTreeMap::new();
+    for &route in &split.routes {
+        *next.entry(route).or_default() += 1;
+    }
+    let mut last = |route: usize| {
+        let next = next.entry(route).or_default();
+        *next += 1;
+        *next - 1
+    };
+    let ranks = chosen.iter().zip(ranks).map(|(&route, rank)| rank.unwrap_or_else(|| last(route))).collect();
     let now_s = s.now.since(SimTime::ZERO);
     Grouping { chosen, ranks, predicted_s: split.makespan_s - now_s }
 }

@@ -31,6 +31,8 @@ pub(crate) struct Knowledge {
     election: Election,
     /// The newest formation of the whole swarm whose drones' passages are noted.
     formed: PlanStamp,
+    /// The obstacles that its drones have passed, of those that were planned for.
+    ended: Vec<ObstacleId>,
 }
 
 impl Knowledge {
@@ -49,6 +51,7 @@ impl Knowledge {
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
             election: Election::new(params.me, params.incarnation, params.election, params.start),
             formed: PlanStamp::default(),
+            ended: Vec::new(),
         }
     }
 
@@ -300,6 +303,9 @@ impl Knowledge {
         if self.obeys(now, Term { ballot, scope, named, goes_on }, source) {
             self.ledger.hear_assignment(part, &self.obstacles);
             self.join(now);
+            if part.id == self.formed {
+                self.note_joined(now, part.drone);
+            }
         } else {
             self.ledger.complete(part);
         }
@@ -355,14 +361,27 @@ impl Knowledge {
 
     /// Notes what the drones of a new formation of the whole swarm are beyond. A slot may lie before the exit of a set that all have
     /// passed; a drone that flies back to it does not have to pass the set again.
-    fn note_formed(&mut self, now: SimTime) {
+    /// `ended`: the obstacles of the sets that it has ended. The assignments of some drones may not be heard yet.
+    fn note_formed(&mut self, now: SimTime, ended: Vec<ObstacleId>) {
         let formation = self.ledger.obeyed().filter(|bundle| is_formation_of_all(&bundle.plan));
         let Some(bundle) = formation.filter(|bundle| bundle.plan.id != self.formed) else { return };
         let of_all = bundle.plan.members >= self.drones;
-        let members = self.living_peers(now).filter(|m| of_all || bundle.parts.contains(m.id));
+        let belongs = |drone: DroneId| of_all || bundle.parts.contains(drone);
+        let members = self.living_peers(now).filter(|m| belongs(m.id));
         let members: Vec<(DroneId, f64)> = members.map(|m| (m.id, m.position.x)).collect();
-        self.formed = bundle.plan.id;
+        for drone in (0..self.drones).map(DroneId).filter(|&drone| belongs(drone)) {
+            self.obstacles.note_passed(drone, &ended);
+        }
+        (self.formed, self.ended) = (bundle.plan.id, ended);
         self.note_beyond(&members);
+    }
+
+    /// Notes what a drone is beyond whose assignment in the new formation was just heard.
+    fn note_joined(&mut self, now: SimTime, drone: DroneId) {
+        self.obstacles.note_passed(drone, &self.ended);
+        if let Some(pose) = self.peers.last_of_living(drone, now) {
+            self.note_beyond(&[(drone, self.expected(now, drone, pose).x)]);
+        }
     }
 
     /// Notes which planned sets these members have passed.
@@ -395,15 +414,7 @@ impl Knowledge {
     /// leader did not hear may still be before the obstacles.
     fn join(&mut self, now: SimTime) {
         let ended = self.ledger.take_ended();
-        if !ended.is_empty()
-            && let Some(bundle) = self.ledger.obeyed()
-        {
-            let of_all = bundle.plan.members >= self.drones;
-            for drone in (0..self.drones).map(DroneId).filter(|&drone| of_all || bundle.parts.contains(drone)) {
-                self.obstacles.note_passed(drone, &ended);
-            }
-        }
-        self.note_formed(now);
+        self.note_formed(now, ended);
         let group = self.ledger.group();
         self.election.handle(now, 0, Input::Joined(group));
     }

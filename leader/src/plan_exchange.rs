@@ -2,7 +2,7 @@
 //! members. All of them split the same table, and each applies the part about its own members.
 
 use crate::split::NEVER_S;
-use crate::tuning::{ANNOUNCE_S, ARRIVALS_TIMEOUT_S, UNPACED};
+use crate::tuning::{ANNOUNCE_S, ARRIVALS_TIMEOUT_S, CLOCKS_S, UNPACED};
 use skein_protocol::payload::{Arrivals, MAX_ROUTES};
 use skein_protocol::{ArrivalsKind, Ballot, DroneId, GroupId, SimTime};
 use std::collections::BTreeMap;
@@ -15,13 +15,21 @@ struct Announcement {
     rows: Vec<Arrivals>,
 }
 
-/// An open question: this drone waits for the rows of others.
+/// An open question of one term: this drone waits for the rows of others.
 #[derive(Clone, Debug, PartialEq)]
 struct Question {
     set: u32,
+    ballot: Ballot,
     since: SimTime,
     next_said: SimTime,
     rows: Vec<Arrivals>,
+}
+
+impl Question {
+    /// Whether the wait for rows is over. `delay_s`: how long a message takes to arrive.
+    fn is_over(&self, now: SimTime, delay_s: f64) -> bool {
+        now.since(self.since) >= ARRIVALS_TIMEOUT_S + 2.0 * delay_s
+    }
 }
 
 /// The rows heard, and the question asked. Memory is bounded by the size of the swarm.
@@ -62,11 +70,12 @@ impl PlanExchange {
         }
     }
 
-    /// Hears a row. A row is ignored if it is older than the last one, from the future, of no drone of the swarm, or if it
+    /// Hears a row. A row is ignored if it is older than the last one, from the future by more than clocks
+    /// may differ, of no drone of the swarm, or if it
     /// has no usable route.
     pub(crate) fn hear(&mut self, now: SimTime, row: &Arrivals) {
         let usable = arrivals_s(row).iter().any(|s| s.abs() < NEVER_S);
-        if row.drone.0 >= self.drones || row.stamp > now || !usable {
+        if row.drone.0 >= self.drones || row.stamp > now.after(CLOCKS_S) || !usable {
             return;
         }
         let rows = match row.kind() {
@@ -83,24 +92,51 @@ impl PlanExchange {
         }
     }
 
-    /// Asks about a set with the rows of this leader's members. `rows` makes them once; they stay the same until the
-    /// answer, so that all leaders split the same table. Says them when due.
+    /// Asks about a set in a term with the rows of this leader's members. `rows` makes them; they stay the same until the
+    /// answer, so that all leaders split the same table. Members that come to the group meanwhile get a row. Says the rows when due.
     pub(crate) fn ask(
         &mut self,
         now: SimTime,
-        set: u32,
+        (set, ballot): (u32, Ballot),
+        members: impl IntoIterator<Item = DroneId>,
         rows: impl FnOnce() -> Vec<Arrivals>,
         say: &mut Vec<Arrivals>,
     ) {
         let question = match &mut self.question {
-            Some(question) if question.set == set => question,
-            other => other.insert(Question { set, since: now, next_said: now, rows: rows() }),
+            Some(question) if (question.set, question.ballot) == (set, ballot) => question,
+            other => other.insert(Question { set, ballot, since: now, next_said: now, rows: Vec::new() }),
         };
+        let has_row = |question: &Question, drone| question.rows.iter().any(|row| row.drone == drone);
+        if members.into_iter().any(|drone| !has_row(question, drone)) {
+            let new: Vec<Arrivals> = rows().into_iter().filter(|row| !has_row(question, row.drone)).collect();
+            question.rows.extend(new);
+        }
         if now >= question.next_said.max(self.next_rows) {
             question.next_said = now.after(self.repeat_s);
             self.next_rows = now.after(pause_s(question.rows.len(), self.row_s));
             say.extend(question.rows.iter().map(|row| Arrivals { kind: ArrivalsKind::Query.to_wire(), ..*row }));
         }
+    }
+
+    /// Whether a question about a set in a term is open, nothing is to be said about it, and it certainly has no answer yet. As
+    /// [`Self::ask`] and [`Self::answer`], without the rows of the members.
+    pub(crate) fn waits(
+        &self,
+        now: SimTime,
+        (set, ballot): (u32, Ballot),
+        members: impl IntoIterator<Item = DroneId>,
+        others: &[DroneId],
+        delay_s: f64,
+    ) -> bool {
+        let asked = self.question.as_ref().filter(|question| (question.set, question.ballot) == (set, ballot));
+        asked.is_some_and(|question| {
+            let has_row = |drone| question.rows.iter().any(|row| row.drone == drone);
+            let is_heard = |drone: &DroneId| self.heard.get(drone).is_some_and(|row| row.set == set);
+            now < question.next_said.max(self.next_rows)
+                && !question.is_over(now, delay_s)
+                && members.into_iter().all(has_row)
+                && !others.iter().all(is_heard)
+        })
     }
 
     /// The whole table, by drone, once every drone of `others` has a row or the wait is over. It includes the rows of this
@@ -116,8 +152,7 @@ impl PlanExchange {
         let fits = |row: &&Arrivals| row.set == question.set && row.routes as usize == routes;
         let foreign: Vec<Arrivals> =
             others.iter().filter_map(|drone| self.heard.get(drone)).filter(fits).copied().collect();
-        let waited = now.since(question.since) >= ARRIVALS_TIMEOUT_S + 2.0 * delay_s;
-        if foreign.len() < others.len() && !waited {
+        if foreign.len() < others.len() && !question.is_over(now, delay_s) {
             return None;
         }
         let mut table: Vec<Arrivals> = question.rows.iter().copied().chain(foreign).collect();
@@ -213,14 +248,15 @@ mod tests {
         SimTime::from_secs(seconds)
     }
 
+    const TERM: Ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
+
     fn row_of(drone: u32, stamp_s: f64, set: u32) -> Arrivals {
-        let ballot = Ballot { round: 1, incarnation: 1, claimant: DroneId(0) };
-        row(at(stamp_s), ballot, GroupId::ALL.child(1), DroneId(drone), set, &[1.0, f64::INFINITY])
+        row(at(stamp_s), TERM, GroupId::ALL.child(1), DroneId(drone), set, &[1.0, f64::INFINITY])
     }
 
     fn asking(exchange: &mut PlanExchange, now_s: f64) -> Vec<Arrivals> {
         let mut said = Vec::new();
-        exchange.ask(at(now_s), 7, || vec![row_of(0, now_s, 7)], &mut said);
+        exchange.ask(at(now_s), (7, TERM), [DroneId(0)], || vec![row_of(0, now_s, 7)], &mut said);
         said
     }
 
@@ -238,6 +274,24 @@ mod tests {
     }
 
     #[test]
+    fn a_question_waits_while_there_is_nothing_to_say_and_no_answer() {
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
+        let waits = |exchange: &PlanExchange, now_s: f64, set: u32, members: &[u32]| {
+            exchange.waits(at(now_s), (set, TERM), members.iter().copied().map(DroneId), &[DroneId(2)], 0.0)
+        };
+        assert!(!waits(&exchange, 1.0, 7, &[0]), "nothing was asked");
+        asking(&mut exchange, 1.0);
+        assert!(waits(&exchange, 1.1, 7, &[0]));
+        assert!(!waits(&exchange, 1.1, 8, &[0]), "another set");
+        assert!(!waits(&exchange, 1.1, 7, &[0, 1]), "a member without a row");
+        assert!(!waits(&exchange, 1.2, 7, &[0]), "the rows are due again");
+        asking(&mut exchange, 1.2);
+        assert!(!waits(&exchange, 1.3, 7, &[0]), "the wait is over");
+        exchange.hear(at(1.25), &row_of(2, 1.22, 7));
+        assert!(!waits(&exchange, 1.25, 7, &[0]), "the table is complete");
+    }
+
+    #[test]
     fn rows_stay_the_same_and_are_repeated_until_the_wait_is_over() {
         let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         let first = asking(&mut exchange, 1.0);
@@ -249,12 +303,26 @@ mod tests {
     }
 
     #[test]
+    fn a_member_that_comes_later_gets_a_row_and_a_question_of_an_earlier_term_is_dropped() {
+        let mut exchange = PlanExchange::new(4, 0.2, 0.0);
+        let mut ask = |now_s: f64, ballot, members: &[u32]| {
+            let rows = || members.iter().map(|drone| row_of(*drone, now_s, 7)).collect();
+            exchange.ask(at(now_s), (7, ballot), members.iter().copied().map(DroneId), rows, &mut Vec::new());
+            let table = exchange.answer(at(now_s), &[], 2, 0.0).unwrap();
+            table.iter().map(|row| (row.drone.0, row.stamp)).collect::<Vec<_>>()
+        };
+        assert_eq!(ask(1.0, TERM, &[0]), [(0, at(1.0))]);
+        assert_eq!(ask(1.1, TERM, &[0, 1]), [(0, at(1.0)), (1, at(1.1))]);
+        assert_eq!(ask(5.0, Ballot { round: 2, ..TERM }, &[1]), [(1, at(5.0))]);
+    }
+
+    #[test]
     fn many_rows_are_repeated_only_as_often_as_the_share_of_the_bandwidth_allows() {
         let mut exchange = PlanExchange::new(100, 0.2, 0.1);
         let mut ask = |now_s: f64| {
             let mut said = Vec::new();
             let rows = || (0..UNPACED as u32 + 10).map(|drone| row_of(drone, now_s, 7)).collect();
-            exchange.ask(at(now_s), 7, rows, &mut said);
+            exchange.ask(at(now_s), (7, TERM), [DroneId(0)], rows, &mut said);
             said.len()
         };
         assert_eq!(ask(1.0), UNPACED + 10);
@@ -311,7 +379,7 @@ mod tests {
         let mut exchange = PlanExchange::new(4, 0.2, 0.0);
         asking(&mut exchange, 1.0);
         exchange.hear(at(1.0), &row_of(9, 0.5, 7));
-        exchange.hear(at(1.0), &row_of(2, 1.5, 7));
+        exchange.hear(at(1.0), &row_of(2, 1.1 + CLOCKS_S, 7));
         exchange.hear(at(1.0), &Arrivals { gate_s: [f32::MAX; MAX_ROUTES], ..row_of(2, 0.5, 7) });
         assert!(exchange.answer(at(1.0), &[DroneId(2)], 2, 0.0).is_none() && exchange.heard.is_empty());
     }

@@ -67,8 +67,11 @@ impl Planner {
     }
 
     fn avoid(&mut self, s: &Situation<'_>, set: &[ObstacleId], say: &mut Vec<Arrivals>) -> Option<Vec<PlanBundle>> {
-        let survey = Survey::new(s, set)?;
         let others = s.others_before(set);
+        if self.joint.waits(s, set, &others) {
+            return None;
+        }
+        let survey = Survey::new(s, set)?;
         self.interim = 0;
         if others.is_empty() || is_without_queues(s, survey.routes()) {
             return avoidance::alternatives(s, set, &survey);

@@ -102,6 +102,11 @@ impl<'a> Survey<'a> {
         }
     }
 
+    /// The shortest route of a member.
+    pub(crate) fn shortest(&self, member: usize) -> usize {
+        shortest(&self.trips[member])
+    }
+
     /// What other leaders are told about the members: one row per member.
     pub(crate) fn rows(&self, s: &Situation<'_>, tag: u32) -> Vec<Arrivals> {
         let row = |i: usize| {

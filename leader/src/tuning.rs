@@ -200,6 +200,8 @@ pub(crate) const FAR_REPEATS: u32 = 4;
 pub(crate) const ANCHOR_STEP_M: f64 = 5.0;
 /// A formation in which a drone cannot reach its slot is widened by this factor. No unit. 1.6. By hand.
 pub(crate) const OPEN_RANKS: f64 = 1.6;
+/// Number of factors that are tried if obstacles are in the way of so wide a formation. No unit. 4: 1.6, 1.45, 1.3 and 1.15. By hand.
+pub(crate) const OPENINGS: u32 = 4;
 /// A formation in which all drones have been stalled for this long is stuck, s. 3. By hand.
 pub(crate) const STALLED_S: f64 = 3.0;
 /// A drone that hears no other takes a slot farther back once another one has been in the front slot for this long, s. 30: others that live

@@ -106,6 +106,11 @@ impl Outline {
         })
     }
 
+    /// The altitudes of its floor and its top, m.
+    pub(crate) fn heights_m(&self) -> (f64, f64) {
+        (self.floor_m, self.top_m)
+    }
+
     /// How far an altitude is above the top or below the floor, m; negative between them.
     fn gap_m(&self, altitude_m: f64) -> f64 {
         (self.floor_m - altitude_m).max(altitude_m - self.top_m)

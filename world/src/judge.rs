@@ -103,7 +103,11 @@ impl MissionJudge {
         self.end = Some(match state.violations {
             0 => verdict,
             count => {
-                let reason = format!("{}, but invariants were broken {count} times", verdict.reason);
+                let broken = match count {
+                    1 => "an invariant was broken".to_owned(),
+                    _ => format!("invariants were broken {count} times"),
+                };
+                let reason = format!("{}, but {broken}", verdict.reason);
                 Verdict { outcome: Outcome::Unsafe, reason, stuck: Vec::new(), ..verdict }
             }
         });

@@ -32,10 +32,13 @@ struct Extent {
     set: usize,
     front_x_m: f64,
     rear_x_m: f64,
+    /// Between these altitudes it is in the way, m: its own, and the planning distance above and below.
+    low_m: f64,
+    high_m: f64,
 }
 
 impl Stages {
-    /// Puts obstacles whose extents along x are closer than `gap_m` into one set.
+    /// Puts obstacles whose extents along x are closer than `gap_m`, twice the planning distance, into one set.
     pub(crate) fn new(outlines: &[Outline], gap_m: f64) -> Self {
         let mut order: Vec<usize> = (0..outlines.len()).collect();
         order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
@@ -50,7 +53,9 @@ impl Stages {
                 made.close(&centres);
                 centres.clear();
             }
-            made.obstacles[obstacle] = Extent { set: made.stages.len(), front_x_m, rear_x_m };
+            let (floor_m, top_m) = outlines[obstacle].heights_m();
+            let (low_m, high_m) = (floor_m - gap_m / 2.0, top_m + gap_m / 2.0);
+            made.obstacles[obstacle] = Extent { set: made.stages.len(), front_x_m, rear_x_m, low_m, high_m };
             last_x_m = last_x_m.max(rear_x_m);
             centres.push((front_x_m + rear_x_m) / 2.0);
         }
@@ -75,12 +80,12 @@ impl Stages {
     }
 
     /// The greatest abscissa of the obstacles that living drones have sensed, m; −∞ without any. An obstacle that no drone ever senses
-    /// lies beside the way, or beyond its end.
+    /// lies beside the way, or beyond its end. One that drones fly over or under is not in the way.
     pub(crate) fn past_x_m(&self) -> f64 {
         self.past_x_m
     }
 
-    /// The greatest abscissa at which an obstacle begins that living drones have sensed, m; −∞ without any.
+    /// The greatest abscissa at which such an obstacle begins, m; −∞ without any.
     pub(crate) fn begun_x_m(&self) -> f64 {
         self.begun_x_m
     }
@@ -111,11 +116,14 @@ impl Stages {
     }
 
     /// Logs the sets that are sensed for the first time, at the time when the tick opens.
-    pub(crate) fn detect(&mut self, contacts: &[Contact], opening: SimTime, log: &mut EventLog) {
+    pub(crate) fn detect(&mut self, contacts: &[Contact], bodies: &[Body], opening: SimTime, log: &mut EventLog) {
         for contact in contacts {
-            let Extent { set: number, front_x_m, rear_x_m } = self.obstacles[contact.obstacle as usize];
-            self.begun_x_m = self.begun_x_m.max(front_x_m);
-            self.past_x_m = self.past_x_m.max(rear_x_m);
+            let Extent { set: number, front_x_m, rear_x_m, low_m, high_m } = self.obstacles[contact.obstacle as usize];
+            let altitude_m = bodies[contact.drone as usize].position().z;
+            if low_m < altitude_m && altitude_m < high_m {
+                self.begun_x_m = self.begun_x_m.max(front_x_m);
+                self.past_x_m = self.past_x_m.max(rear_x_m);
+            }
             if !std::mem::replace(&mut self.stages[number].detected, true) {
                 let what = EventKind::Detected {
                     stage: number as u32,
@@ -185,9 +193,9 @@ mod tests {
 
     #[test]
     fn detection_is_logged_once_per_set() {
-        let (mut stages, mut log) = (forest(), EventLog::default());
-        stages.detect(&[contact(3, 0), contact(4, 1)], SimTime(5), &mut log);
-        stages.detect(&[contact(0, 1), contact(0, 2)], SimTime(6), &mut log);
+        let (mut stages, mut log, all) = (forest(), EventLog::default(), bodies(&[[0.0, 0.0]; 5]));
+        stages.detect(&[contact(3, 0), contact(4, 1)], &all, SimTime(5), &mut log);
+        stages.detect(&[contact(0, 1), contact(0, 2)], &all, SimTime(6), &mut log);
         let detected = |stage, drone, obstacle| EventKind::Detected {
             stage,
             drone: DroneId(drone),
@@ -195,6 +203,19 @@ mod tests {
             distance_m: 60.0,
         };
         assert_eq!(event_kinds(read(&mut log)), [detected(1, 3, 0), detected(0, 0, 2)]);
+    }
+
+    #[test]
+    fn an_obstacle_that_drones_fly_over_is_not_in_the_way() {
+        let low = |top_m| rectangle(100.0, 0.0, 10.0, 10.0).between(0.0, top_m).unwrap();
+        let past_x_m = |top_m| {
+            let mut stages = Stages::new(&[Outline::new(&low(top_m))], 40.0);
+            let above = [Body::new(Vec3::new(60.0, 0.0, 50.0), Vec3::zeros())];
+            stages.detect(&[contact(0, 0)], &above, SimTime(5), &mut EventLog::default());
+            assert!(stages.is_detected(0));
+            stages.past_x_m()
+        };
+        assert_eq!((past_x_m(31.0), past_x_m(30.0)), (110.0, f64::NEG_INFINITY));
     }
 
     #[test]

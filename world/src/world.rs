@@ -319,7 +319,7 @@ impl World {
         let now = self.now();
         self.faults.end_due(now, &mut self.drones, &mut self.log);
         self.drop_unsensed_contacts();
-        self.stages.detect(self.sweep.contacts(), now, &mut self.log);
+        self.stages.detect(self.sweep.contacts(), self.drones.bodies(), now, &mut self.log);
         if self.faults.begin_due(now, &mut self.drones, &self.stages, &mut self.log) {
             self.drop_unsensed_contacts();
         }

@@ -16,12 +16,19 @@ pub(crate) struct FaultEngine {
     commands: Vec<ProcessCommand>,
     /// The drones whose pilots failed in the last tick, with the reasons.
     failed: Vec<(DroneId, String)>,
+    /// Which faults hold the processes of which drones stopped, as index and drone.
+    freezes: Vec<(usize, DroneId)>,
 }
 
 impl FaultEngine {
     /// The plan for this number of drones, with nothing begun.
     pub(crate) fn new(plan: FaultPlan, drones: usize) -> Self {
-        Self { schedule: FaultSchedule::new(plan, drones), commands: Vec::new(), failed: Vec::new() }
+        Self {
+            schedule: FaultSchedule::new(plan, drones),
+            commands: Vec::new(),
+            failed: Vec::new(),
+            freezes: Vec::new(),
+        }
     }
 
     /// What is in force.
@@ -85,6 +92,7 @@ impl FaultEngine {
                 }
                 FaultKind::Freeze => {
                     drones.freeze(drone);
+                    self.freezes.push((change.fault, drone));
                     self.commands.push(ProcessCommand::Freeze(drone));
                 }
                 _ => {}
@@ -102,7 +110,7 @@ impl FaultEngine {
         }
         for &drone in &change.drones {
             let detail = match kind {
-                FaultKind::Freeze => self.resume(drone, drones),
+                FaultKind::Freeze => self.resume(change.fault, drone, drones),
                 FaultKind::Restart => self.restart(drone, drones),
                 _ => Some(String::new()),
             };
@@ -112,8 +120,13 @@ impl FaultEngine {
         }
     }
 
-    /// The description of the event; `None` if the process has been killed meanwhile.
-    fn resume(&mut self, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
+    /// Ends what a fault does to a process. Returns the description of the event; `None` if the process has been killed meanwhile.
+    fn resume(&mut self, fault: usize, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
+        let held = self.freezes.iter().position(|held| *held == (fault, drone))?;
+        self.freezes.swap_remove(held);
+        if self.freezes.iter().any(|(_, held)| *held == drone) {
+            return Some("another fault still stops it".to_owned());
+        }
         if !drones.resume(drone) {
             return None;
         }
@@ -124,6 +137,8 @@ impl FaultEngine {
     /// The description of the event; `None` if the drone is landing meanwhile.
     fn restart(&mut self, drone: DroneId, drones: &mut DroneTable) -> Option<String> {
         let incarnation = drones.restart(drone)?;
+        // The faults that stopped its last process do not stop the new one.
+        self.freezes.retain(|(_, held)| *held != drone);
         self.commands.push(ProcessCommand::Restart(drone, incarnation));
         Some(format!("a new process, incarnation {incarnation}"))
     }
@@ -135,5 +150,50 @@ fn is_of_swarm(targets: &FaultTargets, effect: &FaultEffect) -> bool {
         FaultEffect::Partition(_) => true,
         FaultEffect::Kill | FaultEffect::Freeze | FaultEffect::Restart => false,
         _ => *targets == FaultTargets::All,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault_plan::{Fault, FaultTime};
+    use skein_protocol::Vec3;
+
+    /// When one drone's process is stopped, in whole seconds, in which it has these faults: effect, time and length, s.
+    fn stopped(faults: &[(FaultEffect, f64, f64)]) -> Vec<u32> {
+        let targets = FaultTargets::Drones(vec![DroneId(0)]);
+        let fault = |(effect, at_s, for_s): &(FaultEffect, f64, f64)| Fault {
+            effect: effect.clone(),
+            time: FaultTime::At(*at_s),
+            targets: targets.clone(),
+            for_s: *for_s,
+        };
+        let plan = FaultPlan { seed: 1, faults: faults.iter().map(fault).collect() };
+        let mut drones = DroneTable::new(&[(Vec3::zeros(), Vec3::zeros())]);
+        let (mut engine, stages, mut log) = (FaultEngine::new(plan, 1), Stages::new(&[], 40.0), EventLog::default());
+        let mut stopped = false;
+        let mut tick = |second: u32| {
+            let now = SimTime::from_secs(second.into());
+            engine.end_due(now, &mut drones, &mut log);
+            engine.begin_due(now, &mut drones, &stages, &mut log);
+            for command in engine.commands() {
+                stopped = matches!(command, ProcessCommand::Freeze(_));
+            }
+            stopped
+        };
+        (0..30).filter(|&second| tick(second)).collect()
+    }
+
+    #[test]
+    fn the_end_of_one_freeze_does_not_end_another_one() {
+        let freeze = |at_s, for_s| (FaultEffect::Freeze, at_s, for_s);
+        assert_eq!(stopped(&[freeze(1.0, 9.0), freeze(4.0, 20.0)]), (1..24).collect::<Vec<_>>());
+        let restarted = [freeze(1.0, 9.0), (FaultEffect::Restart, 2.0, 1.0), freeze(4.0, 20.0)];
+        let expected: Vec<u32> = (1..2).chain(4..24).collect();
+        assert_eq!(stopped(&restarted), expected, "the first one stopped another process");
+        let (long, short) = (freeze(1.0, 9.0), freeze(4.0, 2.0));
+        assert_eq!(stopped(&[long.clone(), short.clone()]), (1..10).collect::<Vec<_>>());
+        let expected: Vec<u32> = (1..2).chain(4..6).collect();
+        assert_eq!(stopped(&[long, (FaultEffect::Restart, 2.0, 1.0), short]), expected);
     }
 }

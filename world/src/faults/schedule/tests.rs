@@ -32,7 +32,8 @@ impl Scene {
 
     fn detect(&mut self) {
         let nearest = Nearest { point: Vec3::zeros(), distance_m: 60.0 };
-        self.stages.detect(&[Contact { drone: 0, obstacle: 0, nearest }], SimTime::ZERO, &mut EventLog::default());
+        let contacts = [Contact { drone: 0, obstacle: 0, nearest }];
+        self.stages.detect(&contacts, self.drones.bodies(), SimTime::ZERO, &mut EventLog::default());
     }
 
     /// Lets a drone obey the plan of this epoch.
