@@ -9,7 +9,7 @@ Usage: scripts/spawn_swarm.sh [DRONES] [FORMATION] [SPACING_M] [OPTION]...
 Starts one process per drone and one for the world, and flies scenarios/open-field.toml.
 
   DRONES      number of drones [8]
-  FORMATION   nested-v, v, line, column, grid or circle [v]
+  FORMATION   nested-v, v, wedge, line, column, grid or circle [v]
   SPACING_M   metres between neighbours, at least 4 [8]
   OPTION      the first argument that begins with a dash, and all after it, are passed to
               `skein run`
