@@ -487,8 +487,8 @@ fn group_of(member: &Member, split: &[&Member]) -> GroupId {
 }
 
 /// The shape, widened about its own centre, or else about the corner or the side of its bounding box for which the fewest drones meet
-/// an obstacle on the way. If some meet one in any case, it is widened by less. `front`: position of the front slot, world frame, m. A drone that is shut out finds a way in. When the ranks
-/// close again, all drones move in proportion.
+/// an obstacle on the way. If some meet one in any case, it is widened by less. `front`: position of the front slot, world frame, m. A
+/// drone that is shut out finds a way in. When the ranks close again, all drones move in proportion.
 fn opened(shape: &[Vec2], front: Vec2, occupied: &Occupied) -> Vec<Vec2> {
     let centre = shape.iter().sum::<Vec2>() / shape.len().max(1) as f64;
     let (low, high) = shape.iter().fold((centre, centre), |(low, high), slot| (low.inf(slot), high.sup(slot)));
