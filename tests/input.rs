@@ -70,7 +70,12 @@ fn what_does_not_exist_or_is_of_another_kind_is_answered_by_what_was_meant() {
 
 #[test]
 fn keys_and_values_are_named_with_their_place() {
-    let cases: [(&str, &[&str]); 10] = [
+    let cases: [(&str, &[&str]); 12] = [
+        (
+            "[formation]\nspeed_mps = 8\n",
+            &["bad.toml:2:1: formation.speed_mps: unknown key", "it belongs in `[drone]`"],
+        ),
+        ("[formation]\nseed = 8\n", &["bad.toml:2:1: formation.seed: unknown key", "at the top level of the file"]),
         ("[formation]\ndronse = 8\n", &["bad.toml:2:1: formation.dronse: unknown key", "did you mean `drones`?"]),
         ("[formation]\n[dron]\n", &["bad.toml:2:2: dron: unknown table", "did you mean `drone`?"]),
         ("[formation]\ndrones = \"eight\"\n", &["bad.toml:2:10: formation.drones: ", "expected a whole number"]),
@@ -99,7 +104,18 @@ fn obstacles_must_have_a_size_and_keep_clear_of_slots() {
 
 #[test]
 fn arguments_without_a_meaning_are_refused() {
-    let cases: [(&[&str], &[&str]); 14] = [
+    let inline = ["--runtime", "inline"];
+    let processes = ["expected --runtime processes beside it"];
+    for option in
+        [["--patience", "1"], ["--drones-per-process", "2"], ["--pin", "off"], ["--wait", "yield"], ["--keys", "k"]]
+    {
+        let done = Place::new().run(&[&["run", &paper("s2-right")], &inline[..], &option].concat());
+        assert_refused(&Place::new(), &done, &[&[option[0]], &processes[..]].concat());
+    }
+    let cases: [(&[&str], &[&str]); 17] = [
+        (&["--clock", "realtime", "--patience", "1"], &["--patience: expected --clock lockstep beside it"]),
+        (&["--keys", "keys"], &["--keys: expected --hosts NAME=COUNT or [[host]] beside it"]),
+        (&["--connect", "tcp/127.0.0.1:1"], &["--connect: expected --hosts NAME=COUNT or [[host]] beside it"]),
         (&["--set", "drone"], &["--set", "expected key.path=value"]),
         (&["--set", "drone.speed=3"], &["drone.speed: unknown key", "`speed_mps`"]),
         (&["--set", "time.dt_s=soon"], &["--set time.dt_s=soon", "expected a number"]),
@@ -203,6 +219,17 @@ fn help_version_schemas_completions_and_manual_go_to_stdout() {
     }
 }
 
+#[test]
+fn help_into_a_closed_pipe_is_no_error() {
+    let place = Place::new();
+    for args in [&["--help"][..], &["run", "--help"], &["--version"], &["man", "run"], &["schema", "scenario"]] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = place.command(args).stdout(writer).output().unwrap();
+        assert_eq!((output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()), (Some(0), ""), "{args:?}");
+    }
+}
+
 /// The value has every required key, each with a type that the schema allows, and no other key.
 fn assert_valid(value: &Value, schema: &Value, root: &Value, at: &str) {
     let name = schema["$ref"].as_str();
@@ -288,30 +315,44 @@ fn quiet_prints_nothing_and_colour_is_for_terminals() {
     assert!(!spoken.stdout.contains('\u{1b}'), "{spoken:?}");
 }
 
+/// What a command prints on a terminal with these variables; `None` if the machine has no util-linux `script`, which makes one.
+fn on_terminal(place: &Place, args: &str, variables: &[(&str, &str)]) -> Option<String> {
+    let line = format!("{} {args}", env!("CARGO_BIN_EXE_skein"));
+    let mut command = std::process::Command::new("script");
+    command.args(["-qec", &line, "/dev/null"]).current_dir(place.join("")).env("TERM", "xterm");
+    command.env("XDG_RUNTIME_DIR", place.join("x")).env_remove("NO_COLOR").stdin(std::process::Stdio::null());
+    command.envs(variables.iter().copied());
+    command.output().ok().map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Only sequences that end in `m` set a colour. Others move the cursor.
+fn is_coloured(text: &str) -> bool {
+    let mut sequences = text.split("\u{1b}[").skip(1);
+    sequences.any(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';').starts_with('m'))
+}
+
 #[test]
-fn no_color_is_honoured_on_a_terminal() {
-    // util-linux's `script` gives the command a terminal.
-    let terminal = |no_colour: bool| {
-        let place = Place::new();
-        let line = format!("{} run {} --runtime inline", env!("CARGO_BIN_EXE_skein"), paper("s1-centred"));
-        let mut command = std::process::Command::new("script");
-        command.args(["-qec", &line, "/dev/null"]).current_dir(place.join("")).env("TERM", "xterm");
-        command.env("XDG_RUNTIME_DIR", place.join("x")).env_remove("NO_COLOR").stdin(std::process::Stdio::null());
-        if no_colour {
-            command.env("NO_COLOR", "1");
-        }
-        command.output().ok().map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
-    };
-    let (Some(with), Some(without)) = (terminal(false), terminal(true)) else {
-        return eprintln!("skipped: the command `script` is missing");
-    };
-    // Only sequences that end in `m` set a colour. Others move the cursor.
-    let coloured = |text: &str| {
-        let mut sequences = text.split("\u{1b}[").skip(1);
-        sequences.any(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';').starts_with('m'))
-    };
-    assert!(with.contains("reached") && coloured(&with), "{with:?}");
-    assert!(without.contains("reached") && !coloured(&without), "{without:?}");
+fn colour_follows_one_rule_on_a_terminal() {
+    let place = Place::new();
+    std::fs::write(place.join("bad.toml"), "[formation]\ndrones = 0\n").unwrap();
+    let run = format!("run {} --runtime inline", paper("s1-centred"));
+    let commands = [("--help", "Usage"), ("run --no-such", "error"), ("check bad.toml", "drones"), (&run, "reached")];
+    let cases: [(&[(&str, &str)], bool); 5] = [
+        (&[], true),
+        (&[("NO_COLOR", "")], true),
+        (&[("NO_COLOR", "1")], false),
+        (&[("TERM", "dumb")], false),
+        (&[("NO_COLOR", "1"), ("CLICOLOR_FORCE", "1")], false),
+    ];
+    for ((args, word), (variables, coloured)) in
+        commands.into_iter().flat_map(|command| cases.map(|case| (command, case)))
+    {
+        let Some(text) = on_terminal(&place, args, variables) else {
+            return eprintln!("skipped: the command `script` is missing");
+        };
+        assert!(text.contains(word), "{args} {variables:?}: {text:?}");
+        assert_eq!(is_coloured(&text), coloured, "{args} {variables:?}: {text:?}");
+    }
 }
 
 #[test]
@@ -364,6 +405,8 @@ fn without_a_record_only_the_summary_is_written() {
     }
     let hunt = place.run(&["hunt", "short.toml", "--flights", "1", "--out", "out"]);
     assert!(hunt.code == Some(2) && hunt.stderr.contains("out: exists"), "{hunt:?}");
+    let forced = place.run(&["hunt", "short.toml", "--flights", "1", "--out", "out", "--force"]);
+    assert!(forced.code == Some(2) && forced.stderr.contains("out: is not the folder of a hunt"), "{forced:?}");
     let manifest = std::fs::read_to_string(place.join("out/manifest.json")).unwrap();
     assert_eq!(read_json(place.join("out/manifest.json"))["facts"]["end"], "hold");
     let broken = manifest.replacen("\"spacing_m\": 60.0", "\"spacing_m\": -60.0", 1);
@@ -389,6 +432,10 @@ fn a_process_that_is_killed_before_the_first_tick_leaves_a_summary() {
     assert_eq!(done.code, Some(3), "{done:?}");
     assert_eq!((&done.summary()["outcome"], &done.summary()["ticks"]), (&json!("aborted"), &json!(0)));
     assert_eq!(read_json(place.join("out/summary.json"))["outcome"], "aborted");
-    let nowhere = place.run(&["reproduce", "--quick", "--out", "/proc/paper"]);
-    assert_eq!(nowhere.code, Some(3), "{nowhere:?}");
+    // These take long if the folder is made last.
+    std::fs::write(place.join("short.toml"), SHORT).unwrap();
+    for args in [&["reproduce", "--quick"][..], &["hunt", "short.toml", "--flights", "10000000"]] {
+        let nowhere = place.run(&[args, &["--out", "/proc/paper"]].concat());
+        assert_eq!(nowhere.code, Some(3), "{nowhere:?}");
+    }
 }

@@ -78,14 +78,40 @@ fn a_full_disk_costs_no_record_that_it_holds() {
     assert!(out.join("report.html").exists() && !out.join("flight.spool").exists(), "{:?}", names(&out));
 }
 
+/// Flies with a limit of so many KiB per file (`ulimit -f`).
+fn with_file_limit(place: &Place, limit_kib: u32, options: &[&str]) -> Output {
+    let flown = place.command(&[&["run", &paper("s2-right"), "--json", "--out", "out", "--force"], options].concat());
+    let words = flown.get_args().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" ");
+    // In blocks of 512 bytes.
+    let script = format!("ulimit -f {}; exec {} {words}", 2 * limit_kib, env!("CARGO_BIN_EXE_skein"));
+    Command::new("sh").args(["-c", &script]).current_dir(place.join("")).output().unwrap()
+}
+
+#[test]
+fn a_file_that_reaches_the_limit_of_sizes_is_an_error_with_words() {
+    let place = Place::new();
+    for (runtime, limit_kib, word) in [
+        ("inline", 4, "File too large"),
+        ("inline", 256, "File too large"),
+        ("processes", 4, "File too large"),
+        // Files in shared memory reach it first.
+        ("processes", 100, "`ulimit -f`"),
+        ("processes", 1024, "`ulimit -f`"),
+    ] {
+        let done = with_file_limit(&place, limit_kib, &["--runtime", runtime]);
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(3), "{runtime}, {limit_kib} KiB: {said}");
+        assert!(said.contains(word), "{runtime}, {limit_kib} KiB: {said}");
+    }
+}
+
 #[test]
 fn a_record_that_was_cut_short_is_written_up() {
     let place = Place::new();
-    // A limit of 1 MiB per file, in blocks of 512 bytes. The page would be larger.
-    let flown = place.command(&["run", &paper("s2-right"), "--json", "--out", "out", "--runtime", "inline"]);
-    let words = flown.get_args().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" ");
-    let script = format!("trap '' XFSZ; ulimit -f 2048; exec {} {words}", env!("CARGO_BIN_EXE_skein"));
-    let done = Command::new("sh").args(["-c", &script]).current_dir(place.join("")).output().unwrap();
+    // The page would be larger than 1 MiB.
+    let done = with_file_limit(&place, 1024, &INLINE);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("File too large"), "{said}");
     assert_eq!(done.status.code(), Some(3), "{done:?}");
     let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(

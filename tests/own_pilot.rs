@@ -5,8 +5,10 @@
 mod own_pilots;
 
 use serde_json::Value;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Output};
+use std::process::{Command, ExitCode, Output, Stdio};
+use std::time::{Duration, Instant};
 
 /// Set in the processes of the application.
 const APP: &str = "SKEIN_TEST_APP";
@@ -59,6 +61,8 @@ const TESTS: &[(&str, Test)] = &[
     ("a_process_that_ends_or_hangs_is_a_failure", a_process_that_ends_or_hangs_is_a_failure),
     ("a_program_of_another_version_is_refused_with_words", a_program_of_another_version_is_refused_with_words),
     ("a_forked_process_never_flies", a_forked_process_never_flies),
+    ("a_pilot_that_ends_an_inline_run_is_named", a_pilot_that_ends_an_inline_run_is_named),
+    ("a_pilot_that_hangs_an_inline_run_can_be_interrupted", a_pilot_that_hangs_an_inline_run_can_be_interrupted),
     ("drones_of_a_shared_process_fail_alone", drones_of_a_shared_process_fail_alone),
     ("a_program_without_its_pilot_in_the_air_says_so", a_program_without_its_pilot_in_the_air_says_so),
 ];
@@ -351,6 +355,58 @@ fn a_forked_process_never_flies(bench: &Bench) {
             assert_eq!(summary["digest"], alone["digest"], "{how}, {runtime}: the drone flies on");
             assert_eq!(summary["failures"], serde_json::json!([]));
         }
+    }
+}
+
+fn a_pilot_that_ends_an_inline_run_is_named(bench: &Bench) {
+    for (how, threads) in [("exit", "1"), ("exit", "2"), ("exit at birth", "1")] {
+        let path = bench.scenario(&clumsy(how));
+        let words = ["run", path.to_str().unwrap(), "--json", "--force", "--out", "run", "--runtime", "inline"];
+        // More drones than one thread takes at a time.
+        let done = bench.command(&words).args(["--threads", threads, "--set", "formation.drones=20"]).output().unwrap();
+        let errors = text(&done.stderr);
+        assert_eq!(done.status.code(), Some(3), "{how}, {threads}: {errors}");
+        assert!(
+            errors.contains("skein: the pilot of drone 2 ended the process, and with it the run"),
+            "{how}: {errors}"
+        );
+    }
+    // A process that the pilot forks may end as it likes.
+    let alone = bench.fly(&bench.scenario(&clumsy("nothing")), &["--runtime", "inline"]);
+    let forked = bench.fly(&bench.scenario(&clumsy("fork and exit")), &["--runtime", "inline"]);
+    assert_eq!(forked["digest"], alone["digest"]);
+}
+
+fn a_pilot_that_hangs_an_inline_run_can_be_interrupted(bench: &Bench) {
+    let path = bench.scenario(&clumsy("hang"));
+    let words = ["run", path.to_str().unwrap(), "--force", "--out", "run", "--runtime", "inline", "--threads", "2"];
+    // The signals, and within which time after the last one the run ends, s.
+    let cases: [(&[&str], i32, [f64; 2]); 2] = [(&["INT"], 130, [2.0, 4.0]), (&["INT", "TERM"], 143, [0.0, 1.5])];
+    for (signals, code, [least_s, most_s]) in cases {
+        let mut command = bench.command(&words);
+        command.args(["--set", "formation.drones=20"]).stderr(Stdio::piped());
+        let mut flight = command.spawn().unwrap();
+        let mut errors = BufReader::new(flight.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains("it hangs") {
+            line.clear();
+            assert!(errors.read_line(&mut line).unwrap() > 0, "the run has ended");
+        }
+        let mut asked = Instant::now();
+        for signal in signals {
+            std::thread::sleep(Duration::from_millis(500));
+            asked = Instant::now();
+            assert!(Command::new("kill").args(["-s", signal, &flight.id().to_string()]).status().unwrap().success());
+        }
+        let status = flight.wait().unwrap();
+        let took_s = asked.elapsed().as_secs_f64();
+        let mut said = String::new();
+        errors.read_to_string(&mut said).unwrap();
+        assert_eq!(status.code(), Some(code), "{said}");
+        assert!((least_s..most_s).contains(&took_s), "{signals:?}: {took_s} s");
+        assert!(said.contains("the pilot of drone 2 does not return"), "{said}");
+        let report = bench.output(&["report", "run"]);
+        assert_eq!(report.status.code(), Some(0), "{}", text(&report.stderr));
     }
 }
 

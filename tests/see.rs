@@ -56,6 +56,16 @@ fn a_running_swarm_shows_in_the_terminal() {
     let lines: Vec<Value> = poses.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines.iter().all(|line| line["drone"] == 3 && line["kind"] == "pose") && lines.len() == 2, "{poses:?}");
     assert!(lines.iter().all(|line| line["message"]["position_m"].is_array() && line["error"].is_null()), "{poses:?}");
+    let unknown: [(&[&str], &str); 4] = [
+        (&["echo", "air", "--drone", "8"], "--drone 8: expected a drone of the run: 0 to 7"),
+        (&["hz", "senses", "--drone", "8"], "--drone 8: expected a drone of the run: 0 to 7"),
+        (&["echo", "uplink", "--kind", "gosip"], "presence, gossip; did you mean `gossip`?"),
+        (&["hz", "record", "--kind", "pose"], "--kind pose: expected the topic `air` or `uplink`"),
+    ];
+    for (args, words) in unknown {
+        let refused = place.run(&[&["topic"], args].concat());
+        assert!(refused.code == Some(2) && refused.stderr.contains(words), "{refused:?}");
+    }
     let top = place.run(&["top", "--once"]);
     assert!(top.stdout.contains("s2-right.") && top.stdout.contains("8/8"), "{top:?}");
     let top = place.run(&["top", "--json"]).summary();

@@ -22,6 +22,10 @@ fn experiment(place: &Place, name: &str, more: &str) -> String {
     name.to_owned()
 }
 
+/// A pilot that does not see obstacles flies into one.
+const COLLIDE: &str = "[formation]\ndrones = 2\nspacing_m = 60\n[[pilot]]\nname = \"cruise\"\n[time]\ntimeout_s = 30\n\
+                       [[obstacle]]\nshape = \"circle\"\ncentre_m = [150, 0]\nradius_m = 20\n";
+
 fn rows(folder: &Path) -> usize {
     fs::read_to_string(folder.join("rows.jsonl")).map_or(0, |text| text.matches('\n').count())
 }
@@ -196,6 +200,7 @@ fn rows_are_tidy_and_their_commands_repeat_them_by_processes() {
     assert_eq!(done.summary()["cells"][1]["n"], 2);
     for row in [&rows[1], &rows[2]] {
         assert_eq!((field(row, "strategy"), field(row, "radio.loss")), ("congestion-aware-paper", "0.2"));
+        assert_eq!((field(row, "outcome"), field(row, "failures")), ("reached", ""));
         let ratio: f64 = field(row, "separation_ratio").parse().unwrap();
         assert!((0.5..3.0).contains(&ratio), "{row:?}");
         let mut command = Command::new("sh");
@@ -258,6 +263,30 @@ fn a_failing_run_is_a_row_and_the_sweep_is_complete() {
     let invalid: Vec<_> = rows.iter().filter(|row| field(row, "outcome") == "invalid").collect();
     assert!((1..40).contains(&invalid.len()), "{} of 40", invalid.len());
     assert!(field(invalid[0], "reason").contains("apart at the start"), "{:?}", invalid[0]);
+
+    fs::write(place.join("collide.toml"), COLLIDE).unwrap();
+    fs::write(place.join("c.toml"), "scenario = \"collide.toml\"\nseeds = 1\n").unwrap();
+    let done = place.run(&["sweep", "c.toml"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let rows = csv(&read(&place, "sweeps/c/runs.csv"));
+    assert_eq!((field(&rows[0], "outcome"), field(&rows[0], "failures")), ("unsafe", "clearance"), "{rows:?}");
+    assert!(field(&rows[0], "command").starts_with("skein run collide.toml "), "{rows:?}");
+}
+
+#[test]
+fn an_interrupted_hunt_writes_what_it_has_found() {
+    let place = Place::new();
+    fs::write(place.join("collide.toml"), COLLIDE).unwrap();
+    for (name, code) in [("INT", 130), ("TERM", 143)] {
+        let flight = place.start(&["hunt", "collide.toml", "--flights", "10000000", "--out", name]);
+        eventually("the folder is made", || place.join(name).exists());
+        std::thread::sleep(std::time::Duration::from_secs(2));
+        signal(name, flight.pid());
+        let done = flight.finish();
+        assert_eq!(done.code, Some(code), "{done:?}");
+        assert_eq!(names(place.join(name)), ["finding-1.toml"], "{done:?}");
+        assert!(done.stdout.contains(&format!("skein run {name}/finding-1.toml")), "{done:?}");
+    }
 }
 
 #[test]
@@ -270,9 +299,24 @@ fn bad_experiments_fly_nothing_and_foreign_folders_are_refused() {
     let misspelt = experiment(&place, "m.toml", "seeds = 1\nmetric = []");
     let done = place.run(&["sweep", &misspelt]);
     assert_eq!(done.code, Some(2), "{done:?}");
-    assert!(done.stderr.contains("m.toml:4:1: unknown key \"metric\" (did you mean \"metrics\"?)"), "{done:?}");
+    assert!(done.stderr.contains("m.toml:4:1: unknown key \"metric\", expected one of name, "), "{done:?}");
+    assert!(done.stderr.contains("; did you mean `metrics`?"), "{done:?}");
+    let strategy = experiment(&place, "s.toml", "seeds = 1");
+    let text = read(&place, &strategy).replace("\"shortest-path\"", "\"fixed:9/1\"");
+    fs::write(place.join("s.toml"), text).unwrap();
+    let done = place.run(&["sweep", "s.toml"]);
+    assert!(done.code == Some(2) && done.stderr.contains("s.toml:2:35: strategy: found fixed:9/1"), "{done:?}");
+    // 10^10 runs. They do not fit into the memory.
+    let axes: String = (0..4).map(|i| format!("obstacle.{i}.x = {{ from = 0, to = 1, steps = 100 }}\n")).collect();
+    fs::write(place.join("many.toml"), format!("scenario = \"random\"\nseeds = 100\n[grid]\n{axes}")).unwrap();
+    for command in ["sweep", "hunt"] {
+        let done = place.run(&[command, "many.toml"]);
+        let wanted =
+            "many.toml:2:9: found 10000000000 runs, 100000000 cells with 100 seeds each, expected at most 10000000";
+        assert!(done.code == Some(2) && done.stderr.contains(wanted), "{done:?}");
+    }
     assert_eq!(place.run(&["sweep", "none.toml"]).code, Some(2));
-    assert!(!place.join("sweeps").exists(), "nothing is made");
+    assert!(!place.join("sweeps").exists() && !place.join("hunts").exists(), "nothing is made");
 
     assert_eq!(place.run(&["sweep", &file, "--quiet"]).code, Some(0));
     let done = place.run(&["sweep", &file, "--set", "radio.delay_s=0.1"]);

@@ -1,5 +1,6 @@
 //! Errors of the bus.
 
+use crate::file_limit;
 use crate::version::Version;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum BusError {
     /// The operating system refused a file operation.
-    #[error("cannot {what} {}: {source}", path.display())]
+    #[error("cannot {what} {}: {source}{}", path.display(), file_limit::hint(source))]
     Io {
         /// What was tried, as a verb.
         what: &'static str,
@@ -40,7 +41,7 @@ pub enum BusError {
         launcher: Version,
     },
     /// The operating system refused a call that has no path.
-    #[error("cannot {what}: {source}")]
+    #[error("cannot {what}: {source}{}", file_limit::hint(source))]
     System {
         /// What was tried, as a verb.
         what: &'static str,
@@ -59,6 +60,14 @@ pub enum BusError {
         /// What to try.
         hint: &'static str,
     },
+    /// A run has no place for another observer.
+    #[error(
+        "the run has {most} observers, and no place for another: end one of them (`skein view`, `skein top`, `skein topic`, `skein share`)"
+    )]
+    Crowded {
+        /// Maximum number of observers at a time.
+        most: usize,
+    },
     /// A sample could not be loaned, sent or received.
     #[error("cannot {what} on `{service}`: {cause}; {hint}")]
     Transfer {
@@ -74,7 +83,7 @@ pub enum BusError {
     /// A port lost its connection to another port or never had one, so that samples would be lost silently. Every later call
     /// on the port fails, too.
     #[error(
-        "a connection of `{service}` could not be made or is corrupted, samples are lost; raise the limit of open files (`ulimit -n`) or free space in /dev/shm"
+        "a connection of `{service}` could not be made or is corrupted, samples are lost; raise the limits of open files (`ulimit -n`) and file sizes (`ulimit -f`), or free space in /dev/shm"
     )]
     Degraded {
         /// Name of the service.

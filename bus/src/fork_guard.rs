@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use crate::error::BusError;
+use crate::process_end::end_process;
 use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous};
 use std::ptr::NonNull;
 use std::sync::OnceLock;
@@ -54,17 +55,9 @@ impl ForkGuard {
     #[inline]
     pub fn end_copy(self, words: impl FnOnce() -> String) {
         if self.is_copy() {
-            end(&words());
+            end_process(&words(), COPY_ENDED);
         }
     }
-}
-
-#[cold]
-fn end(words: &str) -> ! {
-    // Not by `std`: another thread of the original may have held its lock.
-    let _ = rustix::io::write(rustix::stdio::stderr(), format!("skein: {words}\n").as_bytes());
-    // SAFETY: ends the process at once; no code runs after it.
-    unsafe { libc::_exit(COPY_ENDED) }
 }
 
 /// The word of this process.

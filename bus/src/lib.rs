@@ -51,6 +51,8 @@ pub mod domain;
 mod drone_block;
 mod drone_endpoint;
 mod error;
+mod exit_guard;
+mod file_limit;
 mod fork_guard;
 mod futex;
 mod home_file;
@@ -59,6 +61,7 @@ mod large_pages;
 mod mission;
 pub mod payload;
 pub mod ports;
+mod process_end;
 mod process_request;
 mod room;
 mod run_tag;
@@ -79,6 +82,8 @@ pub use control::Control;
 pub use domain::{Cleaned, Domain, clean, living};
 pub use drone_endpoint::{DroneEndpoint, TickSignal};
 pub use error::BusError;
+pub use exit_guard::guard_exit;
+pub use file_limit::outlive_file_limit;
 pub use fork_guard::ForkGuard;
 pub use host::{PinMode, allowed_cores, pin_to_core, raise_file_limit};
 pub use large_pages::LargePages;
@@ -88,6 +93,7 @@ pub use ports::{
     DownlinkPublisher, DownlinkSubscriber, RecordPolicy, RecordPublisher, RecordSubscriber, UplinkPublisher,
     UplinkSubscriber, WatchPublisher,
 };
+pub use process_end::end_process;
 pub use process_request::{ProcessRequest, RequestKind};
 pub use services::{DeadNodes, SHARD_DRONES, Services, clean_dead_nodes, shards};
 pub use spare_room::SpareRoom;

@@ -133,7 +133,8 @@ impl<P: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + Default> Sende
     }
 
     fn refused(&self, error: LoanError) -> BusError {
-        self.transfer("loan a sample", error.to_string(), "free space in /dev/shm")
+        let hint = "free space in /dev/shm, or raise the limit of file sizes (`ulimit -f`)";
+        self.transfer("loan a sample", error.to_string(), hint)
     }
 
     fn transfer(&self, what: &'static str, cause: String, hint: &'static str) -> BusError {

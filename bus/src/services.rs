@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 /// Drones per uplink service. Receiving takes time quadratic in the number of a service's publishers.
 pub const SHARD_DRONES: usize = 32;
 
-/// Spare places per service, for restarted drones whose dead node is not yet cleaned, and for observers.
+/// Spare places per service, for restarted drones whose dead node is not yet cleaned.
 const SPARE: usize = 4;
 /// Size of a subscriber's buffer, samples.
 const BUFFER: usize = 8;
@@ -50,8 +50,11 @@ const DOWNLINK_ROOM: usize = 448;
 /// Frames of a tick that fit into the first segments of downlink and record: per drone, and the number of drones that counts. A run
 /// of a usual tick length then needs no other segment, for which there may be no room.
 const TICK_FRAMES: [usize; 2] = [4, 64];
-/// Maximum number of observers at a time.
+/// Maximum number of observers at a time. Each may open every service that is for observers.
 const OBSERVERS: usize = 8;
+
+/// Part of iceoryx2's errors if a limit of a service is reached.
+const EXCEEDS: &str = "Exceeds";
 
 const DOWNLINK: &str = "skein/downlink";
 const RECORD: &str = "skein/record";
@@ -129,7 +132,7 @@ impl Services {
     /// made.
     ///
     /// # Errors
-    /// As [`Services::open`]; [`BusError::Folder`] if the run has ended.
+    /// As [`Services::open`]; [`BusError::Folder`] if the run has ended. Its ports: [`BusError::Crowded`] if there are eight observers already.
     pub fn visit(domain: &Domain, drones: usize, name: &str) -> Result<Self, BusError> {
         let _held = hold(domain.path())?;
         let opened = Self::open(domain, drones, name)?;
@@ -217,7 +220,7 @@ impl Services {
     /// loses the oldest sample.
     ///
     /// # Errors
-    /// [`BusError::Service`], also if there are eight observers already; [`BusError::Degraded`].
+    /// [`BusError::Crowded`] if there are eight observers already, [`BusError::Service`], [`BusError::Degraded`].
     pub fn watch_subscriber(&self) -> Result<RecordSubscriber, BusError> {
         Ok(StreamSubscriber(self.receiver(WATCH)?))
     }
@@ -278,17 +281,29 @@ impl Services {
         H: ZeroCopySend + Debug,
     {
         let _held = self.visited.as_deref().map(hold).transpose()?;
-        let service: Factory<P, H> = open(&self.node, name)?;
-        let health = Health::default();
-        let degraded = health.clone();
-        let builder = service.subscriber_builder().set_degradation_handler(move |_, _| {
-            degraded.degrade();
-            DegradationAction::DegradeAndFail
-        });
-        let port = builder.create().map_err(failed("make a subscriber of", name))?;
-        health.check(name)?;
-        Ok(Receiver { port, service: name.to_owned(), health })
+        open(&self.node, name).and_then(|service| subscriber(&service, name)).map_err(|error| match error {
+            BusError::Service { cause, .. } if self.visited.is_some() && cause.contains(EXCEEDS) => {
+                BusError::Crowded { most: OBSERVERS }
+            }
+            other => other,
+        })
     }
+}
+
+fn subscriber<P, H>(service: &Factory<P, H>, name: &str) -> Result<Receiver<P, H>, BusError>
+where
+    P: ZeroCopySend + Debug + 'static,
+    H: ZeroCopySend + Debug,
+{
+    let health = Health::default();
+    let degraded = health.clone();
+    let builder = service.subscriber_builder().set_degradation_handler(move |_, _| {
+        degraded.degrade();
+        DegradationAction::DegradeAndFail
+    });
+    let port = builder.create().map_err(failed("make a subscriber of", name))?;
+    health.check(name)?;
+    Ok(Receiver { port, service: name.to_owned(), health })
 }
 
 fn node(domain: &Domain, name: &str) -> Result<Node<ipc::Service>, BusError> {
@@ -307,7 +322,7 @@ fn uplink_name(shard: usize) -> String {
 }
 
 fn downlink_limits(drones: usize) -> Limits {
-    let subscribers = drones + SPARE;
+    let subscribers = drones + SPARE + OBSERVERS;
     Limits { publishers: 1, subscribers, nodes: subscribers + 2, buffer: BUFFER, overflow: true }
 }
 
@@ -397,11 +412,12 @@ fn hint(cause: &str) -> &'static str {
     let hints = [
         ("IncompatibleTypes", "its payload has another type or version: use one build for launcher and children"),
         ("DoesNotExist", "the run has no such service: is its launcher still alive, and is the drone in this swarm?"),
-        ("Exceeds", "all its places are taken: clean dead nodes before a restart, close observers"),
+        (EXCEEDS, "all its places are taken: clean dead nodes before a restart, close observers"),
         ("AlreadyExists", "it belongs to a running swarm: use a domain of its own"),
     ];
-    let known = hints.iter().find(|(part, _)| cause.contains(part));
-    known.map_or("see the limit of open files (`ulimit -n`) and the free space in /dev/shm", |(_, hint)| hint)
+    let other =
+        "see the limits of open files (`ulimit -n`) and file sizes (`ulimit -f`), and the free space in /dev/shm";
+    hints.iter().find(|(part, _)| cause.contains(part)).map_or(other, |(_, hint)| hint)
 }
 
 /// Result of [`clean_dead_nodes`].

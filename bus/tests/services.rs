@@ -225,6 +225,32 @@ fn observers_can_join_and_leave_and_lose_the_oldest_samples() {
     assert_eq!(world.send(0, 8, |bytes| bytes.fill(1)).unwrap(), 0);
 }
 
+/// Observers on all services for them, in a run whose drones and restarted drones have their places, too.
+#[test]
+fn eight_observers_find_a_place_at_all_services_and_a_ninth_is_told_what_to_do() {
+    let run = run();
+    let services = Services::create(&run.domain, 2, 1, "launcher").unwrap();
+    let worlds = (services.downlink_publisher().unwrap(), services.watch_publisher().unwrap());
+    let _drones = [(); 2].map(|()| services.downlink_subscriber().unwrap());
+    let domain = Domain::join(run.domain.path()).unwrap();
+    let visit = || {
+        let observer = Services::visit(&domain, 2, "observer").unwrap();
+        let watch = observer.watch_subscriber()?;
+        Ok::<_, BusError>((watch, observer.downlink_subscriber()?, observer))
+    };
+    let mut observers: Vec<_> = (0..8).map(|_| visit().unwrap()).collect();
+    let _restarted = [(); 4].map(|()| services.downlink_subscriber().unwrap());
+    assert_eq!(worlds.0.send(0, 8, |bytes| bytes.fill(1)).unwrap(), 14);
+    assert_eq!(worlds.1.send(0, 8, |bytes| bytes.fill(1)).unwrap(), 8);
+    for (watch, downlink, _) in &observers {
+        assert!(watch.receive().unwrap().is_some() && downlink.receive().unwrap().is_some());
+    }
+    let error = visit().err().unwrap().to_string();
+    assert!(error.contains("has 8 observers") && error.contains("end one of them (`skein view`"), "{error}");
+    observers.pop();
+    visit().unwrap();
+}
+
 #[test]
 fn two_runs_do_not_hear_each_other() {
     let (one, two) = (run(), run());
@@ -261,10 +287,11 @@ fn killed_drones_occupy_their_ports_until_they_are_cleaned() {
     let services = Services::create(&run.domain, 1, 1, "launcher").unwrap();
     let world = services.downlink_publisher().unwrap();
     let uplink = services.uplink_subscriber(0).unwrap();
+    let _observers = [(); 8].map(|()| services.downlink_subscriber().unwrap());
     for tick in 0..5 {
         let mut drone = child("child_drone", &run.domain);
         hear(&mut drone, "joined");
-        assert_eq!(world.send(tick, 8, |bytes| bytes.fill(1)).unwrap(), tick as usize + 1);
+        assert_eq!(world.send(tick, 8, |bytes| bytes.fill(1)).unwrap(), tick as usize + 9);
         drone.stdin.as_mut().unwrap().write_all(b"\n").unwrap();
         hear(&mut drone, "held");
         drone.kill().unwrap();
@@ -279,10 +306,10 @@ fn killed_drones_occupy_their_ports_until_they_are_cleaned() {
 
     let dead = clean_dead_nodes(&run.domain).unwrap();
     assert_eq!((dead.removed, dead.failed), (5, 0));
-    assert_eq!(world.send(9, 8, |bytes| bytes.fill(1)).unwrap(), 0);
+    assert_eq!(world.send(9, 8, |bytes| bytes.fill(1)).unwrap(), 8);
     let mut drone = child("child_drone", &run.domain);
     hear(&mut drone, "joined");
-    assert_eq!(world.send(10, 8, |bytes| bytes.fill(1)).unwrap(), 1);
+    assert_eq!(world.send(10, 8, |bytes| bytes.fill(1)).unwrap(), 9);
     assert_eq!(uplink.receive().unwrap().unwrap().header().tick, 3);
     drone.kill().unwrap();
     drone.wait().unwrap();

@@ -16,7 +16,7 @@ use crate::summary::{
 };
 use crate::tuning::METRICS_PERIOD_S;
 use crate::vicinity::Vicinity;
-use skein_protocol::record::{DroneRow, EventKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
+use skein_protocol::record::{DroneRow, EventKind, FaultKind, Outcome, Percentiles, RecordView, RunEvent, Totals};
 use skein_protocol::{DroneId, Phase, UnfinishedDrone, Vec2, horizontal};
 
 /// Why a mission ended whose record has no end.
@@ -147,7 +147,7 @@ impl Accumulator {
             }
             EventKind::Fault { kind, target, scheduled, detail } => {
                 if let (true, Some(row)) = (kind.stops_process(), self.last.get(target.index())) {
-                    self.leading.died(t_s, row);
+                    self.leading.lost(t_s, target, row, kind == FaultKind::Freeze);
                 }
                 let target = (target != DroneId::NONE).then_some(target.0);
                 self.faults.push(FaultEntry { t_s, kind, target, scheduled, detail });

@@ -1,4 +1,4 @@
-//! Which drones led, for how long two led the same group, and how long a group had no leader after its leader died.
+//! Which drones led, for how long two led the same group, and how long a group had no leader after its leader died or was frozen.
 
 use crate::summary::{LeaderEntry, Term};
 use skein_protocol::record::DroneRow;
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(crate) struct Leading {
     entries: Vec<LeaderEntry>,
     split_brain_s: f64,
-    failover_s: Vec<Option<f64>>,
+    failovers: Vec<Failover>,
     ballots: BTreeSet<Term>,
     orphans: Vec<Orphan>,
     /// The group that each leader leads, and the leader, in the tick that was taken last.
@@ -28,26 +28,48 @@ pub(crate) struct LeadershipSummary {
     /// Time in which two leaders could hear each other although one had to follow the other, s: both lead the same group,
     /// or the later term is for a group that contains the other leader's own group.
     pub split_brain_s: f64,
-    /// For each death of a leader, the time until another drone led its group, s; `None` if none ever did.
+    /// For each leader that died or was frozen, the time until its group had a leader again, s; `None` if it never had. If the group splits
+    /// meanwhile, its part counts. A leader that went on after a freeze before another drone led is left out.
     pub failover_s: Vec<Option<f64>>,
 }
 
-/// A group whose leader died.
+/// What became of a group without a leader.
+#[derive(Clone, Copy)]
+enum Failover {
+    /// It has none yet.
+    Open,
+    /// It has one again, after this time, s.
+    Done(f64),
+    /// Its leader was frozen and went on.
+    Resumed,
+}
+
+/// A group whose leader died or is frozen.
 struct Orphan {
     group: GroupId,
+    /// The group that the leader was in: part of the group, if it was just about to split.
+    own: GroupId,
+    leader: DroneId,
+    /// Whether the leader may go on, because it is frozen.
+    frozen: bool,
     since_s: f64,
-    /// Index in `failover_s`.
+    /// Index in `failovers`.
     failover: usize,
 }
 
 impl Leading {
     /// The result.
     pub(crate) fn finish(self) -> LeadershipSummary {
+        let time = |failover: &Failover| match failover {
+            Failover::Open => Some(None),
+            Failover::Done(time_s) => Some(Some(*time_s)),
+            Failover::Resumed => None,
+        };
         LeadershipSummary {
             elections: self.ballots.len() as u32,
             entries: self.entries,
             split_brain_s: self.split_brain_s,
-            failover_s: self.failover_s,
+            failover_s: self.failovers.iter().filter_map(time).collect(),
         }
     }
 
@@ -58,26 +80,32 @@ impl Leading {
         self.entries.push(LeaderEntry { t_s, group, ballot: ballot.into(), leader: leader.0 });
     }
 
-    /// Notes the death of a drone, whose last row was `row`.
-    pub(crate) fn died(&mut self, t_s: f64, row: &DroneRow) {
-        if leads(row) {
-            self.orphans.push(Orphan { group: row.led, since_s: t_s, failover: self.failover_s.len() });
-            self.failover_s.push(None);
+    /// Notes that a drone died or, if `frozen`, that it froze. Its last row was `row`.
+    pub(crate) fn lost(&mut self, t_s: f64, leader: DroneId, row: &DroneRow, frozen: bool) {
+        if let Some(orphan) = self.orphans.iter_mut().find(|orphan| orphan.frozen && orphan.leader == leader) {
+            // It died while it was frozen.
+            orphan.frozen = frozen;
+        } else if leads(row) {
+            let own = if row.led.contains(row.group) { row.group } else { row.led };
+            let failover = self.failovers.len();
+            self.orphans.push(Orphan { group: row.led, own, leader, frozen, since_s: t_s, failover });
+            self.failovers.push(Failover::Open);
         }
     }
 
-    /// Takes the rows of a tick that lasted `dt_s`. Dead drones lead no group.
+    /// Takes the rows of a tick that lasted `dt_s`. Dead and frozen drones lead no group.
     pub(crate) fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
         self.leaders.clear();
         self.leaders.extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.led, drone)));
         self.leaders.sort_unstable();
-        let (leaders, failover_s) = (&self.leaders, &mut self.failover_s);
+        let (leaders, failovers) = (&self.leaders, &mut self.failovers);
         self.orphans.retain(|orphan| {
-            let led = leaders.iter().any(|(group, _)| *group == orphan.group);
-            if led {
-                failover_s[orphan.failover] = Some(t_s - orphan.since_s);
-            }
-            !led
+            let of_group = |group: GroupId| orphan.group.contains(group) && group.contains(orphan.own);
+            let mut of_group = leaders.iter().filter(|(group, _)| of_group(*group)).map(|(_, drone)| *drone);
+            let Some(first) = of_group.next() else { return true };
+            let resumed = orphan.frozen && first == orphan.leader.index() && of_group.next().is_none();
+            failovers[orphan.failover] = if resumed { Failover::Resumed } else { Failover::Done(t_s - orphan.since_s) };
+            false
         });
         let contact = |a: usize, b: usize| in_contact(&rows[a], &rows[b], range_m);
         let term = |drone: usize| self.terms.get(&DroneId(drone as u32));
@@ -91,7 +119,7 @@ impl Leading {
 }
 
 fn leads(row: &DroneRow) -> bool {
-    row.alive() && row.leads()
+    row.alive() && row.leads() && !row.is_frozen()
 }
 
 /// Whether each of two drones can hear the other: they are in radio range, no fault of the links separates them, and
@@ -158,18 +186,55 @@ mod tests {
         assert_eq!(split(None, &[leader(0.0, one), frozen]), 0.0);
     }
 
+    fn failover_s(leading: Leading) -> Vec<Option<f64>> {
+        leading.finish().failover_s
+    }
+
     #[test]
     fn failover_lasts_until_another_drone_leads_the_group() {
         let (one, two) = (GroupId::ALL.child(1), GroupId::ALL.child(2));
         let mut leading = Leading::default();
-        leading.died(10.0, &leader(0.0, one));
-        leading.died(10.0, &row(0.0, 0.0));
-        leading.died(10.5, &leader(0.0, two));
+        leading.lost(10.0, DroneId(1), &leader(0.0, one), false);
+        leading.lost(10.0, DroneId(2), &row(0.0, 0.0), false);
+        leading.lost(10.5, DroneId(3), &leader(0.0, two), false);
         leading.take(10.6, 0.1, &[leader(0.0, GroupId::ALL)], None);
-        assert_eq!(leading.failover_s, [None, None]);
         leading.take(11.25, 0.1, &[leader(0.0, one)], None);
         leading.take(12.0, 0.1, &[leader(0.0, one)], None);
-        assert_eq!(leading.failover_s, [Some(1.25), None]);
+        assert_eq!(failover_s(leading), [Some(1.25), None]);
+    }
+
+    #[test]
+    fn a_group_that_splits_is_led_again_by_the_leader_of_the_lost_ones_part() {
+        let [one, two] = [1, 2].map(|part| GroupId::ALL.child(part));
+        let mut leading = Leading::default();
+        leading.lost(10.0, DroneId(0), &DroneRow { group: one, ..leader(0.0, GroupId::ALL) }, false);
+        leading.take(11.0, 1.0, &[row(0.0, 0.0), leader(9.0, two)], None);
+        leading.take(12.0, 1.0, &[leader(5.0, one), leader(9.0, two)], None);
+        assert_eq!(failover_s(leading), [Some(2.0)]);
+    }
+
+    #[test]
+    fn failover_from_a_frozen_leader_ends_with_another_leader() {
+        let all = GroupId::ALL;
+        let frozen = DroneRow { flags: ROW_ALIVE | ROW_LEADS | ROW_FROZEN, ..leader(0.0, all) };
+        let after = |ticks: &[[DroneRow; 2]], dies: bool| {
+            let mut leading = Leading::default();
+            leading.lost(10.0, DroneId(0), &leader(0.0, all), true);
+            for (rows, tick) in ticks.iter().zip(1..) {
+                if dies && tick == 2 {
+                    leading.lost(12.0, DroneId(0), &frozen, false);
+                }
+                leading.take(10.0 + f64::from(tick), 1.0, rows, None);
+            }
+            failover_s(leading)
+        };
+        let (led, follower, goes_on) = (leader(9.0, all), row(9.0, 0.0), leader(0.0, all));
+        assert_eq!(after(&[[frozen, follower], [frozen, led], [goes_on, led]], false), [Some(2.0)]);
+        assert_eq!(after(&[[frozen, follower], [frozen, follower]], false), [None]);
+        assert_eq!(after(&[[frozen, follower], [goes_on, follower], [goes_on, led]], false), [], "it went on");
+        let dead = DroneRow { flags: 0, ..frozen };
+        assert_eq!(after(&[[frozen, follower], [dead, follower], [dead, led]], true), [Some(3.0)], "one failover");
+        assert_eq!(after(&[[frozen, led], [dead, led]], true), [Some(1.0)], "it led no more when it died");
     }
 
     #[test]

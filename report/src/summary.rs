@@ -96,7 +96,8 @@ pub struct Summary {
     pub leaders: Vec<LeaderEntry>,
     /// Total time in which two leaders of one group could hear each other, s.
     pub split_brain_s: f64,
-    /// For each death of a leader, the time until another drone led its group, s; null if no drone ever did.
+    /// For each leader that died or was frozen, the time from then until its group had a leader again, s; null if it had none to the end. If
+    /// the group splits meanwhile, the leader's part of it counts. A leader that goes on after a freeze before another drone leads is left out.
     pub failover_s: Vec<Option<f64>>,
     /// Messages sent, delivered and dropped.
     pub messages: Messages,

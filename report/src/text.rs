@@ -209,7 +209,7 @@ fn leadership(summary: &Summary) -> String {
         summary.failover_s.iter().map(|time| time.map_or("until the end".to_owned(), |s| format!("{s:.2} s")));
     let failovers: Vec<String> = failovers.collect();
     if !failovers.is_empty() {
-        let _ = write!(text, "; time without a leader after a leader's death: {}", failovers.join(", "));
+        let _ = write!(text, "; time without a leader after a leader's death or freeze: {}", failovers.join(", "));
     }
     text
 }

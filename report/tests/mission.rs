@@ -438,7 +438,7 @@ reached after 10.00 s: goal met and every invariant held
   formation     largest slot error 0.00 m, root mean square 0.00 m
   energy        3.000 kJ; 2.000 kJ until the last obstacle was passed, 1.600 kJ of it since the first detection
   distances     minimum: 30.00 m between drones, 5.00 m to obstacles
-  leadership    1 election; time without a leader after a leader's death: 0.50 s
+  leadership    1 election; time without a leader after a leader's death or freeze: 0.50 s
   messages      10 sent, 30 received, 8 duplicates, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
 5 dropped (deaf), 6 dropped (malformed), 7 dropped (queue); delay: median 20 ms, p99 40 ms
   fault         6.10 s: kill, drone 3 (not scheduled; signal 9)

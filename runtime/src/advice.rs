@@ -46,8 +46,11 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
     let found = [
         too_fast(scenario, "drone.speed_mps", scenario.drone.speed_mps),
         too_fast(scenario, "mission.reform_speed_max_mps", scenario.reform_speed_max_mps()),
+        too_short(scenario),
         slots_too_close(scenario),
         slots_out_of_reach(scenario),
+        slots_too_blurred(scenario),
+        radio_too_weak(scenario),
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),
         enclosed(&no_way, 2.0 * scenario.half_gap_m()),
@@ -83,6 +86,18 @@ fn too_fast(scenario: &Scenario, key: &str, speed_mps: f64) -> Option<String> {
     })
 }
 
+/// A time limit in which the formation cannot fly to its destination.
+fn too_short(scenario: &Scenario) -> Option<String> {
+    let (way_m, speed_mps) = (scenario.way_m() - scenario.mission.arrival_error_m, scenario.drone.speed_max_mps);
+    let (limit_s, least_s) = (scenario.timeout_s(), way_m / speed_mps);
+    (limit_s < least_s).then(|| {
+        format!(
+            "time.timeout_s = {limit_s} s, but the formation's way to its destination is {way_m:.1} m long: at \
+             drone.speed_max_mps = {speed_mps} m/s this takes {least_s:.1} s; raise time.timeout_s"
+        )
+    })
+}
+
 /// Slots that are closer together than the drones let each other come.
 fn slots_too_close(scenario: &Scenario) -> Option<String> {
     let keep_m = pilot(scenario).separation_kept_m();
@@ -108,6 +123,38 @@ fn slots_out_of_reach(scenario: &Scenario) -> Option<String> {
         format!(
             "two parts of the formation are {gap_m:.1} m apart, and drones hear each other over radio.range_m = {range_m} m: the \
              parts do not hear each other; raise radio.range_m, lower formation.spacing_m, or set mission.parts = \"each\""
+        )
+    })
+}
+
+/// An error of the drones' positions with which some drone is often farther from its slot than a drone in its slot may be.
+fn slots_too_blurred(scenario: &Scenario) -> Option<String> {
+    let (std_m, allowed_m) = (scenario.sensors.position_std_m, scenario.mission.arrival_error_m);
+    let closes = matches!(scenario.mission.end, End::Hold | End::Goal);
+    (closes && 2.0 * std_m > allowed_m).then(|| {
+        format!(
+            "sensors.position_std_m = {std_m} m, but a drone is in its slot within mission.arrival_error_m = {allowed_m} m: the \
+             formation may not close while a drone is off by more than that; raise mission.arrival_error_m"
+        )
+    })
+}
+
+/// A radio over which drones do not hear each other, or hear each other late.
+fn radio_too_weak(scenario: &Scenario) -> Option<String> {
+    let radio = &scenario.radio;
+    if scenario.formation.drones < 2 {
+        return None;
+    }
+    if radio.loss >= 1.0 {
+        return Some("radio.loss = 1: no drone hears another one".to_owned());
+    }
+    let messages = skein_agent::separation::messages(mission::drones(scenario));
+    let (rate_bps, beacons_bps) = (radio.rate_bps?, scenario.beacons_bps(messages));
+    (beacons_bps > rate_bps / 2.0).then(|| {
+        format!(
+            "radio.rate_bps = {rate_bps} bit/s, but the beacons of the {} drones that share it take {beacons_bps:.0} bit/s alone: with all \
+             other messages the channel may be full, and messages late or dropped; raise radio.rate_bps or protocol.peer_timeout_s",
+            scenario.channel_drones()
         )
     })
 }
@@ -271,9 +318,10 @@ mod tests {
         let fault = |keys: &str| format!("[[fault]]\nat_s = 5\ndrone = 1\n{keys}");
         let gnss = fault("kind = \"gnss\"\nposition_bias_m = [3, 4]\n");
         assert_eq!(warned(&gnss), "", "the margins allow for it");
-        let less = warned(&format!("[sensors]\nposition_error_max_m = 4\nposition_std_m = 0.5\n{gnss}"));
+        let noisy = "[mission]\narrival_error_m = 1\n[sensors]\nposition_std_m = 0.5\n";
+        let less = warned(&format!("{noisy}position_error_max_m = 4\n{gnss}"));
         assert!(less.contains("wrong by 6.500 m with all faults, but the margins allow for 4.000 m"), "{less}");
-        assert_eq!(warned(&format!("[sensors]\nposition_error_max_m = 6.5\nposition_std_m = 0.5\n{gnss}")), "");
+        assert_eq!(warned(&format!("{noisy}position_error_max_m = 6.5\n{gnss}")), "");
         let noise = warned(&fault("kind = \"noise\"\nposition_bias_m = [3, 4]\n"));
         assert!(noise.contains("5.000 m with all faults, but the margins allow for 0.000 m"), "{noise}");
         let clock = fault("kind = \"clock\"\nclock_offset_s = -1\n");
@@ -314,6 +362,27 @@ mod tests {
         assert!(
             warned(&format!("[sensors]\nranging = false\n{kill}")).starts_with("fault.0 (kill): without ideal ranging")
         );
+    }
+
+    #[test]
+    fn a_radio_that_is_too_weak_is_warned_of() {
+        assert!(warned("[radio]\nloss = 1").contains("no drone hears another one"));
+        assert!(warned("[radio]\nrate_bps = 20_000").contains("raise radio.rate_bps"));
+        assert_eq!(warned("[radio]\nrate_bps = 100_000"), "");
+        assert_eq!(warned("[formation]\ndrones = 1\n[radio]\nloss = 1"), "");
+    }
+
+    #[test]
+    fn positions_that_are_too_uncertain_for_slots_are_warned_of() {
+        assert!(warned("[sensors]\nposition_std_m = 0.5").contains("raise mission.arrival_error_m"));
+        assert_eq!(warned("[sensors]\nposition_std_m = 0.5\n[mission]\narrival_error_m = 1"), "");
+    }
+
+    #[test]
+    fn a_time_limit_that_is_too_short_is_warned_of() {
+        let far = |limit: &str| format!("[formation]\ndrones = 1\n[mission]\nstop_x_m = 5000\n{limit}");
+        assert_eq!(warned(&far("")), "");
+        assert!(warned(&far("[time]\ntimeout_s = 200")).contains("raise time.timeout_s"));
     }
 
     #[test]

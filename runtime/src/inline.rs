@@ -4,6 +4,7 @@
 use crate::clock::Clock;
 use crate::drone_factory::DroneFactory;
 use crate::error::RuntimeError;
+use crate::in_pilots::Place;
 use crate::mission;
 use crate::pacer::Pacer;
 use crate::pilot_host::{PilotHost, StepScratch};
@@ -30,7 +31,8 @@ const CHUNK: usize = 8;
 const LARGE_SWARM: usize = 100;
 
 /// Flies a mission in this thread with the pilots that the scenario names. `interrupted` is called once per tick; it returns the
-/// number of a signal that should stop the run.
+/// number of a signal that should stop the run. A pilot that does not return keeps it from being called, see
+/// [`HangWatch`](crate::HangWatch). A pilot that ends this process, as by [`std::process::exit`], ends it with exit code 3.
 ///
 /// # Errors
 /// [`RuntimeError::Pilot`] if a pilot cannot be made, [`RuntimeError::Scenario`] and [`RuntimeError::Shape`] if no world can be made
@@ -125,6 +127,8 @@ struct Worker {
     scratch: StepScratch,
     /// What their radio receivers have counted. It is here and not with each drone, so that it stays in the cache.
     stats: LinkStats,
+    /// Says which pilot the thread is in.
+    place: Place,
 }
 
 impl<'s> InlineSwarm<'s> {
@@ -234,9 +238,11 @@ impl InlineDrone {
         self.pilot_host.is_some() && !self.frozen
     }
 
-    fn step(&mut self, down: &DownlinkView<'_>, Worker { scratch, stats }: &mut Worker) {
+    fn step(&mut self, down: &DownlinkView<'_>, Worker { scratch, stats, place }: &mut Worker) {
         let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
+        let in_pilot = place.enter(pilot_host.drone().0);
         let said = pilot_host.step(down, scratch, &mut self.slot, stats);
+        drop(in_pilot);
         self.frames.clear();
         self.frames.extend(said.frames());
     }

@@ -59,6 +59,12 @@ impl PilotHost {
         Self { guard: Some(guard), ..self }
     }
 
+    /// The drone.
+    #[inline]
+    pub(crate) fn drone(&self) -> DroneId {
+        self.params.me
+    }
+
     /// Receives the frames of a downlink that came too late to be answered. The pilot hears them in its next step.
     pub fn receive_late(&mut self, down: &DownlinkView<'_>, scratch: &mut StepScratch, stats: &mut LinkStats) {
         self.radio_receiver.receive(down, SimTime(i64::MIN), &mut scratch.arrived, stats);

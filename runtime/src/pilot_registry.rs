@@ -4,6 +4,7 @@ use crate::beacon::BeaconPilot;
 use crate::cruise::CruisePilot;
 use crate::error::RuntimeError;
 use crate::forked::copy_came_back;
+use crate::in_pilots::{self, Place};
 use crate::mission;
 use crate::pilot_problem::PilotProblem;
 use crate::program::Program;
@@ -16,7 +17,7 @@ use skein_bus::ForkGuard;
 use skein_pilot::{Birth, Params, Pilot, PilotError};
 use skein_protocol::{DroneId, SimTime};
 use skein_report::{PilotEntry, TopicSchema};
-use skein_scenario::{DEFAULT_PILOT, PilotKeys, Scenario};
+use skein_scenario::{DEFAULT_PILOT, PilotKeys, Scenario, did_you_mean};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
@@ -125,11 +126,12 @@ impl PilotRegistry {
     }
 
     /// Whether this program can fly the scenario: it makes one pilot of each table. `inline`: in this process, where commands
-    /// cannot fly.
+    /// cannot fly. From now on, a pilot that ends this process ends it with exit code 3.
     ///
     /// # Errors
     /// [`PilotProblem`] with the key that is wrong.
     pub fn check(&self, scenario: &Scenario, inline: bool) -> Result<(), PilotProblem> {
+        in_pilots::guard().map_err(|error| PilotProblem::new("pilot", error.to_string()))?;
         let tables = scenario.pilot_tables();
         let json = Arc::new(serde_json::to_value(scenario).unwrap_or_default());
         for (number, table) in scenario.pilots.iter().enumerate() {
@@ -169,7 +171,11 @@ impl PilotRegistry {
             scenario: Arc::clone(json),
         };
         let guard = ForkGuard::new().map_err(|error| PilotProblem::new(path.clone(), error.to_string()))?;
-        let made = catch(|| (registered.make)(scenario, &birth));
+        let made = {
+            let mut place = Place::new();
+            let _in = place.enter(birth.drone);
+            catch(|| (registered.make)(scenario, &birth))
+        };
         guard.end_copy(|| copy_came_back(birth.drone));
         let made = made.unwrap_or_else(|panic| Err(PilotError::new(format!("the pilot {name:?} {panic}"))));
         made.map_err(|error| refused(name, &path, &error))
@@ -192,9 +198,7 @@ impl PilotRegistry {
 
     fn unknown(&self, name: &str, path: &str) -> PilotProblem {
         let known: Vec<&str> = self.names().into_iter().filter(|name| !["beacon", "talker"].contains(name)).collect();
-        let scored = known.iter().map(|known| (strsim::jaro_winkler(name, known), known));
-        let best = scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-        let hint = best.map(|(_, known)| format!("; did you mean `{known}`?")).unwrap_or_default();
+        let hint = did_you_mean(name, known.iter().copied());
         let list: Vec<String> = known.iter().map(|known| format!("{known:?}")).collect();
         let message =
             format!("found {name:?}, expected one of {}, the pilots of {}{hint}", list.join(", "), self.program);

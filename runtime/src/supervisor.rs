@@ -17,7 +17,7 @@ use crate::world_process::DISMISSED;
 use crate::{fault_plan, mission, scenario_file};
 use skein_bus::{
     Control, ControlSpec, Domain, PinMode, ProcessRequest, RecordSubscriber, RequestKind, Services, SpareRoom,
-    WorldState, allowed_cores, clean_dead_nodes, raise_file_limit,
+    WorldState, allowed_cores, clean_dead_nodes, outlive_file_limit, raise_file_limit,
 };
 use skein_protocol::record::{RecordSink, RecordView};
 use skein_protocol::{DroneId, Tick};
@@ -31,6 +31,7 @@ use std::time::{Duration, Instant};
 /// [`RuntimeError`] if the run could not be started. What fails in flight is in [`RunEnd::failure`].
 pub fn run(launch: Launch<'_>, sink: &mut dyn RecordSink) -> Result<RunEnd, RuntimeError> {
     let started = Instant::now();
+    outlive_file_limit();
     raise_file_limit()?;
     let domain = Domain::create(&launch.scenario.name)?;
     let mut supervisor = Supervisor::new(launch, &domain, sink)?;

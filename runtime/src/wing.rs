@@ -14,7 +14,7 @@ use crate::uplinks::Uplinks;
 use crate::{mission, scenario_file};
 use skein_bus::{
     Control, ControlSpec, Domain, DownlinkPublisher, Patience, PinMode, RequestKind, Services, TickOutcome, WaitMode,
-    allowed_cores, clean_dead_nodes, raise_file_limit,
+    allowed_cores, clean_dead_nodes, outlive_file_limit, raise_file_limit,
 };
 use skein_protocol::frame::Frame;
 use skein_protocol::slot::{LinkStats, Slot};
@@ -64,6 +64,7 @@ impl<'l> Wing<'l> {
     /// # Errors
     /// [`RuntimeError`] if the drones could not be started.
     pub fn start(launch: &WingLaunch<'l>, mut given_up: impl FnMut() -> bool) -> Result<Self, RuntimeError> {
+        outlive_file_limit();
         raise_file_limit()?;
         let (drones, per_process) = (mission::drones(launch.scenario), launch.per_process.max(1));
         let domain = Domain::create(&launch.scenario.name)?;

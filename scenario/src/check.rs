@@ -5,7 +5,9 @@ use crate::node::{Data, Entry, Node, Place};
 use crate::reference;
 use crate::schema_tree::{is_free, kind, lengths, present, range, tag, unit, words};
 use crate::strategy::Strategy;
+use crate::suggestion::did_you_mean;
 use serde_json::{Map, Value as Json};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// An error whose place is not a text yet.
@@ -18,20 +20,20 @@ pub(crate) struct Complaint {
 
 /// Checks the tree. Gives it back as JSON, without the keys that were left out, and all errors.
 pub(crate) fn check(root: &Node, schema: &Json) -> (Json, Vec<Complaint>) {
-    // Of several keys with one name, the first one is suggested.
-    let leaves = reference::keys_of(schema).into_iter().rev().map(|k| (k.leaf().to_owned(), k.path)).collect();
-    let mut walk = Walk { leaves, complaints: Vec::new() };
+    let mut walk = Walk { schema, homes: OnceCell::new(), complaints: Vec::new() };
     let json = walk.value(root, schema, "");
     (json, walk.complaints)
 }
 
-struct Walk {
-    /// Every key's own name, with its path.
-    leaves: BTreeMap<String, String>,
+struct Walk<'a> {
+    /// The schema of the whole scenario.
+    schema: &'a Json,
+    /// Every key's own name, with the tables that have it, in words.
+    homes: OnceCell<BTreeMap<String, String>>,
     complaints: Vec<Complaint>,
 }
 
-impl Walk {
+impl Walk<'_> {
     fn complain(&mut self, place: &Place, key: &str, message: String) -> Json {
         self.complaints.push(Complaint { place: place.clone(), key: key.to_owned(), message });
         Json::Null
@@ -218,11 +220,9 @@ impl Walk {
     }
 
     fn unknown(&mut self, name: &str, entry: &Entry, properties: &Map<String, Json>, table: &str) {
-        let elsewhere = |leaf: &str| format!("; did you mean `{}`?", self.leaves[leaf]);
-        let hint = match closest(name, properties.keys().map(String::as_str)) {
-            _ if self.leaves.contains_key(name) => elsewhere(name),
-            Some(sibling) => format!("; did you mean `{sibling}`?"),
-            None => closest(name, self.leaves.keys().map(String::as_str)).map(elsewhere).unwrap_or_default(),
+        let hint = match self.homes.get_or_init(|| reference::homes(self.schema)).get(name) {
+            Some(home) => format!("; it belongs {home}"),
+            None => did_you_mean(name, properties.keys().map(String::as_str)),
         };
         let known = properties.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         let message = format!("unknown {}, expected one of {known}{hint}", what(&entry.node));
@@ -239,15 +239,4 @@ fn what(node: &Node) -> &'static str {
 
 fn join(key: &str, name: &str) -> String {
     if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") }
-}
-
-/// A question for the most similar word, or nothing.
-pub(crate) fn did_you_mean<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> String {
-    closest(found, words).map(|word| format!("; did you mean `{word}`?")).unwrap_or_default()
-}
-
-/// The most similar word, if any is similar enough.
-fn closest<'a>(found: &str, words: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let scored = words.map(|word| (strsim::jaro_winkler(found, word), word));
-    scored.filter(|(score, _)| *score > 0.8).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, word)| word)
 }

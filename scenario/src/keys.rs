@@ -107,7 +107,8 @@ pub struct Time {
     #[schemars(range(min = 1e-4, max = 0.1))]
     pub dt_s: f64,
     /// Time limit. A mission that takes longer has failed. Default: 180 s, or twice what a smooth flight takes from the last slot
-    /// past all obstacles and to the goal, one drone behind another, if that is longer; at least `mission.duration_s`.
+    /// past all obstacles and to the goal or the stop, one drone behind another, if that is longer, but
+    /// at most 36000 s; at least `mission.duration_s`.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
     pub timeout_s: Option<f64>,
 }
@@ -190,7 +191,8 @@ pub struct Mission {
     /// With `end = "hold"`: the formation stops once the x of its anchor is at least this.
     #[schemars(range(min = -1e6, max = 1e6))]
     pub stop_x_m: f64,
-    /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y].
+    /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y]. Routes past obstacles lead along x, and the
+    /// formation faces along x. So the way to a goal that is beside the start or behind it may be longer than it has to be.
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub goal_m: Option<[f64; 2]>,
     /// What groups do between two obstacle sets.

@@ -68,6 +68,7 @@ mod rules;
 mod schema_tree;
 mod sensors;
 mod strategy;
+mod suggestion;
 
 pub use energy_keys::{EnergyKeys, Thrust};
 pub use error::{Issue, ScenarioErrors};
@@ -88,3 +89,4 @@ pub use radio_keys::{BurstKeys, BurstScope, DelayModel, Preset, RadioKeys, RuleK
 pub use reference::{KeyDoc, keys, markdown, schema};
 pub use sensors::{OutlineSensing, Sensors};
 pub use strategy::{Strategy, StrategyError};
+pub use suggestion::{did_you_mean, nearest};

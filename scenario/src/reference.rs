@@ -4,6 +4,7 @@ use crate::keys::Scenario;
 use crate::node::number;
 use crate::schema_tree::{is_free, kind, present, range, tag, unit, words};
 use serde_json::Value as Json;
+use std::collections::BTreeMap;
 // Writing to a string cannot fail, so its result is dropped below.
 use std::fmt::Write as _;
 
@@ -27,6 +28,19 @@ impl KeyDoc {
     pub(crate) fn leaf(&self) -> &str {
         self.path.rsplit('.').next().unwrap_or_default()
     }
+}
+
+/// Where each key's own name belongs, in words: `in `[drone]``, or `at the top level of the file`.
+pub(crate) fn homes(schema: &Json) -> BTreeMap<String, String> {
+    let mut homes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for key in keys_of(schema) {
+        let home = match key.path.rsplit_once('.') {
+            Some((table, _)) => format!("in {}", titled(schema, table).0),
+            None => "at the top level of the file".to_owned(),
+        };
+        homes.entry(key.leaf().to_owned()).or_default().push(home);
+    }
+    homes.into_iter().map(|(name, homes)| (name, homes.join(" or "))).collect()
 }
 
 /// The JSON schema of a scenario (draft 2020-12), made from the types of [`Scenario`].

@@ -23,6 +23,8 @@ const GRAVITY_MPS2: f64 = 9.81;
 const GAP_ROOM_M: f64 = 0.004;
 /// Default of `time.timeout_s` for a small swarm, s.
 const TIMEOUT_S: f64 = 180.0;
+/// Longest default of `time.timeout_s`, s: the greatest value of that key.
+const TIMEOUT_MAX_S: f64 = 36_000.0;
 /// The default of `time.timeout_s` is at least this many times the duration of a smooth flight.
 const TIMEOUT_FACTOR: f64 = 2.0;
 /// Default of `formation.altitude_m`, m.
@@ -262,6 +264,16 @@ impl Scenario {
         BEACON_PERIOD_S.max(self.protocol.peer_timeout_s / 3.0)
     }
 
+    /// What the beacons of all drones that share a channel in the formation take of its bandwidth, with the statements of their lines if
+    /// words keep them apart, bit/s. `messages`: number of messages of one statement.
+    #[must_use]
+    pub fn beacons_bps(&self, messages: usize) -> f64 {
+        let rate_bps = |bytes: usize, period_s: f64| 8.0 * (HEAD_BYTES as f64 + bytes as f64) / period_s;
+        let statements_bps = || messages as f64 * rate_bps(size_of::<Separation>(), self.separation_period_s(messages));
+        let words_bps = if self.apart_by_words() { statements_bps() } else { 0.0 };
+        f64::from(self.channel_drones()) * (rate_bps(size_of::<Pose>(), self.beacon_period_s()) + words_bps)
+    }
+
     /// Longest time between two beacons of a drone, s: that of a drone that hears very many others. It is that of all beacons if the
     /// scenario names it, or if distances are kept by words.
     #[must_use]
@@ -366,19 +378,36 @@ impl Scenario {
     }
 
     /// The time limit of the mission, s: `time.timeout_s`; or 180 s, or twice what a smooth flight takes
-    /// from the last slot past all obstacles and to the goal, one drone behind another, if that is longer; at least the duration of a
-    /// mission that lasts a time.
+    /// from the last slot past all obstacles and to the destination, one drone behind another, if that is longer, but at most 10 hours; at
+    /// least the duration of a mission that lasts a time.
     #[must_use]
     pub fn timeout_s(&self) -> f64 {
-        let (drone, start_x_m) = (&self.drone, self.formation.start_m[0]);
-        let goal_x_m = self.mission.goal_m.map_or(start_x_m, |goal| goal[0]);
-        let rears = self.shapes().unwrap_or_default();
-        let last_x_m = rears.iter().map(|shape| shape.bounds().1.x).fold(goal_x_m, f64::max);
-        let rear_x_m = self.slots().iter().map(|slot| slot.x).fold(0.0, f64::min) + start_x_m;
-        let headway_s = self.avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps;
-        let smooth_s = (last_x_m - rear_x_m) / drone.speed_mps + f64::from(self.formation.drones) * headway_s;
         let lasts_s = self.mission.duration_s.filter(|_| self.mission.end == End::Time).unwrap_or(0.0);
-        self.time.timeout_s.unwrap_or_else(|| TIMEOUT_S.max((TIMEOUT_FACTOR * smooth_s).ceil()).max(lasts_s))
+        let smooth_s = || (TIMEOUT_FACTOR * self.smooth_flight_s()).ceil().clamp(TIMEOUT_S, TIMEOUT_MAX_S);
+        self.time.timeout_s.unwrap_or_else(|| smooth_s().max(lasts_s))
+    }
+
+    /// What a flight without delay takes from the farthest slot past all obstacles and to the destination, one drone behind another, s.
+    fn smooth_flight_s(&self) -> f64 {
+        let drone = &self.drone;
+        let outlines = self.shapes().unwrap_or_default();
+        let rear_m = outlines.iter().map(|shape| shape.bounds().1.x).fold(f64::NEG_INFINITY, f64::max);
+        let past_m = rear_m + self.avoidance.planning_distance_m - self.formation.start_m[0];
+        let farthest_m = self.slots().iter().map(|slot| slot.norm()).fold(0.0, f64::max);
+        let way_m = farthest_m + self.formation.start_jitter_m + self.way_m().max(past_m);
+        let headway_s = self.avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps;
+        way_m / drone.speed_mps.min(self.reform_speed_max_mps()) + f64::from(self.formation.drones) * headway_s
+    }
+
+    /// The straight way of the formation's front slot to the destination, m; 0 if the mission has none.
+    #[must_use]
+    pub fn way_m(&self) -> f64 {
+        let start = Vec2::from(self.formation.start_m);
+        match (self.mission.end, self.mission.goal_m) {
+            (End::Goal, Some(goal_m)) => (Vec2::from(goal_m) - start).norm(),
+            (End::Hold, _) => (self.mission.stop_x_m - start.x).max(0.0),
+            _ => 0.0,
+        }
     }
 
     /// The scenario as TOML with every key written out. [`Scenario::parse`] makes an equal scenario of it.

@@ -48,7 +48,16 @@ fn unknown_keys_and_words_come_with_a_suggestion() {
     assert_rejected(&[
         ("[formation]\ndronse = 8", &["bad.toml:2:1: formation.dronse: unknown key", "did you mean `drones`?"]),
         ("[formation]\n[drone]\nspeed = 8", &["bad.toml:3:1: drone.speed: unknown key", "did you mean `speed_mps`?"]),
-        ("drones = 8\n[formation]", &["bad.toml:1:1: drones: unknown key", "did you mean `formation.drones`?"]),
+        ("drones = 8\n[formation]", &["bad.toml:1:1: drones: unknown key", "; it belongs in `[formation]` or "]),
+        (
+            "[formation]\nseed = 8",
+            &["bad.toml:2:1: formation.seed: unknown key", "; it belongs at the top level of the file"],
+        ),
+        ("[formation]\n[time]\nspeed_mps = 8", &["time.speed_mps: unknown key", "; it belongs in `[drone]`"]),
+        (
+            "[formation]\n[[obstacle]]\nshape = \"circle\"\ncentre_m = [99, 0]\nradius_m = 3\nhalf_size_m = [1, 1]",
+            &["obstacle.0.half_size_m: unknown key", "; it belongs in `[[obstacle]]` with shape = \"rectangle\""],
+        ),
         ("[formation]\n[obstacles]", &["obstacles: unknown table", "did you mean `obstacle`?"]),
         ("[formation]\nshape = \"nestedv\"", &["bad.toml:2:9: formation.shape: found \"nestedv\"", "`nested-v`?"]),
         (
@@ -59,6 +68,17 @@ fn unknown_keys_and_words_come_with_a_suggestion() {
         ("[formation]\n[[obstacle]]\nradius_m = 3", &["bad.toml:2:1: obstacle.0.shape: is missing"]),
         ("[formation]\n[[obstacle]]\nshape = \"circle\"\nradius_m = 3\nside_m = 2", &["obstacle.0.side_m", "centre_m"]),
     ]);
+}
+
+#[test]
+fn what_is_not_similar_or_not_a_key_there_is_not_suggested() {
+    // Each is a little like a key of its own table or of another one.
+    let texts =
+        ["[formation]\nspam_rate = 3", "[formation]\n[time]\ndrag_coeficient = 1", "[formation]\n[drone]\nweight = 3"];
+    for text in texts {
+        let message = errors(text, &[]);
+        assert!(message.contains("unknown key, expected one of") && !message.contains(';'), "{message}");
+    }
 }
 
 #[test]

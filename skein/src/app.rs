@@ -1,8 +1,9 @@
 //! The application: commands, and the pilots that they fly.
 
 use crate::cli::{self, Cli, Command};
+use crate::colour;
 use crate::exit::{Exit, Failure};
-use crate::output::KeptStdout;
+use crate::output::{self, KeptStdout};
 use crate::run::OnFolder;
 use crate::{
     bench, check, clean, doctor, hosts, hunt, replay, report, reproduce, roles, run, schema, sweep, top, topic, view,
@@ -13,6 +14,7 @@ use skein_protocol::TopicName;
 use skein_report::TopicSchema;
 use skein_runtime::{PilotRegistry, Program};
 use std::ffi::OsString;
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -93,13 +95,7 @@ impl App {
             Ok(cli) => self.do_command(cli.command),
             Err(mut error) => {
                 cli::suggest(&mut error);
-                // clap prints help to stdout and errors to stderr. A closed pipe is not an error.
-                let printed = error.print().is_ok_and(|()| std::io::Write::flush(&mut std::io::stdout()).is_ok());
-                match (error.use_stderr(), printed) {
-                    (true, _) => Exit::Usage,
-                    (false, true) => Exit::Reached,
-                    (false, false) => Exit::Environment,
-                }
+                print_parsed(&error)
             }
         };
         exit.code()
@@ -168,19 +164,34 @@ fn dispatch(command: Command, pilots: &PilotRegistry, on_folder: Option<&OnFolde
     }
 }
 
+/// Prints the help, the version or the error in which the parsing of arguments ended: help to stdout, errors to stderr.
+fn print_parsed(parsed: &clap::Error) -> Exit {
+    let text = |colour: bool| if colour { parsed.render().ansi().to_string() } else { parsed.render().to_string() };
+    if parsed.use_stderr() {
+        // If this fails, no one is there to be told.
+        let _ = write!(std::io::stderr().lock(), "{}", text(colour::wanted(std::io::stderr().is_terminal())));
+        return Exit::Usage;
+    }
+    match output::print(text(colour::wanted(output::is_terminal()))) {
+        Ok(_) => Exit::Reached,
+        Err(failure) => {
+            failure.print();
+            failure.exit
+        }
+    }
+}
+
 /// Logs to stderr: warnings and errors, unless `SKEIN_LOG` sets another filter. Coloured on a terminal.
 fn start_logging() {
-    use std::io::IsTerminal;
     use tracing_subscriber::EnvFilter;
     let filter = EnvFilter::builder()
         .with_env_var("SKEIN_LOG")
         .with_default_directive(tracing::Level::WARN.into())
         .from_env_lossy();
-    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let logging = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
-        .with_ansi(colour)
+        .with_ansi(colour::wanted(std::io::stderr().is_terminal()))
         .log_internal_errors(false);
     // A program that has its own logging keeps it.
     let _ = logging.try_init();

@@ -1,11 +1,11 @@
 //! The command line.
 
-use crate::missing::nearest;
 use crate::options::{PinChoice, RuntimeChoice, WaitChoice, seconds};
 use crate::scenario_args::ScenarioArgs;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use skein_runtime::Clock;
+use skein_scenario::nearest;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -190,18 +190,18 @@ pub(crate) struct RunArgs {
     /// The tables.
     #[command(flatten)]
     pub(crate) tables: TableArgs,
-    /// Pin each process to one core
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) pin: PinChoice,
-    /// How processes wait for each other: yield is faster on an idle machine and much slower on a busy one
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) wait: WaitChoice,
-    /// In lockstep, how long a drone may take to answer a tick before it is given up, s
-    #[arg(long, value_name = "S", default_value = "5", value_parser = seconds)]
-    pub(crate) patience: Duration,
-    /// Drones per process; the digest does not depend on it
-    #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub(crate) drones_per_process: u32,
+    /// Pin each process to one core [default: auto]
+    #[arg(long, value_enum)]
+    pub(crate) pin: Option<PinChoice>,
+    /// How processes wait for each other: yield is faster on an idle machine and much slower on a busy one [default: block]
+    #[arg(long, value_enum)]
+    pub(crate) wait: Option<WaitChoice>,
+    /// In lockstep, how long a drone may take to answer a tick before it is given up, s [default: 5]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) patience: Option<Duration>,
+    /// Drones per process; the digest does not depend on it [default: 1]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) drones_per_process: Option<u32>,
     /// With `--runtime inline`: number of threads that step the drones; the digest does not depend on it
     #[arg(long, value_name = "COUNT", default_value = "1")]
     pub(crate) threads: NonZero<usize>,

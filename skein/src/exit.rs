@@ -11,6 +11,7 @@
 //!
 //! If several apply: these come before 3, 3 before 4, 4 before 1.
 
+use crate::colour;
 use crate::complaint::complain;
 use skein_report::text::printable;
 use std::borrow::Cow;
@@ -90,8 +91,10 @@ impl Failure {
                 let shown = match printable(&plain) {
                     // The file holds control characters, which must not reach the terminal.
                     Cow::Owned(harmless) => harmless,
-                    Cow::Borrowed(_) if std::env::var_os("NO_COLOR").is_some() => plain,
-                    Cow::Borrowed(_) => rendered(diagnostic.as_ref(), miette::GraphicalTheme::unicode()),
+                    Cow::Borrowed(_) if colour::wanted(true) => {
+                        rendered(diagnostic.as_ref(), miette::GraphicalTheme::unicode())
+                    }
+                    Cow::Borrowed(_) => plain,
                 };
                 // If this fails, no one is there to be told.
                 let _ = write!(std::io::stderr().lock(), "{shown}");

@@ -54,7 +54,21 @@ impl NetworkArgs {
             }
             first += host.drones;
         }
-        Ok(shares)
+        match self.given().filter(|_| shares.is_empty()) {
+            Some(option) => Err(Failure::usage(format!("{option}: expected --hosts NAME=COUNT or [[host]] beside it"))),
+            None => Ok(shares),
+        }
+    }
+
+    /// The first of these options that is given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let options = [
+            ("--connect", !self.connect.is_empty()),
+            ("--keys", self.keys.is_some()),
+            ("--insecure", self.insecure),
+            ("--zenoh-config", self.zenoh_config.is_some()),
+        ];
+        options.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
     }
 
     /// The words of a host's relay.

@@ -1,6 +1,7 @@
 //! `skein hunt`.
 
 use crate::exit::{Exit, Failure};
+use crate::hunt_folder::HuntFolder;
 use crate::interrupt::Interrupt;
 use crate::missing::missing;
 use crate::options::key_value;
@@ -11,8 +12,8 @@ use clap::Args;
 use serde_json::json;
 use skein_runtime::PilotRegistry;
 use skein_sweep::hunt::{self, FailureKind, Hunt, HuntReport};
-use skein_sweep::{Grid, Progress};
-use std::path::{Path, PathBuf};
+use skein_sweep::{Grid, Progress, program_name};
+use std::path::PathBuf;
 
 /// Arguments of `hunt`.
 #[derive(Debug, Args)]
@@ -20,6 +21,7 @@ use std::path::{Path, PathBuf};
     after_help = "A hunt flies runs of the experiment (or seeds of the scenario), then missions that differ a little from \
 those that came nearest to a failure. It makes each kind of failure that it finds small and writes it as a scenario file.
 A mission that does not reach its goal counts unless its time limit is shorter than the default one, or `skein check` warns of it.
+A hunt that is interrupted writes what it has found.
 
 Exit codes: 0 nothing found, 1 a mission that does not reach its goal, 4 a broken invariant.
 
@@ -42,9 +44,12 @@ pub(crate) struct HuntArgs {
     /// Override a scenario key in every run, such as radio.range_m=200; repeatable
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = key_value)]
     pub(crate) overrides: Vec<(String, String)>,
-    /// Folder for the scenario files of what is found; it must not exist [default: hunts/<name>-<number>]
+    /// Folder for the scenario files of what is found; an existing one is refused [default: hunts/<name>-<number>]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Replace the findings in an existing --out folder
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
     /// Print the report as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
@@ -59,84 +64,44 @@ pub(crate) fn hunt(args: &HuntArgs, pilots: &PilotRegistry) -> Result<Exit, Fail
         return Err(Failure::usage(text));
     }
     let experiment = hunt::source(&args.source).map_err(Failure::usage)?;
-    if let Some(path) = args.out.as_deref().filter(|path| path.exists()) {
-        return Err(refused(path, &std::io::ErrorKind::AlreadyExists.into()));
-    }
-    let grid = Grid::new(&experiment, &args.overrides);
+    let program = program_name(pilots.program());
+    let grid = Grid::new(&experiment, &args.overrides).program(&program);
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
+    let folder = match &args.out {
+        Some(path) => HuntFolder::at(path, args.force)?,
+        None => HuntFolder::numbered(&experiment.name)?,
+    };
     let workers = args.jobs.or_else(|| std::thread::available_parallelism().ok().map(std::num::NonZero::get));
     let mut bar = RunsBar::new(args.quiet || args.json);
     let search = Hunt::new(&grid, pilots).flights(args.flights as usize).seed(args.seed).workers(workers.unwrap_or(1));
     let runs = args.flights as usize;
     let report = search.interrupted(&interrupted).run(|done, _| bar.show(Progress { done, runs }));
     bar.finish();
-    let report = report.map_err(|error| Failure::usage(in_experiment(&args.source, &error.to_string())))?;
-    let files = write(args, &experiment.name, &report)?;
-    print(args, &report, &files);
-    let found = |kind| report.findings.iter().any(|finding| finding.failure.kind == kind);
-    Ok(match interrupt.signal() {
-        Some(signal) => Exit::Interrupted(signal),
-        None if report.findings.is_empty() => Exit::Reached,
-        None if report.findings.len() == 1 && found(FailureKind::NotReached) => Exit::NotReached,
-        None => Exit::Unsafe,
-    })
+    let report = report.map_err(|error| Failure::usage(in_experiment(&args.source, &error.to_string())));
+    let written = report.and_then(|report| Ok((folder.write(&report.findings)?, report)));
+    folder.remove_if_empty();
+    let (files, report) = written?;
+    print(args, &program, &report, &files)?;
+    Ok(interrupt.signal().map_or_else(|| exit(&report), Exit::Interrupted))
 }
 
-/// Writes one scenario file for each finding. Returns their paths.
-fn write(args: &HuntArgs, name: &str, report: &HuntReport) -> Result<Vec<PathBuf>, Failure> {
-    if report.findings.is_empty() {
-        return Ok(Vec::new());
-    }
-    let folder = folder(args, name)?;
-    let files = report.findings.iter().enumerate().map(|(number, finding)| {
-        let path = folder.join(format!("finding-{}.toml", number + 1));
-        let text = format!(
-            "# {}: {:.3} of the distance to keep.\n{}",
-            finding.failure.kind.words(),
-            finding.failure.value,
-            finding.toml
-        );
-        std::fs::write(&path, text).map(|()| path.clone()).map_err(|error| refused(&path, &error))
-    });
-    files.collect()
-}
-
-/// Makes the folder: the one that is named, or the first free number.
-fn folder(args: &HuntArgs, name: &str) -> Result<PathBuf, Failure> {
-    if let Some(path) = &args.out {
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let made = parent.map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::create_dir(path));
-        return made.map(|()| path.clone()).map_err(|error| refused(path, &error));
-    }
-    let parent = Path::new("hunts");
-    std::fs::create_dir_all(parent).map_err(|error| refused(parent, &error))?;
-    for number in 1..u32::MAX {
-        let path = parent.join(format!("{name}-{number}"));
-        match std::fs::create_dir(&path) {
-            Ok(()) => return Ok(path),
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(refused(&path, &error)),
-        }
-    }
-    Err(Failure::usage("hunts: every number is taken; name a folder with --out"))
-}
-
-fn refused(path: &Path, error: &std::io::Error) -> Failure {
-    match error.kind() {
-        std::io::ErrorKind::AlreadyExists => Failure::usage(format!("{}: exists; name another --out", path.display())),
-        _ => Failure::environment(format!("{}: {error}", path.display())),
+fn exit(report: &HuntReport) -> Exit {
+    match &report.findings[..] {
+        [] => Exit::Reached,
+        [one] if one.failure.kind == FailureKind::NotReached => Exit::NotReached,
+        _ => Exit::Unsafe,
     }
 }
 
-fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
+fn print(args: &HuntArgs, program: &str, report: &HuntReport, files: &[PathBuf]) -> Result<bool, Failure> {
     let findings = report.findings.iter().zip(files);
     let text = if args.json {
         let findings: Vec<_> = findings
             .map(|(finding, file)| {
                 json!({
                     "failure": finding.failure.kind.words(), "value": finding.failure.value, "file": file,
-                    "command": format!("skein run {}", file.display()), "found_by": finding.command,
+                    "command": format!("{program} run {}", file.display()), "found_by": finding.command,
                 })
             })
             .collect();
@@ -158,7 +123,7 @@ fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
             } else {
                 String::new()
             };
-            text += &format!("\n  {}{value}\n  skein run {}\n", finding.failure.kind.words(), file.display());
+            text += &format!("\n  {}{value}\n  {program} run {}\n", finding.failure.kind.words(), file.display());
             text += &finding.command.iter().map(|command| format!("  found by: {command}\n")).collect::<String>();
         }
         let ratio = |name: &str, ratio: Option<f64>| {
@@ -168,6 +133,5 @@ fn print(args: &HuntArgs, report: &HuntReport, files: &[PathBuf]) {
         };
         text + &ratio("separation", report.least_separation) + &ratio("clearance", report.least_clearance) + "\n"
     };
-    // A closed pipe is the reader's choice.
-    let _ = print_text(text);
+    print_text(text)
 }

@@ -1,5 +1,6 @@
 //! What to say of a file or folder that does not exist: which part of its path is missing, and what similar there is.
 
+use skein_scenario::nearest;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -23,12 +24,6 @@ pub(crate) fn missing(path: &Path, expected: &str) -> Option<String> {
         None => write!(text, "; {expected}"),
     };
     Some(text)
-}
-
-/// The known word that is most like `found`; `None` if none is close.
-pub(crate) fn nearest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let best = known.into_iter().map(|word| (strsim::damerau_levenshtein(found, word), word)).min();
-    best.filter(|(edits, _)| *edits <= 1 + found.len() / 4).map(|(_, word)| word)
 }
 
 /// The shortest beginning of the path that does not exist.
@@ -100,11 +95,5 @@ mod tests {
         assert!(text.contains(&format!("the folder {} does not exist", at("scenario").display())), "{text}");
         let text = missing(&at("quite-another"), "expected a file").unwrap();
         assert!(text.ends_with("quite-another does not exist; expected a file"), "{text}");
-    }
-
-    #[test]
-    fn only_close_words_are_suggested() {
-        assert_eq!(nearest("repotr", ["run", "report", "replay"]), Some("report"));
-        assert_eq!(nearest("fly", ["run", "report", "replay"]), None);
     }
 }

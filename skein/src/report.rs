@@ -2,6 +2,7 @@
 //! gets its other files from its record.
 
 use crate::cli::{ReportArgs, TableArgs};
+use crate::colour;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output;
@@ -52,7 +53,6 @@ fn write(
 }
 
 fn print(summary: &Summary, written: &[PathBuf]) -> Result<bool, Failure> {
-    let colour = crate::output::is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let files: String = written.iter().map(|file| format!("{}\n", file.display())).collect();
-    output::print(format!("{}\n{files}", text::summary(summary, colour)))
+    output::print(format!("{}\n{files}", text::summary(summary, colour::wanted(output::is_terminal()))))
 }

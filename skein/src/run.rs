@@ -1,6 +1,7 @@
 //! `skein run`: flies one mission.
 
 use crate::cli::{RunArgs, TableArgs};
+use crate::colour;
 use crate::complaint::complain;
 use crate::doctor::check_room;
 use crate::exit::{Exit, Failure};
@@ -9,6 +10,7 @@ use crate::interrupt::Interrupt;
 use crate::options::RuntimeChoice;
 use crate::output;
 use crate::progress::MissionBar;
+use crate::run_options;
 use rustix::process::Signal;
 use skein_protocol::record::{Outcome, RecordSink};
 use skein_report::{
@@ -18,8 +20,8 @@ use skein_report::{
 use skein_runtime::advice;
 use skein_runtime::run_facts::run_facts;
 use skein_runtime::{
-    HostReport, HostShare, Launch, PilotRegistry, ProcessInfo, ProcessRole, RunEnd, RuntimeError, end_with_parent,
-    inline, supervisor,
+    HostReport, HostShare, Launch, PATIENCE, PilotRegistry, ProcessInfo, ProcessRole, RunEnd, RuntimeError,
+    end_with_parent, inline, supervisor,
 };
 use skein_scenario::Scenario;
 use std::os::unix::process::ExitStatusExt;
@@ -35,11 +37,12 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     if let Some(parent) = args.parent {
         end_with_parent(parent, Signal::TERM).map_err(Failure::environment)?;
     }
+    run_options::check(args)?;
+    let per_process = args.drones_per_process.unwrap_or(1);
     let scenario = input::scenario(&args.scenario, pilots, args.runtime == RuntimeChoice::Inline)?;
-    check_packing(args, &scenario)?;
-    check_threads(args)?;
+    check_packing(per_process, &scenario)?;
     if args.runtime == RuntimeChoice::Processes {
-        check_room(scenario.formation.drones, args.drones_per_process)?;
+        check_room(scenario.formation.drones, per_process)?;
     }
     let runtime = match args.runtime {
         RuntimeChoice::Processes => "processes",
@@ -59,7 +62,7 @@ pub(crate) fn run(args: &RunArgs, pilots: &PilotRegistry, on_folder: Option<&OnF
     let own_program = own_program.map_err(Failure::environment)?;
     let shares = match args.runtime {
         RuntimeChoice::Processes => {
-            args.network.shares((&args.scenario, &scenario), own_program.as_deref(), args.drones_per_process)?
+            args.network.shares((&args.scenario, &scenario), own_program.as_deref(), per_process)?
         }
         RuntimeChoice::Inline => Vec::new(),
     };
@@ -148,21 +151,13 @@ fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, timeout_s: f64
     Ok(Begun { reserved, sink: MissionBar::new(recorder, quiet, timeout_s, gate_x_m) })
 }
 
-/// Refuses threads for processes: each is on a core of its own anyway.
-fn check_threads(args: &RunArgs) -> Result<(), Failure> {
-    match (args.runtime, args.threads.get()) {
-        (RuntimeChoice::Inline, _) | (_, 1) => Ok(()),
-        (_, threads) => Err(Failure::usage(format!("--threads {threads}: expected --runtime inline beside it"))),
-    }
-}
-
 /// Refuses process faults if drones share processes: the fault would hit all drones of the process.
-fn check_packing(args: &RunArgs, scenario: &Scenario) -> Result<(), Failure> {
+fn check_packing(per_process: u32, scenario: &Scenario) -> Result<(), Failure> {
     use skein_scenario::FaultKind::{Freeze, Kill, Restart};
     let of_process = |fault: &skein_scenario::Fault| [Kill, Freeze, Restart].contains(&fault.kind);
-    if args.drones_per_process > 1 && scenario.fault_plan.iter().any(of_process) {
+    if per_process > 1 && scenario.fault_plan.iter().any(of_process) {
         let why = "the scenario kills, freezes or restarts drones, which needs one process per drone";
-        return Err(Failure::usage(format!("--drones-per-process {}: {why}", args.drones_per_process)));
+        return Err(Failure::usage(format!("--drones-per-process {per_process}: {why}")));
     }
     Ok(())
 }
@@ -261,10 +256,10 @@ fn fly(
             let launch = Launch {
                 scenario,
                 clock: args.clock,
-                pin: args.pin.into(),
-                wait: args.wait.into(),
-                patience: args.patience,
-                per_process: args.drones_per_process,
+                pin: args.pin.unwrap_or_default().into(),
+                wait: args.wait.unwrap_or_default().into(),
+                patience: args.patience.unwrap_or(PATIENCE),
+                per_process: args.drones_per_process.unwrap_or(1),
                 program: pilots.program(),
                 hosts,
                 on_ready: &mut on_ready,
@@ -290,8 +285,8 @@ fn print(args: &RunArgs, summary: &Summary, folder: &RunFolder) -> Result<bool, 
     } else if args.quiet {
         Ok(true)
     } else {
-        let colour = output::is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        output::print_line(format!("{}\nfolder  {}", text::summary(summary, colour), folder.path().display()))
+        let text = text::summary(summary, colour::wanted(output::is_terminal()));
+        output::print_line(format!("{text}\nfolder  {}", folder.path().display()))
     }
 }
 

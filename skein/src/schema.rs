@@ -2,9 +2,9 @@
 
 use crate::cli::{Cli, SchemaOf};
 use crate::exit::{Exit, Failure};
-use crate::missing::nearest;
 use crate::output;
 use clap::CommandFactory;
+use skein_scenario::nearest;
 
 /// Prints a JSON schema.
 pub(crate) fn schema(of: SchemaOf) -> Result<Exit, Failure> {

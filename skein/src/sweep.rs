@@ -13,7 +13,7 @@ use skein_report::table::check_parquet;
 use skein_runtime::PilotRegistry;
 use skein_sweep::{
     Experiment, FolderProgress, Grid, SceneBounds, Shard, Shards, Sweep, SweepEnd, SweepError, SweepProgress,
-    SweepReport, scene_toml, wide_scene_toml,
+    SweepReport, program_name, scene_toml, wide_scene_toml,
 };
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -176,7 +176,7 @@ fn fly(args: &SweepArgs, file: &Path, pilots: &PilotRegistry) -> Result<Exit, Fa
         check_parquet().map_err(Failure::usage)?;
     }
     let experiment = Experiment::read(file).map_err(Failure::usage)?;
-    let grid = Grid::new(&experiment, &args.overrides);
+    let grid = Grid::new(&experiment, &args.overrides).program(program_name(pilots.program()));
     let interrupt = Interrupt::watch()?;
     let interrupted = || interrupt.signal();
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&experiment.name, args.shard));

@@ -1,5 +1,6 @@
 //! `skein topic`: prints the messages, senses and records of a running swarm.
 
+use crate::complaint::complain;
 use crate::exit::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::output::print_line;
@@ -12,6 +13,7 @@ use skein_protocol::message::Topic;
 use skein_protocol::record::RecordView;
 use skein_protocol::{Message, SimTime, TopicName};
 use skein_report::scene::message_json;
+use skein_scenario::did_you_mean;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -165,6 +167,32 @@ fn hz(run: (&Swarms, &RunningSwarm), filter: &Filter) -> Result<Exit, Failure> {
     })
 }
 
+/// Refuses a filter that nothing of the run can match.
+fn check(filter: &Filter, tap: &SwarmTap) -> Result<(), Failure> {
+    let drones = tap.facts.drones;
+    if let Some(drone) = filter.drone.filter(|drone| *drone >= drones) {
+        let last = drones.saturating_sub(1);
+        return Err(Failure::usage(format!("--drone {drone}: expected a drone of the run: 0 to {last}")));
+    }
+    let Some(kind) = &filter.kind else { return Ok(()) };
+    if !matches!(filter.topic, Name::Air | Name::Uplink) {
+        return Err(Failure::usage(format!("--kind {kind}: expected the topic `air` or `uplink`, which have frames")));
+    }
+    let own = tap.own_topics.iter().map(String::as_str);
+    let known: Vec<&str> = Topic::ALL.map(Topic::name).into_iter().chain(own).collect();
+    if known.contains(&kind.as_str()) {
+        return Ok(());
+    }
+    let list = known.join(", ");
+    if tap.topics_known {
+        let hint = did_you_mean(kind, known);
+        return Err(Failure::usage(format!("--kind {kind}: expected a kind of frame of the run: {list}{hint}")));
+    }
+    // Pilots may say what they do not declare.
+    complain(format!("warning: no pilot of the run declares the topic {kind}; known are {list}"));
+    Ok(())
+}
+
 /// Passes each line that matches the filter to `take`, and `None` when there are no new samples. Ends when the swarm has
 /// ended or `take` returns false.
 fn listen(
@@ -174,6 +202,7 @@ fn listen(
 ) -> Result<Exit, Failure> {
     let interrupt = Interrupt::watch()?;
     let tap = SwarmTap::attach(swarms, run)?;
+    check(filter, &tap)?;
     let dt_s = tap.facts.dt_s;
     let downlink = match filter.topic {
         Name::Senses | Name::Air => Some(tap.downlink()?),

@@ -139,6 +139,7 @@ mod tests {
             name: "e".to_owned(),
             scenarios: vec![Mission::Random],
             strategies: vec![],
+            strategy_places: vec![],
             seeds: vec![1, 2, 3],
             grid: vec![Axis {
                 key: "radio.loss".to_owned(),

@@ -194,6 +194,7 @@ mod tests {
             name: "e".to_owned(),
             scenarios: vec![Mission::Random],
             strategies: strategies.iter().map(|&word| word.to_owned()).collect(),
+            strategy_places: vec![],
             seeds: vec![7, 8, 9],
             grid: vec![],
             processes: false,

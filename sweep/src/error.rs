@@ -284,11 +284,11 @@ pub enum Problem {
     #[error("{0}")]
     Toml(String),
     /// A key is not known.
-    #[error("unknown key {found:?}{suggestion}; expected one of {expected}")]
+    #[error("unknown key {found:?}, expected one of {expected}{suggestion}")]
     UnknownKey {
         /// The key.
         found: String,
-        /// ` (did you mean …?)`, or empty.
+        /// `; did you mean …?`, or empty.
         suggestion: String,
         /// All keys.
         expected: String,
@@ -331,6 +331,26 @@ pub enum Problem {
         /// Greatest count.
         most: u64,
     },
+    /// A seed is too great.
+    #[error("seeds: found seeds up to {found}, expected at most {most}")]
+    SeedTooGreat {
+        /// The greatest seed.
+        found: u64,
+        /// Greatest seed of a scenario.
+        most: u64,
+    },
+    /// There are too many runs.
+    #[error("found {runs} runs, {cells} cells with {seeds} seeds each, expected at most {most} runs")]
+    TooManyRuns {
+        /// Number of runs, in words.
+        runs: String,
+        /// Number of combinations of scenario, strategy and values, in words.
+        cells: String,
+        /// Number of seeds.
+        seeds: u128,
+        /// Greatest number of runs.
+        most: u128,
+    },
     /// A key of the grid has a key of its own in the experiment.
     #[error("grid: {0} cannot be a key of the grid: the experiment has a key of its own for it")]
     ReservedKey(String),
@@ -338,11 +358,11 @@ pub enum Problem {
     #[error("grid: {0}: expected {{ from = NUMBER, to = NUMBER, steps = 2 or more }}")]
     Range(String),
     /// A metric is not known.
-    #[error("metrics: unknown {found:?}{suggestion}; expected some of {expected}")]
+    #[error("metrics: unknown {found:?}, expected some of {expected}{suggestion}")]
     UnknownMetric {
         /// The word.
         found: String,
-        /// ` (did you mean …?)`, or empty.
+        /// `; did you mean …?`, or empty.
         suggestion: String,
         /// All metrics.
         expected: String,

@@ -1,12 +1,18 @@
 //! An experiment: which missions a sweep flies. Read from TOML and checked.
 
-use crate::error::{ExperimentError, Problem};
+use crate::axis_values::AxisValues;
+use crate::error::{ExperimentError, Problem, SceneError};
+use crate::file_place::{Spot, line_column, span_of};
+use crate::item_problem::ItemProblem;
+use crate::limits::MAX_VALUES;
 use crate::metrics::{METRICS, SUCCESS, metric, own_name};
 use crate::random_scene::SceneBounds;
+use crate::run_count::RunCount;
 use serde::{Deserialize, Serialize};
+use skein_scenario::did_you_mean;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 /// The missions of a sweep: every scenario with every strategy, every value of the grid and every seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +23,9 @@ pub struct Experiment {
     pub scenarios: Vec<Mission>,
     /// Strategies to fly, as on the command line. Empty: each scenario's own strategy.
     pub strategies: Vec<String>,
+    /// Where each strategy stands, as `file:line:column`. Empty if it stands in no file.
+    #[serde(default)]
+    pub strategy_places: Vec<String>,
     /// Seeds, in the order in which they are flown.
     pub seeds: Vec<u64>,
     /// Scenario keys that vary, with the values of each.
@@ -84,12 +93,31 @@ enum OneOrMany {
     Many(Vec<String>),
 }
 
+impl OneOrMany {
+    fn names(&self) -> Vec<String> {
+        match self {
+            Self::One(name) => vec![name.clone()],
+            Self::Many(names) => names.clone(),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "expected a number of seeds, a list of seeds, or { from, count }")]
 enum Seeds {
     Count(u64),
     List(Vec<u64>),
     From(SeedRange),
+}
+
+impl Seeds {
+    /// Number of seeds.
+    fn count(&self) -> u64 {
+        match self {
+            Self::Count(count) | Self::From(SeedRange { count, .. }) => *count,
+            Self::List(seeds) => seeds.len() as u64,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -115,8 +143,8 @@ struct RawBounds {
     room_m: Option<u32>,
 }
 
-/// Greatest number of seeds, and of values of one key.
-const MAX_VALUES: u64 = 1_000_000;
+/// Greatest seed of a scenario: the greatest whole number of TOML.
+const MAX_SEED: u64 = i64::MAX as u64;
 
 impl Experiment {
     /// Reads the experiment file at `path`. Paths of scenario files in it are relative to its folder.
@@ -142,38 +170,59 @@ impl Experiment {
 
     /// `file`: what messages call the text.
     fn placed(text: &str, file: &str, stem: &str, folder: &Path) -> Result<Self, ExperimentError> {
-        let mut experiment = Self::checked(text, stem, folder).map_err(|fault| fault.at(file, text))?;
-        let table = DeTable::parse(text).map_err(|error| Fault::toml(error).at(file, text))?;
-        if let Some(DeValue::Table(grid)) = table.get_ref().get("grid").map(|grid| grid.get_ref()) {
-            for axis in &mut experiment.grid {
-                let place =
-                    |number| format!("{file}{}", colons(line_column(text, place_in(grid, "", &axis.key, number))));
-                axis.places = (0..axis.values.len()).map(place).collect();
-            }
-        }
-        Ok(experiment)
+        let read = || -> Result<Self, Fault> {
+            let table = DeTable::parse(text).map_err(Fault::toml)?;
+            let mut experiment = Self::checked(text, table.get_ref(), stem, folder)?;
+            experiment.find_places(table.get_ref(), file, text);
+            Ok(experiment)
+        };
+        read().map_err(|fault| fault.at(file, text))
     }
 
-    fn checked(text: &str, stem: &str, folder: &Path) -> Result<Self, Fault> {
-        let table = DeTable::parse(text).map_err(Fault::toml)?;
-        known_keys(table.get_ref())?;
+    fn checked(text: &str, table: &DeTable<'_>, stem: &str, folder: &Path) -> Result<Self, Fault> {
+        known_keys(table)?;
         let raw: Raw = toml::from_str(text).map_err(Fault::toml)?;
-        let place = |key: &str| table.get_ref().get(key).map(|value| value.span());
-        let fault = |key: &str| {
-            let span = place(key);
-            move |problem: Problem| Fault { span, problem: Box::new(problem) }
+        let fault = |path: &str| {
+            let path = path.to_owned();
+            move |ItemProblem { item, problem }| Fault::of(table, &path, item.into(), problem)
         };
+        let axes = axes(&raw.grid);
+        let scenarios = raw.scenario.names();
+        check_count(&raw, &axes, scenarios.len())
+            .map_err(|(path, problem)| Fault::of(table, &path, Spot::Value, problem))?;
         let name = raw.name.unwrap_or_else(|| stem.to_owned());
         Ok(Self {
-            name: checked_name(name).map_err(fault("name"))?,
-            scenarios: scenarios(raw.scenario, folder).map_err(fault("scenario"))?,
+            name: checked_name(name).map_err(|problem| fault("name")(problem.into()))?,
+            scenarios: missions(&scenarios, folder).map_err(fault("scenario"))?,
             strategies: checked_strategies(raw.strategies).map_err(fault("strategies"))?,
+            strategy_places: Vec::new(),
             seeds: seeds(raw.seeds).map_err(fault("seeds"))?,
-            grid: axes(&raw.grid).map_err(fault("grid"))?,
+            grid: checked_axes(axes, table)?,
             processes: matches!(raw.runtime, Runtime::Processes),
             metrics: metrics(raw.metrics).map_err(fault("metrics"))?,
-            bounds: bounds(&raw.random).map_err(fault("random"))?,
+            bounds: bounds(&raw.random).map_err(|error| Fault::of_bounds(table, error))?,
         })
+    }
+
+    /// Notes where strategies and values of the grid stand, for errors that only the scenarios show.
+    fn find_places(&mut self, table: &DeTable<'_>, file: &str, text: &str) {
+        let places = |path: &str, items: usize| {
+            let mut last = (None, String::new());
+            let place = |number| {
+                let start = span_of(table, path, Spot::Item(number)).map(|span| span.start);
+                // All values of a range stand at the same place.
+                if start != last.0 {
+                    let (line, column) = line_column(text, start.unwrap_or(0));
+                    last = (start, format!("{file}:{line}:{column}"));
+                }
+                last.1.clone()
+            };
+            (0..items).map(place).collect()
+        };
+        self.strategy_places = places("strategies", self.strategies.len());
+        for axis in &mut self.grid {
+            axis.places = places(&format!("grid.{}", axis.key), axis.values.len());
+        }
     }
 }
 
@@ -189,41 +238,30 @@ impl Fault {
         Self { span: error.span(), problem: Box::new(Problem::Toml(error.message().to_owned())) }
     }
 
+    /// A problem with the key of this path, such as `grid.radio.loss`.
+    fn of(table: &DeTable<'_>, path: &str, spot: Spot, problem: Box<Problem>) -> Self {
+        Self { span: span_of(table, path, spot), problem }
+    }
+
+    fn of_bounds(table: &DeTable<'_>, error: SceneError) -> Self {
+        let path = match &error {
+            SceneError::Bounds { what, .. } => format!("random.{what}"),
+            _ => "random.room_m".to_owned(),
+        };
+        Self::of(table, &path, Spot::Value, Box::new(error.into()))
+    }
+
     fn at(self, name: &str, text: &str) -> ExperimentError {
-        let place = line_column(text, self.span);
+        let place = self.span.map(|span| line_column(text, span.start));
         ExperimentError::Invalid { name: name.to_owned(), place, problem: self.problem }
     }
-}
-
-/// Line and column, from 1, of the beginning of a span.
-fn line_column(text: &str, span: Option<Range<usize>>) -> Option<(usize, usize)> {
-    let before = text.get(..span?.start).unwrap_or(text);
-    let column = before.rsplit('\n').next().map_or(0, |rest| rest.chars().count()) + 1;
-    Some((before.matches('\n').count() + 1, column))
-}
-
-fn colons(place: Option<(usize, usize)>) -> String {
-    place.map(|(line, column)| format!(":{line}:{column}")).unwrap_or_default()
-}
-
-/// Where value `number` of the key with this path stands. `above`: the path of `table` itself.
-fn place_in(table: &DeTable<'_>, above: &str, key: &str, number: usize) -> Option<Range<usize>> {
-    table.iter().find_map(|(name, value)| {
-        let path = format!("{above}{}", name.get_ref());
-        match value.get_ref() {
-            DeValue::Array(values) if path == key => values.get(number).map(|value| value.span()),
-            _ if path == key => Some(value.span()),
-            DeValue::Table(inner) => place_in(inner, &format!("{path}."), key, number),
-            _ => None,
-        }
-    })
 }
 
 fn known_keys(table: &DeTable<'_>) -> Result<(), Fault> {
     for key in table.keys() {
         let found: &str = key.get_ref();
         if !KEYS.contains(&found) {
-            let suggestion = suggestion(found, &KEYS);
+            let suggestion = did_you_mean(found, KEYS);
             let problem = Problem::UnknownKey { found: found.to_owned(), suggestion, expected: KEYS.join(", ") };
             return Err(Fault { span: Some(key.span()), problem: Box::new(problem) });
         }
@@ -231,13 +269,15 @@ fn known_keys(table: &DeTable<'_>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The known word that is most like `found`, as a question. Empty if none is close.
-fn suggestion(found: &str, known: &[&str]) -> String {
-    let best = known.iter().map(|word| (strsim::damerau_levenshtein(found, word), word)).min();
-    match best {
-        Some((edits, word)) if edits <= 1 + found.len() / 4 => format!(" (did you mean {word:?}?)"),
-        _ => String::new(),
+/// Refuses an experiment with too many runs, with the path of a key, before its seeds and values are written out.
+fn check_count(raw: &Raw, axes: &[(String, AxisValues<'_>)], scenarios: usize) -> Result<(), (String, Box<Problem>)> {
+    let mut count = RunCount::of_seeds(raw.seeds.count());
+    count.times("scenario", scenarios as u64);
+    count.times("strategies", raw.strategies.len() as u64);
+    for (key, values) in axes {
+        count.times(&format!("grid.{key}"), values.count());
     }
+    count.check()
 }
 
 fn checked_name(name: String) -> Result<String, Problem> {
@@ -248,17 +288,13 @@ fn checked_name(name: String) -> Result<String, Problem> {
     }
 }
 
-fn scenarios(written: OneOrMany, folder: &Path) -> Result<Vec<Mission>, Problem> {
-    let names = match written {
-        OneOrMany::One(name) => vec![name],
-        OneOrMany::Many(names) => names,
-    };
+fn missions(names: &[String], folder: &Path) -> Result<Vec<Mission>, ItemProblem> {
     if names.is_empty() {
         let expected = "a scenario file, \"random\" or \"wide\"";
-        return Err(Problem::EmptyList { key: "scenario".to_owned(), expected });
+        return Err(Problem::EmptyList { key: "scenario".to_owned(), expected }.into());
     }
-    unique("scenario", &names)?;
-    let mission = |name: &String| {
+    ItemProblem::unless_unique("scenario", names)?;
+    let mission = |(number, name): (usize, &String)| {
         if name == "random" {
             return Ok(Mission::Random);
         }
@@ -268,10 +304,10 @@ fn scenarios(written: OneOrMany, folder: &Path) -> Result<Vec<Mission>, Problem>
         let path = tidy(&folder.join(name));
         match std::fs::read_to_string(&path) {
             Ok(text) => Ok(Mission::File { path, text }),
-            Err(source) => Err(Problem::ScenarioFile { path, source }),
+            Err(source) => Err(ItemProblem::of_item(number, Problem::ScenarioFile { path, source })),
         }
     };
-    names.iter().map(mission).collect()
+    names.iter().enumerate().map(mission).collect()
 }
 
 /// Removes `folder/..` from a path, so that commands stay readable.
@@ -289,123 +325,107 @@ fn tidy(path: &Path) -> PathBuf {
     tidy
 }
 
-fn checked_strategies(strategies: Vec<String>) -> Result<Vec<String>, Problem> {
-    for word in &strategies {
-        word.parse::<skein_scenario::Strategy>()?;
+fn checked_strategies(strategies: Vec<String>) -> Result<Vec<String>, ItemProblem> {
+    for (number, word) in strategies.iter().enumerate() {
+        word.parse::<skein_scenario::Strategy>().map_err(|error| ItemProblem::of_item(number, error.into()))?;
     }
-    unique("strategies", &strategies)?;
+    ItemProblem::unless_unique("strategies", &strategies)?;
     Ok(strategies)
 }
 
-fn unique<T: PartialEq + std::fmt::Debug>(key: &str, items: &[T]) -> Result<(), Problem> {
-    match (1..items.len()).find(|&i| items[..i].contains(&items[i])) {
-        Some(i) => Err(Problem::Repeated { key: key.to_owned(), item: format!("{:?}", items[i]) }),
-        None => Ok(()),
-    }
-}
-
-fn seeds(written: Seeds) -> Result<Vec<u64>, Problem> {
+fn seeds(written: Seeds) -> Result<Vec<u64>, ItemProblem> {
     let range = match written {
         Seeds::List(seeds) => return listed_seeds(seeds),
         Seeds::Count(count) => SeedRange { from: 1, count },
         Seeds::From(range) => range,
     };
     if !(1..=MAX_VALUES).contains(&range.count) {
-        return Err(Problem::SeedCount { found: range.count, most: MAX_VALUES });
+        return Err(Problem::SeedCount { found: range.count, most: MAX_VALUES }.into());
     }
-    Ok((range.from..range.from.saturating_add(range.count)).collect())
+    // The TOML reader has checked that neither number is greater than an i64.
+    let behind = range.from + range.count;
+    if behind > MAX_SEED + 1 {
+        return Err(Problem::SeedTooGreat { found: behind - 1, most: MAX_SEED }.into());
+    }
+    Ok((range.from..behind).collect())
 }
 
 /// Each seed is in the range of a TOML integer, because the TOML reader has checked that.
-fn listed_seeds(seeds: Vec<u64>) -> Result<Vec<u64>, Problem> {
-    let mut sorted = seeds.clone();
-    sorted.sort_unstable();
-    let key = || "seeds".to_owned();
-    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(Problem::Repeated { key: key(), item: pair[0].to_string() }),
-        None if seeds.is_empty() => Err(Problem::EmptyList { key: key(), expected: "at least one" }),
-        None => Ok(seeds),
+fn listed_seeds(seeds: Vec<u64>) -> Result<Vec<u64>, ItemProblem> {
+    if seeds.is_empty() {
+        return Err(Problem::EmptyList { key: "seeds".to_owned(), expected: "at least one" }.into());
     }
+    ItemProblem::unless_unique("seeds", &seeds)?;
+    Ok(seeds)
 }
 
-/// The keys of the grid, sorted. Nested tables give keys with dots.
-fn axes(table: &toml::Table) -> Result<Vec<Axis>, Problem> {
+/// The keys of the grid with their values, sorted. Nested tables give keys with dots.
+fn axes(grid: &toml::Table) -> Vec<(String, AxisValues<'_>)> {
     let mut axes = Vec::new();
-    collect(table, "", &mut axes)?;
-    axes.sort_by(|a, b| a.key.cmp(&b.key));
-    let keys: Vec<&String> = axes.iter().map(|axis| &axis.key).collect();
-    unique("grid", &keys)?;
-    match axes.iter().find(|axis| matches!(axis.key.as_str(), "seed" | "strategy" | "name")) {
-        Some(axis) => Err(Problem::ReservedKey(axis.key.clone())),
-        None => Ok(axes),
-    }
+    collect(grid, "", &mut axes);
+    axes.sort_by(|(a, _), (b, _)| a.cmp(b));
+    axes
 }
 
-fn collect(table: &toml::Table, path: &str, axes: &mut Vec<Axis>) -> Result<(), Problem> {
+fn collect<'a>(table: &'a toml::Table, path: &str, axes: &mut Vec<(String, AxisValues<'a>)>) {
     for (name, value) in table {
         let key = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
         match value {
             toml::Value::Table(range) if range.contains_key("steps") || range.contains_key("from") => {
-                axes.push(Axis { values: steps(&key, range)?, key, places: Vec::new() });
+                axes.push((key, AxisValues::Range(range)));
             }
-            toml::Value::Table(inner) => collect(inner, &key, axes)?,
-            toml::Value::Array(values) if values.is_empty() => {
-                return Err(Problem::EmptyList { key: format!("grid: {key}"), expected: "at least one value" });
-            }
-            toml::Value::Array(values) => {
-                let values: Vec<String> = values.iter().map(ToString::to_string).collect();
-                unique(&format!("grid: {key}"), &values)?;
-                axes.push(Axis { key, values, places: Vec::new() });
-            }
-            one => axes.push(Axis { key, values: vec![one.to_string()], places: Vec::new() }),
+            toml::Value::Table(inner) => collect(inner, &key, axes),
+            toml::Value::Array(values) => axes.push((key, AxisValues::List(values))),
+            one => axes.push((key, AxisValues::One(one))),
         }
     }
-    Ok(())
 }
 
-/// The values of `{ from, to, steps }`: evenly spaced, both ends included.
-fn steps(key: &str, range: &toml::Table) -> Result<Vec<String>, Problem> {
-    let number = |name: &str| {
-        let value = range.get(name)?;
-        value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64)).filter(|v| v.is_finite())
+fn checked_axes(axes: Vec<(String, AxisValues<'_>)>, table: &DeTable<'_>) -> Result<Vec<Axis>, Fault> {
+    let fault = |key: &str, spot, problem| Fault::of(table, &format!("grid.{key}"), spot, problem);
+    if let Some(twice) = axes.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        let key = &twice[1].0;
+        let problem = Problem::Repeated { key: "grid".to_owned(), item: format!("{key:?}") };
+        return Err(fault(key, Spot::Key, Box::new(problem)));
+    }
+    if let Some((key, _)) = axes.iter().find(|(key, _)| matches!(key.as_str(), "seed" | "strategy" | "name")) {
+        return Err(fault(key, Spot::Key, Box::new(Problem::ReservedKey(key.clone()))));
+    }
+    let axis = |(key, values): (String, AxisValues<'_>)| {
+        let wrong = |ItemProblem { item, problem }| fault(&key, item.into(), problem);
+        let values = values.written(&key).map_err(wrong)?;
+        Ok(Axis { key, values, places: Vec::new() })
     };
-    let count = range.get("steps").and_then(toml::Value::as_integer).unwrap_or(0);
-    match (number("from"), number("to")) {
-        (Some(from), Some(to)) if range.len() == 3 && (2..=MAX_VALUES as i64).contains(&count) && from != to => {
-            // Rounded at the twelfth digit: 0.3, not 0.30000000000000004.
-            let at = |i: i64| from + (to - from) * i as f64 / (count - 1) as f64;
-            Ok((0..count).map(|i| ((at(i) * 1e12).round() / 1e12).to_string()).collect())
-        }
-        _ => Err(Problem::Range(key.to_owned())),
-    }
+    axes.into_iter().map(axis).collect()
 }
 
-fn metrics(written: Option<Vec<String>>) -> Result<Option<Vec<String>>, Problem> {
+fn metrics(written: Option<Vec<String>>) -> Result<Option<Vec<String>>, ItemProblem> {
     let Some(written) = written else { return Ok(None) };
-    unique("metrics", &written)?;
+    ItemProblem::unless_unique("metrics", &written)?;
     let known: Vec<&str> = std::iter::once(SUCCESS).chain(METRICS.iter().map(|metric| metric.name)).collect();
-    let is_known = |name: &&String| *name == SUCCESS || metric(name).is_some() || own_name(name).is_some();
-    match written.iter().find(|name| !is_known(name)) {
+    let is_known = |name: &String| *name == SUCCESS || metric(name).is_some() || own_name(name).is_some();
+    match written.iter().position(|name| !is_known(name)) {
         None => Ok(Some(written)),
-        Some(name) => {
-            let (found, suggestion) = (name.clone(), suggestion(name, &known));
+        Some(number) => {
+            let found = written[number].clone();
+            let suggestion = did_you_mean(&found, known.iter().copied());
             let expected = format!(
                 "{}, or metric.NAME for a figure that pilots report (also metric.NAME.last, .min and .max)",
                 known.join(", ")
             );
-            Err(Problem::UnknownMetric { found, suggestion, expected })
+            Err(ItemProblem::of_item(number, Problem::UnknownMetric { found, suggestion, expected }))
         }
     }
 }
 
-fn bounds(written: &RawBounds) -> Result<SceneBounds, Problem> {
+fn bounds(written: &RawBounds) -> Result<SceneBounds, SceneError> {
     let default = SceneBounds::default();
     let bounds = SceneBounds {
         drones: written.drones.unwrap_or(default.drones),
         obstacles: written.obstacles.unwrap_or(default.obstacles),
         room_m: written.room_m,
     };
-    Ok(bounds.checked()?)
+    bounds.checked()
 }
 
 #[cfg(test)]
@@ -413,7 +433,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Experiment, String> {
-        Experiment::checked(text, "stem", Path::new("")).map_err(|fault| fault.at("e.toml", text).to_string())
+        Experiment::placed(text, "e.toml", "stem", Path::new("")).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -439,17 +459,22 @@ mod tests {
     fn errors_name_place_and_expectation() {
         let head = "scenario = \"random\"\nseeds = 3\n";
         for (rest, wanted) in [
-            ("sedes = 3", "e.toml:3:1: unknown key \"sedes\" (did you mean \"seeds\"?)"),
-            ("metrics = [\"mision_s\"]", "e.toml:3:11: metrics: unknown \"mision_s\" (did you mean \"mission_s\"?)"),
-            ("strategies = [\"shortest\"]", "e.toml:3:14: strategies: \"shortest\" is no strategy"),
-            ("strategies = [\"fixed:1/2\", \"fixed:1/2\"]", "is there twice"),
-            ("[grid]\nradio.loss = []", "grid: radio.loss: found an empty list"),
-            ("[grid]\nradio.loss = { from = 0, to = 1 }", "grid: radio.loss: expected { from = NUMBER"),
-            ("[grid]\nseed = [1, 2]", "seed cannot be a key of the grid"),
-            ("[random]\ndrones = [9, 5]", "random: drones: found 9 to 5"),
-            ("[random]\ndrone = [5, 9]", "unknown field `drone`"),
-            ("runtime = \"outline\"", "unknown variant `outline`"),
-            ("name = \"../x\"", "name: found \"../x\""),
+            ("sedes = 3", "e.toml:3:1: unknown key \"sedes\", expected one of name, "),
+            ("sedes = 3", "random; did you mean `seeds`?"),
+            ("metrics = [\"order\", \"mision_s\"]", "e.toml:3:21: metrics: unknown \"mision_s\", expected some of "),
+            ("metrics = [\"mision_s\"]", "; did you mean `mission_s`?"),
+            ("strategies = [\"shortest-path\", \"shortest\"]", "e.toml:3:32: strategies: \"shortest\" is no strategy"),
+            ("strategies = [\"fixed:1/2\", \"fixed:1/2\"]", "e.toml:3:28: strategies: \"fixed:1/2\" is there twice"),
+            ("[grid]\nradio.delay_s = 0\nradio.loss = []", "e.toml:5:14: grid: radio.loss: found an empty list"),
+            ("[grid]\n\"radio.loss\" = [0, 1, 1]", "e.toml:4:23: grid: radio.loss: \"1\" is there twice"),
+            ("[grid]\nradio.loss = 0\n\"radio.loss\" = 1", "is there twice"),
+            ("[grid]\nradio.loss = { from = 0, to = 1 }", "e.toml:4:14: grid: radio.loss: expected { from = NUMBER"),
+            ("[grid]\nradio.loss = 0\nseed = [1, 2]", "e.toml:5:1: grid: seed cannot be a key of the grid"),
+            ("[random]\nobstacles = [1, 2]\ndrones = [9, 5]", "e.toml:5:10: random: drones: found 9 to 5"),
+            ("[random]\nroom_m = 1", "e.toml:4:10: random: room_m: found 1"),
+            ("[random]\ndrone = [5, 9]", "e.toml:4:1: unknown field `drone`"),
+            ("runtime = \"outline\"", "e.toml:3:11: unknown variant `outline`"),
+            ("name = \"../x\"", "e.toml:3:8: name: found \"../x\""),
         ] {
             let error = parse(&format!("{head}{rest}")).unwrap_err();
             assert!(error.contains(wanted), "{rest}: {error}");
@@ -459,9 +484,27 @@ mod tests {
         let absent = parse("scenario = \"no/such.toml\"\nseeds = 1").unwrap_err();
         assert!(absent.contains("e.toml:1:12: scenario: no/such.toml"), "{absent}");
         assert!(parse("scenario = \"random\"\nseeds = 0").unwrap_err().contains("expected 1 to"));
-        assert!(parse("scenario = \"random\"\nseeds = [1, 1]").unwrap_err().contains("twice"));
+        let seeds = |seeds: &str| parse(&format!("scenario = \"random\"\nseeds = {seeds}")).unwrap_err();
+        assert_eq!(seeds("[1, 2, 1]"), "e.toml:2:16: seeds: 1 is there twice");
+        let last = seeds("{ from = 9223372036854775800, count = 9 }");
+        assert_eq!(
+            last,
+            "e.toml:2:9: seeds: found seeds up to 9223372036854775808, expected at most 9223372036854775807"
+        );
         let twice = parse("scenario = [\"random\", \"wide\", \"random\"]\nseeds = 1").unwrap_err();
-        assert!(twice.contains("e.toml:1:12: scenario: \"random\" is there twice"), "{twice}");
+        assert!(twice.contains("e.toml:1:31: scenario: \"random\" is there twice"), "{twice}");
+    }
+
+    #[test]
+    fn too_many_runs_are_refused_before_they_are_made() {
+        let range = |key: char| format!("radio.{key} = {{ from = 0, to = 1, steps = 1000000 }}\n");
+        let all: String = ('a'..='z').map(range).collect();
+        let error = parse(&format!("scenario = \"random\"\nseeds = 1000000\n[grid]\nx = [1, 2]\n{all}")).unwrap_err();
+        assert!(error.starts_with("e.toml:2:9: found more than 10^38 runs"), "{error}");
+        let error = parse("scenario = \"random\"\nseeds = 10\n[grid]\nradio.a = { from = 0, to = 1, steps = 1000001 }");
+        let wanted =
+            "e.toml:4:11: found 10000010 runs, 1000001 cells with 10 seeds each, expected at most 10000000 runs";
+        assert_eq!(error.unwrap_err(), wanted);
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The runs of an experiment: every combination of scenario, strategy and grid values, with every seed.
 
-use crate::error::JobError;
+use crate::error::{JobError, SceneError};
 use crate::experiment::{Experiment, Mission};
-use crate::random_scene::{SceneBounds, random_scene};
-use crate::wide_scene::wide_scene;
+use crate::program_name::{SKEIN, quoted};
+use crate::random_scene::{SceneBounds, random_scene, scene_toml};
+use crate::wide_scene::{wide_scene, wide_scene_toml};
 use skein_runtime::{PilotProblem, PilotRegistry, resolve_commands};
 use skein_scenario::{Scenario, ScenarioErrors, ScenarioSource};
 use std::path::Path;
@@ -15,6 +16,8 @@ pub struct Grid<'a> {
     /// Overrides of every run, from the command line.
     overrides: &'a [(String, String)],
     combinations: Vec<Combination>,
+    /// The beginning of the commands that repeat runs.
+    program: String,
 }
 
 /// Everything that a run has besides its seed. The runs of one combination are averaged.
@@ -49,7 +52,19 @@ impl<'a> Grid<'a> {
                 }));
             }
         }
-        Self { experiment, overrides, combinations }
+        Self { experiment, overrides, combinations, program: SKEIN.to_owned() }
+    }
+
+    /// Sets the program that flies the runs, as a shell reads it: the commands that repeat them begin with it. The default is `skein`.
+    #[must_use]
+    pub fn program(self, program: impl Into<String>) -> Self {
+        Self { program: program.into(), ..self }
+    }
+
+    /// The program that flies the runs.
+    #[must_use]
+    pub fn program_name(&self) -> &str {
+        &self.program
     }
 
     /// The experiment.
@@ -100,8 +115,11 @@ impl<'a> Grid<'a> {
         let (combination, seed) = self.job(number);
         let overrides = self.overrides_of(number);
         match &self.experiment.scenarios[combination.scenario] {
-            Mission::Random => Ok(random_scene(seed, self.experiment.bounds, &overrides)?),
-            Mission::Wide => Ok(wide_scene(seed, &overrides)?),
+            Mission::Random => {
+                let scene = random_scene(seed, self.experiment.bounds, &overrides);
+                scene.map_err(|error| self.placed_in_scene(combination, error))
+            }
+            Mission::Wide => wide_scene(seed, &overrides).map_err(|error| self.placed_in_scene(combination, error)),
             Mission::File { path, text } => {
                 let parsed = named(path, |source| Scenario::parse(text, source, &overrides));
                 let mut scenario = parsed.map_err(|errors| self.placed(combination, errors))?;
@@ -119,15 +137,26 @@ impl<'a> Grid<'a> {
         overrides
     }
 
-    /// Gives an error in a value of the grid its place in the experiment file.
+    /// Gives an error in a strategy or in a value of the grid its place in the experiment file.
     fn placed(&self, combination: &Combination, errors: ScenarioErrors) -> ScenarioErrors {
+        let Experiment { strategies, strategy_places, grid, .. } = self.experiment;
+        let strategy =
+            combination.strategy.iter().map(|word| (format!("strategy={word:?}"), word, strategies, strategy_places));
+        let axes = grid.iter().zip(&combination.values);
+        let axes = axes.map(|(axis, value)| (format!("{}={value}", axis.key), value, &axis.values, &axis.places));
+        let changes: Vec<_> = strategy.chain(axes).collect();
         errors.with_places(|place| {
-            let axes = self.experiment.grid.iter().zip(&combination.values);
-            let (axis, value) =
-                axes.into_iter().find(|(axis, value)| place == format!("--set {}={value}", axis.key))?;
-            let number = axis.values.iter().position(|known| known == value)?;
-            axis.places.get(number).cloned()
+            let change = place.strip_prefix("--set ")?;
+            let (_, value, values, places) = changes.iter().find(|(known, ..)| known == change)?;
+            places.get(values.iter().position(|known| known == *value)?).cloned()
         })
+    }
+
+    fn placed_in_scene(&self, combination: &Combination, error: SceneError) -> JobError {
+        match error {
+            SceneError::Overrides(errors) => self.placed(combination, errors).into(),
+            error => error.into(),
+        }
     }
 
     /// Checks each combination, and that these pilots can fly it, with its first seed. `inline`: in this process. Another seed can only change the start's jitter; if that makes the
@@ -146,14 +175,21 @@ impl<'a> Grid<'a> {
 
     /// Gives a problem of the pilots its place in the scenario or in the experiment.
     fn blamed(&self, number: usize, problem: PilotProblem) -> JobError {
-        let (combination, _) = self.job(number);
-        let Mission::File { path, text } = &self.experiment.scenarios[combination.scenario] else {
-            return problem.into();
-        };
+        let (combination, seed) = self.job(number);
         let overrides = self.overrides_of(number);
-        let blame =
-            |source: ScenarioSource<'_>| Scenario::blame(text, source, &overrides, problem.keys(), problem.message());
-        self.placed(combination, named(path, blame)).into()
+        let blame = |text: &str, source: ScenarioSource<'_>| {
+            let errors = Scenario::blame(text, source, &overrides, problem.keys(), problem.message());
+            self.placed(combination, errors).into()
+        };
+        let scene = |kind: &str, text: Result<String, SceneError>| {
+            let name = format!("{kind}-{seed}");
+            text.map_or_else(JobError::from, |text| blame(&text, ScenarioSource { name: &name, stem: &name }))
+        };
+        match &self.experiment.scenarios[combination.scenario] {
+            Mission::File { path, text } => named(path, |source| blame(text, source)),
+            Mission::Random => scene("random", scene_toml(seed, self.experiment.bounds)),
+            Mission::Wide => scene("wide", wide_scene_toml(seed)),
+        }
     }
 
     /// What a combination changes of its scenario, besides the seed.
@@ -178,18 +214,19 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn command(&self, number: usize) -> String {
         let (combination, seed) = self.job(number);
+        let program = &self.program;
         let (before, path) = match &self.experiment.scenarios[combination.scenario] {
             Mission::File { path, .. } => (String::new(), path.display().to_string()),
             Mission::Wide => {
                 let file = format!("wide-{seed}.toml");
-                (format!("skein scene --wide {seed} > {file} && "), file)
+                (format!("{program} scene --wide {seed} > {file} && "), file)
             }
             Mission::Random => {
                 let file = format!("random-{seed}.toml");
-                (format!("skein scene {seed}{} > {file} && ", flags(self.experiment.bounds)), file)
+                (format!("{program} scene {seed}{} > {file} && ", flags(self.experiment.bounds)), file)
             }
         };
-        let mut command = format!("{before}skein run {}", quoted(&path));
+        let mut command = format!("{before}{program} run {}", quoted(&path));
         command += &combination.strategy.iter().map(|word| format!(" --strategy {word}")).collect::<String>();
         if before.is_empty() {
             command += &format!(" --seed {seed}");
@@ -229,16 +266,6 @@ fn points(experiment: &Experiment) -> Vec<Vec<String>> {
     })
 }
 
-/// Quotes a word for a shell, if it needs quotes.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:,+%@".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,6 +282,7 @@ mod tests {
             name: "e".to_owned(),
             scenarios: vec![Mission::File { path: "a b.toml".into(), text }, Mission::Random],
             strategies: vec!["shortest-path".to_owned(), "congestion-aware".to_owned()],
+            strategy_places: Vec::new(),
             seeds: vec![4, 9],
             grid: vec![axis("radio.delay_s", &["0", "0.5"]), axis("radio.loss", &["0", "0.1", "0.2"])],
             processes: false,
@@ -302,6 +330,11 @@ mod tests {
         let wanted = "skein scene 4 --drones 5..6 > random-4.toml && skein run random-4.toml --strategy shortest-path \
                       --set radio.delay_s=0 --set radio.loss=0";
         assert_eq!(grid.command(24), wanted);
+        let own = grid.program("python3 boids.py");
+        assert!(own.command(5).starts_with("python3 boids.py run 'a b.toml' --strategy"), "{}", own.command(5));
+        let scene =
+            "python3 boids.py scene 4 --drones 5..6 > random-4.toml && python3 boids.py run random-4.toml --strategy";
+        assert!(own.command(24).starts_with(scene), "{}", own.command(24));
     }
 
     #[test]
@@ -311,5 +344,26 @@ mod tests {
         let error =
             Grid::new(&experiment, &[]).check(&PilotRegistry::built_in().unwrap(), true).unwrap_err().to_string();
         assert!(error.contains("--set radio.loss=1.5"), "{error}");
+    }
+
+    #[test]
+    fn what_only_a_scenario_shows_has_its_place_in_the_experiment() {
+        let pilots = PilotRegistry::built_in().unwrap();
+        let refused = |scenario: &str, rest: &str| {
+            let text = format!("scenario = {scenario:?}\nseeds = 1\n{rest}");
+            let experiment = Experiment::parse(&text, "e.toml", Path::new("../scenarios/paper")).unwrap();
+            Grid::new(&experiment, &[]).check(&pilots, true).unwrap_err().to_string()
+        };
+        for scenario in ["random", "wide", "s2-right.toml"] {
+            for (rest, place) in [
+                ("strategies = [\"shortest-path\", \"fixed:99/1\"]", "e.toml:3:32: strategy: "),
+                ("[grid]\nradio.loss = [0, 1.5]", "e.toml:4:18: radio.loss: "),
+                ("[grid]\n\"drone.safe_distance_m\" = [20, 900]", "e.toml:4:32: "),
+                ("[grid]\npilot.0.name = \"papr\"", "e.toml:4:16: pilot.0.name: "),
+            ] {
+                let error = refused(scenario, rest);
+                assert!(error.starts_with(place), "{scenario}, {rest}: {error}");
+            }
+        }
     }
 }

@@ -41,22 +41,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod axis_values;
 mod cells;
 mod energy_ratios;
 mod error;
 mod experiment;
 mod file_kind;
+mod file_place;
 mod flight;
 mod grid;
 pub mod hunt;
+mod item_problem;
+mod limits;
 mod metrics;
 mod missions;
 mod own_statistic;
 mod paired;
 mod plots;
+mod program_name;
 mod random_scene;
 mod report;
 mod row;
+mod run_count;
 mod shard;
 mod shards;
 mod splitmix;
@@ -78,6 +84,7 @@ pub use grid::{Combination, Grid};
 pub use metrics::{METRICS, Metric, OWN_PREFIX, SUCCESS};
 pub use paired::PairedDifference;
 pub use plots::Plot;
+pub use program_name::program_name;
 pub use random_scene::{SceneBounds, random_scene, scene_toml};
 pub use report::SweepReport;
 pub use row::Row;

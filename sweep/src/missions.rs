@@ -9,4 +9,6 @@ pub(crate) struct Missions {
     pub(crate) experiment: Experiment,
     /// Key path and TOML value.
     pub(crate) overrides: Vec<(String, String)>,
+    /// The program that flies them, as a shell reads it.
+    pub(crate) program: String,
 }

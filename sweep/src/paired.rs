@@ -230,6 +230,7 @@ mod tests {
             name: "e".to_owned(),
             scenarios: vec![Mission::Random],
             strategies: ["shortest-path", "congestion-aware"].map(str::to_owned).to_vec(),
+            strategy_places: vec![],
             seeds: vec![7, 8, 9],
             grid: vec![Axis {
                 key: "radio.loss".to_owned(),

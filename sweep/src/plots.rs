@@ -217,6 +217,7 @@ mod tests {
             name: "e".to_owned(),
             scenarios: vec![Mission::Random],
             strategies: vec![],
+            strategy_places: vec![],
             seeds: vec![1],
             grid: axes.iter().map(axis).collect(),
             processes: false,

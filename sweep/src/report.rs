@@ -14,8 +14,17 @@ use serde_json::{Value, json};
 use skein_report::table::{ColumnKind, csv_to_parquet, inferred};
 
 /// Columns of runs.csv that are texts, even if they look like numbers.
-const TEXTS: [&str; 8] =
-    ["scenario", "strategy", "outcome", "pass_times_s", "splits_left_to_right", "digest", "reason", "command"];
+const TEXTS: [&str; 9] = [
+    "scenario",
+    "strategy",
+    "outcome",
+    "pass_times_s",
+    "splits_left_to_right",
+    "digest",
+    "reason",
+    "command",
+    "failures",
+];
 
 /// The results of a complete sweep.
 #[derive(Debug)]

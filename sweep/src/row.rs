@@ -34,6 +34,9 @@ pub struct Row {
     pub metrics_own: BTreeMap<String, OwnMetric>,
     /// Digest of the run, hex.
     pub digest: Option<String>,
+    /// The kinds of the invariants that were broken, each once, in the order in which they were broken first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<String>,
 }
 
 impl Row {
@@ -53,6 +56,7 @@ impl Row {
             metrics: METRICS.iter().map(|metric| (metric.value)(summary, scenario)).collect(),
             metrics_own: summary.metrics_own.clone(),
             digest: summary.digest.clone(),
+            failures: kinds(&summary.violations),
         }
     }
 
@@ -69,6 +73,7 @@ impl Row {
             metrics: Vec::new(),
             metrics_own: BTreeMap::new(),
             digest: None,
+            failures: Vec::new(),
         }
     }
 
@@ -91,9 +96,25 @@ impl Row {
     }
 }
 
+/// The kinds of the violations, each once.
+fn kinds(violations: &[Violation]) -> Vec<String> {
+    let mut kinds = Vec::new();
+    for violation in violations {
+        let kind = kind_name(violation);
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
+        }
+    }
+    kinds
+}
+
+/// The violation's kind, as in summary.json.
+fn kind_name(violation: &Violation) -> String {
+    serde_json::to_value(violation.kind).ok().and_then(|kind| kind.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
 fn violation_text(first: &Violation, count: usize) -> String {
-    let kind = serde_json::to_value(first.kind).unwrap_or_default();
-    let kind = kind.as_str().unwrap_or_default();
+    let kind = kind_name(first);
     let value = if first.kind.is_distance() { format!(": {:.3} m", first.value_m) } else { String::new() };
     format!("{kind} of {:?}{value} at {} s, {count} in all", first.drones, first.t_s)
 }
@@ -111,7 +132,7 @@ pub(crate) fn write_csv(out: &mut impl Write, grid: &Grid<'_>, rows: &[Row]) -> 
     head.extend(["outcome", "pass_times_s", "splits_left_to_right"].map(str::to_owned));
     head.extend(METRICS.iter().map(|metric| metric.name.to_owned()));
     head.extend(own.keys().map(|name| format!("{OWN_PREFIX}{name}")));
-    head.extend(["digest", "reason", "command"].map(str::to_owned));
+    head.extend(["digest", "reason", "command", "failures"].map(str::to_owned));
     line(out, head.into_iter())?;
     for row in rows {
         line(out, fields(grid, row, own.values().copied()).into_iter())?;
@@ -135,6 +156,7 @@ fn fields<'a>(grid: &Grid<'_>, row: &Row, own: impl Iterator<Item = OwnColumn<'a
     fields.extend(own.map(|column| number(&row.own(column))));
     fields.extend([row.digest.clone(), row.reason.clone()].map(Option::unwrap_or_default));
     fields.push(grid.command(row.job));
+    fields.push(row.failures.join(";"));
     fields
 }
 
@@ -145,6 +167,14 @@ fn line(out: &mut impl Write, fields: impl Iterator<Item = String>) -> std::io::
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_kind_of_violation_is_named_once() {
+        use skein_protocol::record::ViolationKind::{BallotWentBack, Separation};
+        let violation = |kind| Violation { t_s: 1.0, kind, drones: vec![0, 1], value_m: 2.0 };
+        let kinds = kinds(&[Separation, BallotWentBack, Separation].map(violation));
+        assert_eq!(kinds.join(";"), "separation;ballot-went-back");
+    }
 
     #[test]
     fn fields_with_commas_and_quotes_are_quoted() {

@@ -65,7 +65,8 @@ impl Shards {
     /// The runs of the whole sweep.
     #[must_use]
     pub fn grid(&self) -> Grid<'_> {
-        Grid::new(&self.missions.experiment, &self.missions.overrides)
+        let Missions { experiment, overrides, program } = &self.missions;
+        Grid::new(experiment, overrides).program(program)
     }
 
     /// Writes the folder of the whole sweep: what one machine that had flown all runs would have written.

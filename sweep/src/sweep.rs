@@ -117,7 +117,8 @@ impl<'g, 'c> Sweep<'g, 'c> {
         let (mut store, mut rows) = Store::open(folder, &Identity { shard: self.shard, ..identity(self.grid) })?;
         if self.shard.is_some() {
             let (experiment, overrides) = (self.grid.experiment().clone(), self.grid.overrides().to_vec());
-            store.keep_missions(&Missions { experiment, overrides })?;
+            let program = self.grid.program_name().to_owned();
+            store.keep_missions(&Missions { experiment, overrides, program })?;
         }
         let flights = folder.join("flights");
         // Left behind by a sweep that was killed.
@@ -196,7 +197,7 @@ impl<'g, 'c> Sweep<'g, 'c> {
     }
 }
 
-/// The identity of a grid's sweep. It hashes texts, not paths, so that a sweep may be resumed from another folder. It
+/// The identity of a grid's sweep. It hashes texts, not paths or places, so that a sweep may be resumed from another folder. It
 /// leaves out the metrics, which only choose what is shown.
 pub(crate) fn identity(grid: &Grid<'_>) -> Identity {
     let mut digest = Digest::default();
@@ -205,6 +206,7 @@ pub(crate) fn identity(grid: &Grid<'_>) -> Identity {
     };
     let Experiment { strategies, seeds, grid: axes, processes, bounds, .. } = grid.experiment();
     let overrides = grid.overrides();
+    let axes: Vec<_> = axes.iter().map(|axis| (&axis.key, &axis.values)).collect();
     fold(&format!("{strategies:?} {seeds:?} {axes:?} {processes} {bounds:?} {overrides:?}"));
     for mission in &grid.experiment().scenarios {
         match mission {

@@ -60,18 +60,22 @@ struct Clumsy {
 impl Clumsy {
     fn new(birth: &Birth) -> Result<Self, PilotError> {
         let how = birth.params.get_str("how", "")?.to_owned();
-        if how == "fork at birth" {
-            fork();
+        match how.as_str() {
+            "fork at birth" => _ = fork(),
+            "exit at birth" => std::process::exit(7),
+            _ => {}
         }
         Ok(Self { how, forked: false })
     }
 }
 
-/// Forks this process and does not care which of both it is.
+/// Forks this process. Returns whether this is the forked one.
 #[allow(unsafe_code, reason = "the system's call is unsafe")]
-fn fork() {
+fn fork() -> bool {
     // SAFETY: what the forked process does until it is ended is what the test is about.
-    assert!(unsafe { libc::fork() } >= 0);
+    let pid = unsafe { libc::fork() };
+    assert!(pid >= 0);
+    pid == 0
 }
 
 impl Pilot for Clumsy {
@@ -85,12 +89,16 @@ impl Pilot for Clumsy {
             "flood" => (0..65).for_each(|_| out.say("gossip", b"hello")),
             "oversize" => out.say("gossip", [0; 273]),
             "say" => out.fail("it gives up"),
-            "fork" if !std::mem::replace(&mut self.forked, true) => fork(),
+            "fork" if !std::mem::replace(&mut self.forked, true) => _ = fork(),
+            "fork and exit" if !std::mem::replace(&mut self.forked, true) && fork() => std::process::exit(7),
             "exit" => std::process::exit(7),
             "abort" => std::process::abort(),
-            "hang" => loop {
-                std::thread::sleep(std::time::Duration::from_secs(1));
-            },
+            "hang" => {
+                eprintln!("it hangs");
+                loop {
+                    std::thread::sleep(std::time::Duration::from_secs(1));
+                }
+            }
             _ => {}
         }
         Command::default()

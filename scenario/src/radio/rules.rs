@@ -2,9 +2,9 @@
 
 use super::resolve::with_rule;
 use crate::broken_rule::{BrokenRule, quantity};
-use crate::check::did_you_mean;
 use crate::keys::Scenario;
 use crate::radio_keys::{DelayModel, RadioKeys, RuleKeys};
+use crate::suggestion::did_you_mean;
 use skein_protocol::TopicName;
 use skein_protocol::message::Topic;
 

@@ -18,8 +18,12 @@ pub(crate) use sample::Sample;
 use skein_report::RunFacts;
 use skein_runtime::LocalTap;
 use skein_runtime::run_facts::run_facts;
+use skein_scenario::{DEFAULT_PILOT, PilotKeys};
 use std::collections::BTreeSet;
 pub(crate) use swarms::{RunningSwarm, Swarms};
+
+/// The other built-in pilot without topics of its own.
+const CRUISE: &str = "cruise";
 
 /// A tap on a running swarm: it receives copies of what the swarm publishes. It stays on the thread that made it.
 pub(crate) struct SwarmTap {
@@ -27,6 +31,8 @@ pub(crate) struct SwarmTap {
     pub(crate) facts: RunFacts,
     /// The topics that its pilots declare.
     pub(crate) own_topics: BTreeSet<String>,
+    /// Whether its pilots have no topics besides those that they declare.
+    pub(crate) topics_known: bool,
     source: TapSource,
 }
 
@@ -56,7 +62,10 @@ impl SwarmTap {
         };
         let facts = run_facts(&scenario, "processes", "").map_err(Failure::usage)?;
         let own_topics = scenario.declared_topics().into_iter().map(|(_, name)| name.to_owned()).collect();
-        Ok(Self { facts, own_topics, source })
+        let silent = [DEFAULT_PILOT, CRUISE];
+        let is_built_in = |pilot: &PilotKeys| pilot.command.is_none() && silent.contains(&pilot.shown_name());
+        let topics_known = scenario.pilots.iter().all(is_built_in);
+        Ok(Self { facts, own_topics, topics_known, source })
     }
 
     /// The oldest record of a tick that is not yet received.

@@ -73,6 +73,9 @@ struct Flown {
     run: Option<usize>,
 }
 
+/// A mission to fly, and the number of its run in the grid; `None` for a neighbour.
+type Mission = (Scenario, Option<usize>);
+
 impl<'a> Hunt<'a> {
     /// A hunt of these pilots over the runs of a grid, with 1000 flights in one worker. It is never interrupted.
     #[must_use]
@@ -138,9 +141,11 @@ impl<'a> Hunt<'a> {
         let runs = self.grid.len().min(share);
         // The runs are spread evenly over the grid, so that each combination has its part.
         let chosen: Vec<usize> = (0..runs).map(|i| i * self.grid.len() / runs.max(1)).collect();
-        let scenarios: Vec<(Scenario, Option<usize>)> =
-            chosen.iter().filter_map(|&run| Some((self.grid.scenario(run).ok()?, Some(run)))).collect();
-        self.fly(scenarios, 0, 0, progress)
+        let mission = |number: usize| {
+            let run = chosen[number];
+            Some((self.grid.scenario(run).ok()?, Some(run)))
+        };
+        self.fly((runs, &mission), 0, 0, progress)
     }
 
     /// Flies neighbours of the missions that came nearest to a failure, generation by generation.
@@ -155,13 +160,10 @@ impl<'a> Hunt<'a> {
                 let parent = parents[i % parents.len()];
                 mutation::neighbour(parent, self.seed, (flown.len() + i) as u64)
             };
-            let scenarios: Vec<(Scenario, Option<usize>)> =
-                (0..count).filter_map(neighbour).map(|s| (s, None)).collect();
-            if scenarios.is_empty() {
-                return;
-            }
+            let scenarios: Vec<Scenario> = (0..count).filter_map(neighbour).collect();
+            let mission = |number: usize| Some((scenarios[number].clone(), None));
             let failures = flown.iter().filter(|one| one.failure.is_some()).count();
-            let generation = self.fly(scenarios, flown.len(), failures, progress);
+            let generation = self.fly((scenarios.len(), &mission), flown.len(), failures, progress);
             if generation.is_empty() {
                 return;
             }
@@ -169,28 +171,35 @@ impl<'a> Hunt<'a> {
         }
     }
 
-    /// Flies missions side by side and returns them in the given order. `done` and `failures`: counts so far, for `progress`.
+    /// Flies missions side by side and returns them in the order of their numbers. A mission is made when it is flown, so that a hunt
+    /// in many runs begins at once; one that is not valid is left out. `done` and `failures`: counts so far, for `progress`.
     fn fly(
         &self,
-        scenarios: Vec<(Scenario, Option<usize>)>,
+        (count, mission): (usize, &(dyn Fn(usize) -> Option<Mission> + Sync)),
         done: usize,
         failures: usize,
         progress: &mut impl FnMut(usize, usize),
     ) -> Vec<Flown> {
-        let jobs: Vec<usize> = (0..scenarios.len()).collect();
+        let jobs: Vec<usize> = (0..count).collect();
         let (mut flown, mut failed) = (BTreeMap::new(), failures);
         let pool = WorkerPool { jobs: &jobs, workers: self.workers };
+        let is_interrupted = || (self.interrupted)().is_some();
+        // `None` ends a worker.
         let fly = |job: usize| {
-            let (scenario, run) = &scenarios[job];
-            let summary = fly_inline(scenario, self.pilots, self.interrupted).ok();
-            (self.interrupted)().is_none().then(|| (job, summary.map(|summary| (scenario, *run, summary))))
+            let mission = if is_interrupted() { return None } else { mission(job) };
+            let flight = |(scenario, run): Mission| {
+                let summary = fly_inline(&scenario, self.pilots, self.interrupted).ok()?;
+                Some((scenario, run, summary))
+            };
+            let flight = mission.and_then(flight);
+            (!is_interrupted()).then_some((job, flight))
         };
         let end = pool.run(fly, |result| {
             if let Some((job, Some((scenario, run, summary)))) = result {
-                let failure = Failure::of(&summary, scenario);
+                let failure = Failure::of(&summary, &scenario);
                 failed += usize::from(failure.is_some());
-                let danger = Danger::of(&summary, scenario);
-                flown.insert(job, Flown { scenario: scenario.clone(), danger, failure, run });
+                let danger = Danger::of(&summary, &scenario);
+                flown.insert(job, Flown { scenario, danger, failure, run });
             }
             progress(done + flown.len(), failed);
             Ok::<(), std::convert::Infallible>(())
