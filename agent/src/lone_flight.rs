@@ -18,6 +18,8 @@ pub(crate) struct Others<'a> {
     pub(crate) peers: &'a Peers,
     /// Distance over which drones hear each other, m; `None` if all do.
     pub(crate) reach_m: Option<f64>,
+    /// Whether it keeps apart from them by words. Then those that it leaves behind might not go on.
+    pub(crate) by_words: bool,
 }
 
 /// How far a drone flies on.
@@ -33,7 +35,8 @@ pub(crate) struct LoneFlight {
     next_look: SimTime,
     /// Abscissa of the last living drone, world frame, m.
     last_x_m: f64,
-    /// Abscissa up to which it stays in reach of the nearest other drone, world frame, m; infinite if all drones hear each other.
+    /// Abscissa up to which it stays in reach of the nearest other drone (by words: of the nearest one behind), world frame, m; infinite if
+    /// all drones hear each other.
     reached_x_m: f64,
     /// The ordinate along which it flies, world frame, m, and when it last did.
     lane: Option<(f64, SimTime)>,
@@ -77,12 +80,13 @@ impl LoneFlight {
         others: &Others<'_>,
         guidance: &GuidanceParams,
     ) -> f64 {
-        let &Others { peers, reach_m } = others;
+        let &Others { peers, reach_m, by_words } = others;
         if now >= self.next_look {
             self.next_look = now.after(LOOK_S);
             let living = || peers.living(now).map(|(_, pose)| pose.extrapolated(now));
             self.last_x_m = living().map(|place| place.x).fold(f64::INFINITY, f64::min);
-            let nearest_m = living().map(|place| (place - position).norm()).reduce(f64::min);
+            let behind = living().filter(|place| !by_words || place.x < position.x);
+            let nearest_m = behind.map(|place| (place - position).norm()).reduce(f64::min);
             let room_m = reach_m.zip(nearest_m).map(|(reach_m, nearest_m)| IN_REACH * reach_m - nearest_m);
             self.reached_x_m = room_m.map_or(f64::INFINITY, |room_m| position.x + room_m);
         }
@@ -108,14 +112,20 @@ mod tests {
 
     /// The speed of a drone that has passed nothing, m/s.
     fn speed_mps(flight: &mut LoneFlight, now: SimTime, x_m: f64, peers: &Peers, reach_m: Option<f64>) -> f64 {
-        flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &Others { peers, reach_m }, &GUIDANCE)
+        flight.speed_mps(
+            now,
+            Vec2::new(x_m, 0.0),
+            f64::NEG_INFINITY,
+            &Others { peers, reach_m, by_words: false },
+            &GUIDANCE,
+        )
     }
 
     #[test]
     fn a_drone_waits_beyond_the_goal() {
         let mut flight = flight(Destination::Goal { front_m: Vec2::new(500.0, 30.0) });
         let peers = Peers::new(2, 1.0);
-        let others = Others { peers: &peers, reach_m: None };
+        let others = Others { peers: &peers, reach_m: None, by_words: false };
         let mut speed_mps =
             |x_m, passed_x_m| flight.speed_mps(SimTime::ZERO, Vec2::new(x_m, 0.0), passed_x_m, &others, &GUIDANCE);
         assert_eq!((speed_mps(500.0, 300.0), speed_mps(900.0, 300.0)), (10.0, 0.0));
@@ -156,5 +166,20 @@ mod tests {
         assert_eq!(speed_mps(130.0, Some(100.0)), 10.0);
         assert_eq!(speed_mps(180.0, Some(100.0)), 0.0);
         assert_eq!(speed_mps(180.0, None), 10.0, "all drones hear each other");
+    }
+    #[test]
+    fn by_words_a_drone_stays_in_reach_of_the_nearest_one_behind() {
+        let mut peers = Peers::new(3, 1.0);
+        let now = SimTime::from_secs(2.0);
+        for (drone, x_m) in [(0, 0.0), (1, 190.0)] {
+            peers.hear(now, DroneId(drone), Pose { stamp: now, position_m: [x_m, 0.0, 0.0], ..Pose::zeroed() });
+        }
+        let speed_mps = |x_m, by_words| {
+            let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
+            let others = Others { peers: &peers, reach_m: Some(100.0), by_words };
+            flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &others, &GUIDANCE)
+        };
+        assert_eq!((speed_mps(180.0, false), speed_mps(180.0, true)), (10.0, 0.0));
+        assert_eq!(speed_mps(50.0, true), 10.0);
     }
 }

@@ -7,7 +7,7 @@ mod relayed_lines;
 pub mod separating_line;
 pub mod separation_pair;
 
-use crate::tuning::{IN_REACH, STILL_MPS};
+use crate::tuning::STILL_MPS;
 use own_path::OwnPath;
 use relayed_lines::{Distances, RelayedLines};
 use separating_line::{SeparatingLine, Side};
@@ -42,6 +42,20 @@ const CLOSE: f64 = 2.0;
 const FRONT_TURN_S: f64 = 60.0;
 /// Then the one with the higher id, for this long, s.
 const BACK_TURN_S: f64 = 20.0;
+
+/// Two drones that are farther from each other than this share of the distance over which drones hear each other may lose each other soon.
+/// Chosen by hand.
+const FAR: f64 = 0.5;
+/// Two drones that are this far beside each other, in distances to keep, can fly past each other, if they were on the same sides in the formation
+/// at the start. Chosen by hand: the line between them leaves each of them some room.
+const ASIDE: f64 = 1.25;
+/// The same for two drones that may have to change sides. Chosen by hand: drones that follow each other round a corner are less far aside.
+const FAR_ASIDE: f64 = 2.0;
+/// One drone flies ahead of another one if the direction from this to that has at least this component along the flight. No unit. The cosine
+/// of 45°.
+const AHEAD: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// A drone of which the last word is older than this is lost, s. Chosen by hand: longer than words take over several other drones.
+const OLD_S: f64 = 5.0;
 
 /// A line that moves for longer than this is no line that a drone makes, s.
 const LONGEST_MOTION_S: f64 = 300.0;
@@ -328,7 +342,7 @@ impl Separations {
                 // A drone that is out of reach may have been restarted: its state is passed on.
                 known.hear_incarnation(pose.incarnation);
                 let pose = known.seen.map_or(pose, |seen| seen.at(now, &pose));
-                let lost = !peers.is_living(known.peer, now);
+                let lost = !peers.is_living(known.peer, now) || now.since(pose.stamp) > OLD_S;
                 self.params.propose(known, &pose, lost, peers.delay_s(), path);
             }
             separators.extend(known.statement(self.ranges).map(|said| separator(known.peer, &said)));
@@ -391,9 +405,8 @@ struct Stop {
 #[derive(Clone, Copy, Debug)]
 struct Other {
     stop: Stop,
-    /// Where it would have stopped when it was heard last, m, if it is lost. It is given room within reach of that place only. Farther away, the
-    /// two might wait on their sides of the line without hearing each other, and the room would be lost to both.
-    lost_at: Option<Vec2>,
+    /// How far this drone was to the left of it at the start, m.
+    aside_m: f64,
 }
 
 /// Which of two drones that are still and close has all the room between them. Each of the two says so by its own clock: where their clocks
@@ -453,15 +466,16 @@ impl SeparationParams {
         if speed > 0.0 { moving.arriving_at(way_m, braking * along.abs() / speed) } else { moving }
     }
 
-    /// Makes a new line, if it is this drone's turn and the new line is better than the present one. `lost`: whether the other drone has been
-    /// silent for too long.
+    /// Makes a new line, if it is this drone's turn and the new line is better than the present one. `lost`: whether the last word of the
+    /// other drone is too old.
     fn propose(&self, known: &mut Known, pose: &Pose, lost: bool, delay_s: f64, path: &OwnPath) {
         let now = path.now();
         let age_s = now.since(pose.stamp).max(0.0);
         let late_s = age_s.max(delay_s);
         let stopped = pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2));
         let stop = self.peer_stop(known, stopped, pose.velocity(), age_s);
-        let peer = Other { stop, lost_at: lost.then_some(stopped) };
+        let aside_m = self.start(self.me).y - self.start(known.peer).y;
+        let peer = Other { stop, aside_m };
         let own = Stop { at: path.end(), velocity: path.velocity() };
         let Some(towards_me) = (own.at - stop.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
@@ -471,6 +485,10 @@ impl SeparationParams {
             }
             return;
         };
+        // The other drone would not hear of a line that binds this one.
+        if lost && (own.at - stopped).norm() > self.radio_range_m {
+            return;
+        }
         let side = known.pair.side();
         let along_mps = towards_me.dot(&(own.velocity + stop.velocity)) / 2.0;
         let abreast_mps = self.scale().speed(ABREAST_MPS);
@@ -504,6 +522,19 @@ impl SeparationParams {
         Stop { at: at + velocity * flown_s, velocity }
     }
 
+    /// The normal of a line between this drone and another one, on this drone's side. `apart`: from where that one would stop to where this one
+    /// would, m. Two drones that may lose each other get a line along the flight, if they are far enough beside each other, and were on the same
+    /// sides in the formation at the start (`aside_m`): then each of them can fly on without a word from the other.
+    fn normal(&self, apart: Vec2, aside_m: f64) -> Option<Vec2> {
+        let is_far = apart.norm() > FAR * self.radio_range_m;
+        let stay_aside = aside_m * apart.y.signum() >= self.keep_m / 2.0;
+        let least_m = self.keep_m * if stay_aside { ASIDE } else { FAR_ASIDE };
+        if is_far && apart.y.abs() >= least_m {
+            return Some(Vec2::new(0.0, apart.y.signum()));
+        }
+        apart.try_normalize(1e-9)
+    }
+
     /// The best line between this drone and another one, to which this drone's path keeps; `None` if there is none. When the
     /// other drone hears of it, both will have flown on for `late_s`. The line is in the middle of where they would stop then, as
     /// far as this drone's path now and the other's path then allow.
@@ -518,7 +549,7 @@ impl SeparationParams {
     ) -> Option<SeparatingLine> {
         let (now, peer) = (path.now(), &other.stop);
         let half_m = self.keep_m / 2.0;
-        let wanted = (own.at - peer.at).try_normalize(1e-9)? * side.sign();
+        let wanted = self.normal(own.at - peer.at, other.aside_m)? * side.sign();
         let keeps =
             |line: &&SeparatingLine| line.normal().perp(&wanted).abs() < TURN && line.normal().dot(&wanted) > 0.0;
         let resting = match present.filter(keeps) {
@@ -533,17 +564,17 @@ impl SeparationParams {
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
         let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().speed(STILL_MPS);
+        let leads = n.x > AHEAD && own_mps > 0.0 && (own_mps + peer_mps) / 2.0 > self.scale().speed(ABREAST_MPS);
         // The first line is in the middle: the other drone, which hovers, must keep to it.
         let aimed_m = match (close && still && present.is_some(), side == turn_at(now)) {
+            // A drone that flies far behind has most of the room: it may hear of the next line late.
+            (false, _) if leads => middle_m.max(own_m - self.keep_m),
             (false, _) => middle_m,
             // Two drones that block each other would wait for ever if each of them always left the other one half of the room.
             (true, true) => peer_m + half_m,
             (true, false) => own_m - half_m,
         };
-        let present_m = present.filter(keeps).map_or(f64::NEG_INFINITY, |line| side.sign() * line.stop_m());
-        let reach_m = |at: Vec2| n.dot(&at) + IN_REACH * self.radio_range_m - half_m;
-        let room_m = other.lost_at.map_or(f64::INFINITY, reach_m);
-        let stop_m = aimed_m.max(peer_needs_m).min(room_m.max(present_m)).min(own_m - half_m);
+        let stop_m = aimed_m.max(peer_needs_m).min(own_m - half_m);
         // How much of the way of this drone's path the line has still to go, so that this drone's path keeps to it.
         let speed = own.velocity.norm();
         let spare_m = own_m - half_m - stop_m;

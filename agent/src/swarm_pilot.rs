@@ -292,7 +292,10 @@ impl SwarmPilot {
 
     /// The velocity of a drone that has nothing left to pass and no formation to join, m/s.
     fn lone_velocity(&mut self, now: SimTime, position: Vec2) -> Vec2 {
-        let others = lone_flight::Others { peers: self.leading.peers(), reach_m: self.leading.reach_m() };
+        // How far away the farthest drone is that it hears says nothing of its reach once it hears only near ones.
+        let range_m = Some(self.params.planner.radio_range_m).filter(|range_m| range_m.is_finite());
+        let reach_m = self.leading.reach_m().map(|heard_m| range_m.unwrap_or(heard_m));
+        let others = lone_flight::Others { peers: self.leading.peers(), reach_m, by_words: self.separations.is_some() };
         let exits = self.leading.planned_sets().iter().map(|set| set.routes.exit_x_m());
         let passed_x_m = exits.filter(|exit_x_m| *exit_x_m <= position.x).fold(f64::NEG_INFINITY, f64::max);
         let speed_mps = self.lone_flight.speed_mps(now, position, passed_x_m, &others, &self.params.guidance);

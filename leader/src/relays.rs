@@ -22,8 +22,8 @@ use crate::presences::Presences;
 use crate::relay_pace::RelayPace;
 use crate::relayed_facts::RelayedFacts;
 use crate::tuning::{
-    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, REACHED, RELAY_MEMORY_S, SETTLED_S, UNSETTLED_S,
-    WIDE_S,
+    CLOCKS_S, COUNT_S, FORGET_S, MAX_RELAYED_PER_TICK, NEAR, OLDEST_S, REACHED, RELAY_MEMORY_S, SETTLED_S,
+    STAYS_WIDE_S, UNSETTLED_S, WIDE_S,
 };
 use skein_protocol::payload::{Leadership, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
@@ -45,6 +45,8 @@ pub(crate) struct Relays {
     distances_m: Vec<f64>,
     /// Since when some neighbour hears other drones than this one.
     differs: Option<SimTime>,
+    /// When one last did.
+    differed: SimTime,
     /// Whether this drone passes messages on.
     wide: bool,
     /// Whether some drone is close to this one.
@@ -79,6 +81,7 @@ impl Relays {
             reach_m: 0.0,
             distances_m: Vec::new(),
             differs: None,
+            differed: params.start,
             wide: false,
             crowded: false,
             lags: false,
@@ -139,7 +142,11 @@ impl Relays {
             }
         }
         self.measure_reach(k, now, beacon_s);
-        self.differs = differs.then(|| self.differs.unwrap_or(now));
+        if differs {
+            self.differed = now;
+        }
+        let stays = self.wide && now.since(self.differed) < STAYS_WIDE_S;
+        self.differs = (differs || stays).then(|| self.differs.unwrap_or(now));
         let patience_s = WIDE_S.max(3.0 * beacon_s) + 2.0 * k.peers().delay_s();
         let first = !k.election().obeyed().is_some();
         self.wide = self.differs.is_some_and(|since| first || now.since(since) >= patience_s);

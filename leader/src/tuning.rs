@@ -114,6 +114,9 @@ pub(crate) const NEAR: f64 = 0.6;
 /// A drone passes messages on once a neighbour has heard other drones than it does for this long, s. At least three beacons,
 /// and twice the message delay is added. 0.5. By hand: longer than a crash is noticed by some and not by others.
 pub(crate) const WIDE_S: f64 = 0.5;
+/// A drone stops passing messages on once each neighbour has heard the same drones as it does for this long, s. Chosen by hand: where beacons
+/// are lost, and at the edge of the range, all agree by chance for a moment now and then, and what was to be passed on would be forgotten.
+pub(crate) const STAYS_WIDE_S: f64 = 3.0;
 /// Longest time until a message of a leader is passed on while other drones are close, s; also the time between two repetitions
 /// while a neighbour obeys an earlier term. 0.1: half of a heartbeat period. By hand.
 pub(crate) const HOP_S: f64 = 0.1;

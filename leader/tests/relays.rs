@@ -21,6 +21,8 @@ const PLAN: PlanStamp = PlanStamp { ballot: TERM, epoch: 1 };
 struct Middle {
     leading: Leading,
     tick: u64,
+    /// What its two neighbours say of the drones that they hear.
+    hears: [u32; 2],
 }
 
 impl Middle {
@@ -30,7 +32,7 @@ impl Middle {
 
     fn over(channel: ChannelParams) -> Self {
         let params = LeadingParams { channel, ..params(&DEFAULT, DRONES, 1, 1, SimTime::ZERO) };
-        Self { leading: Leading::new(&params), tick: 0 }
+        Self { leading: Leading::new(&params), tick: 0, hears: [17, 18] }
     }
 
     fn now(&self) -> SimTime {
@@ -84,7 +86,7 @@ impl Middle {
     fn step(&mut self) -> Vec<Message> {
         self.tick += 1;
         let stamp = self.now();
-        for (source, hears) in [(0, 17), (2, 18)] {
+        for (source, hears) in [0, 2].into_iter().zip(self.hears) {
             let position_m = [-40.0 * f64::from(source), 0.0, 50.0];
             let common = Pose { stamp, position_m, group: GroupId::ALL, term: TERM, incarnation: 1, ..Pose::zeroed() };
             self.hear(source, Message::Pose(Pose { hears, obeyed: PLAN, ..common }));
@@ -276,4 +278,20 @@ fn a_drone_that_is_heard_by_chance_does_not_count_for_the_range() {
     }
     let reach_m = middle.leading.reach_m().unwrap();
     assert!((60.0..=120.0).contains(&reach_m), "{reach_m}");
+}
+
+#[test]
+fn a_drone_passes_messages_on_while_its_neighbours_agree_for_a_moment() {
+    let mut middle = Middle::new();
+    let mut passes_on = |hears, ticks| {
+        middle.hears = hears;
+        for _ in 0..ticks {
+            middle.step();
+        }
+        middle.leading.reach_m().is_some()
+    };
+    assert!(passes_on([17, 18], 60));
+    assert!(passes_on([0, 0], 100), "they agree for 2 s");
+    assert!(!passes_on([0, 0], 100), "they agree for 4 s");
+    assert!(!passes_on([17, 18], 10), "it begins after a while");
 }

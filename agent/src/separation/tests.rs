@@ -248,24 +248,56 @@ fn two_drones_that_block_each_other_have_the_room_between_them_in_turn() {
     }
 }
 
+/// Where drone 1 may be at most after drone 0 has spoken, m: that one is still at `x_m`, and has not heard drone 1 at x = −60 m for a while.
+fn edge_m(radio_range_m: f64, silent_s: f64, x_m: f64) -> f64 {
+    let params = SeparationParams { radio_range_m, ..separations(0, 1).params };
+    let mut leader = Separations::new(params, SimTime::ZERO);
+    let mut peers = Peers::new(3, 2.0);
+    let heard = SimTime::from_secs(1.0);
+    peers.hear(heard, DroneId(1), pose(heard, Vec2::new(-60.0, 0.0), Vec2::zeros()));
+    let tick = ((1.0 + silent_s) / FILTER.dt_s).round() as u64;
+    leader.speak(&peers, &path(tick, Vec2::new(x_m, 0.0), Vec2::zeros()), &mut Vec::new());
+    let (line, _) = leader.lines().next().unwrap();
+    line.normal().x * line.stop_m() + FILTER.keep_m() / 2.0
+}
+
 #[test]
-fn a_drone_gives_a_lost_one_no_more_room_than_up_to_where_the_two_hear_each_other() {
-    let edge_m = |radio_range_m: f64, silent_s: f64| {
-        let params = SeparationParams { radio_range_m, ..separations(0, 1).params };
-        let mut leader = Separations::new(params, SimTime::ZERO);
-        let mut peers = Peers::new(3, 2.0);
-        let heard = SimTime::from_secs(1.0);
-        peers.hear(heard, DroneId(1), pose(heard, Vec2::new(-60.0, 0.0), Vec2::zeros()));
-        let tick = ((1.0 + silent_s) / FILTER.dt_s).round() as u64;
-        leader.speak(&peers, &path(tick, Vec2::new(700.0, 0.0), Vec2::zeros()), &mut Vec::new());
-        let (line, _) = leader.lines().next().unwrap();
-        line.normal().x * line.stop_m() + FILTER.keep_m() / 2.0
+fn a_drone_makes_no_line_that_a_lost_one_cannot_hear_of() {
+    let middle_m = |x_m: f64| (x_m - 60.0) / 2.0 + FILTER.keep_m() / 2.0;
+    for (range_m, silent_s, x_m) in [(200.0, 1.0, 700.0), (f64::INFINITY, 4.0, 700.0), (200.0, 4.0, 130.0)] {
+        let differ_m = (edge_m(range_m, silent_s, x_m) - middle_m(x_m)).abs();
+        assert!(differ_m < 1e-3, "range {range_m} m, silent for {silent_s} s, at {x_m} m: {differ_m} m");
+    }
+    assert!(edge_m(200.0, 4.0, 700.0) < 0.0, "the first line stays");
+}
+
+#[test]
+fn drones_that_may_lose_each_other_get_a_line_along_the_flight() {
+    let params = SeparationParams { radio_range_m: 200.0, ..separations(0, 1).params };
+    let normal = |x_m, y_m, aside_m| params.normal(Vec2::new(x_m, y_m), aside_m).unwrap();
+    assert_eq!(normal(100.0, 60.0, 40.0), Vec2::y());
+    assert_eq!(normal(-100.0, -60.0, -40.0), -Vec2::y());
+    assert_eq!(normal(60.0, 60.0, 40.0), Vec2::new(1.0, 1.0).normalize(), "they are near");
+    assert_eq!(normal(120.0, 0.0, 40.0), Vec2::x(), "they cannot fly past each other");
+    assert_eq!(normal(80.0, 60.0, -40.0), Vec2::new(0.8, 0.6), "they may change sides");
+    assert_eq!(normal(80.0, 80.0, -40.0), Vec2::y(), "they are far aside");
+}
+
+#[test]
+fn a_drone_far_behind_has_most_of_the_room() {
+    let params = separations(0, 1).params;
+    let stop_m = |ahead_m: f64, speed_mps: f64| {
+        let velocity = Vec2::new(speed_mps, 0.0);
+        let path = path(0, Vec2::new(ahead_m, 0.0), velocity);
+        let own = Stop { at: path.end(), velocity };
+        let other = Other { stop: Stop { at: own.at - Vec2::new(ahead_m, 0.0), velocity }, aside_m: 0.0 };
+        let line = params.line(None, Side::Front, &own, &other, 0.0, &path).unwrap();
+        line.stop_m() - other.stop.at.x
     };
-    let middle_m = 320.0 + FILTER.keep_m() / 2.0;
-    for (range_m, silent_s, wanted_m) in
-        [(200.0, 1.0, middle_m), (f64::INFINITY, 4.0, middle_m), (200.0, 4.0, -60.0 + 0.75 * 200.0)]
+    let keep_m = FILTER.keep_m();
+    for (ahead_m, speed_mps, wanted_m) in
+        [(150.0, 10.0, 150.0 - keep_m), (40.0, 10.0, 20.0), (150.0, 0.0, 75.0), (150.0, -10.0, 75.0)]
     {
-        let edge_m = edge_m(range_m, silent_s);
-        assert!((edge_m - wanted_m).abs() < 1e-3, "range {range_m} m, silent for {silent_s} s: {edge_m} m");
+        assert!((stop_m(ahead_m, speed_mps) - wanted_m).abs() < 1e-3, "{ahead_m} m ahead at {speed_mps} m/s");
     }
 }
