@@ -46,11 +46,9 @@ const BACK_TURN_S: f64 = 20.0;
 /// Two drones that are farther from each other than this share of the distance over which drones hear each other may lose each other soon.
 /// Chosen by hand.
 const FAR: f64 = 0.5;
-/// Two drones that are this far beside each other, in distances to keep, can fly past each other, if they were on the same sides in the formation
-/// at the start. Chosen by hand: the line between them leaves each of them some room.
-const ASIDE: f64 = 1.25;
-/// The same for two drones that may have to change sides. Chosen by hand: drones that follow each other round a corner are less far aside.
-const FAR_ASIDE: f64 = 2.0;
+/// Two drones that are this far beside each other, in distances to keep, can fly past each other. Chosen by hand: drones that follow each other
+/// round a corner are less far aside.
+const ASIDE: f64 = 2.0;
 /// One drone flies ahead of another one if the direction from this to that has at least this component along the flight. No unit. The cosine
 /// of 45°.
 const AHEAD: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -405,8 +403,6 @@ struct Stop {
 #[derive(Clone, Copy, Debug)]
 struct Other {
     stop: Stop,
-    /// How far this drone was to the left of it at the start, m.
-    aside_m: f64,
 }
 
 /// Which of two drones that are still and close has all the room between them. Each of the two says so by its own clock: where their clocks
@@ -474,8 +470,7 @@ impl SeparationParams {
         let late_s = age_s.max(delay_s);
         let stopped = pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2));
         let stop = self.peer_stop(known, stopped, pose.velocity(), age_s);
-        let aside_m = self.start(self.me).y - self.start(known.peer).y;
-        let peer = Other { stop, aside_m };
+        let peer = Other { stop };
         let own = Stop { at: path.end(), velocity: path.velocity() };
         let Some(towards_me) = (own.at - stop.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
@@ -485,8 +480,8 @@ impl SeparationParams {
             }
             return;
         };
-        // The other drone would not hear of a line that binds this one.
-        if lost && (own.at - stopped).norm() > self.radio_range_m {
+        // A drone that is out of reach would not hear of a line that binds this one.
+        if lost && self.radio_range_m.is_finite() {
             return;
         }
         let side = known.pair.side();
@@ -522,14 +517,16 @@ impl SeparationParams {
         Stop { at: at + velocity * flown_s, velocity }
     }
 
+    /// Whether two drones that would stop this far `apart` (m) may lose each other.
+    fn is_far(&self, apart: Vec2) -> bool {
+        apart.norm() > FAR * self.radio_range_m
+    }
+
     /// The normal of a line between this drone and another one, on this drone's side. `apart`: from where that one would stop to where this one
-    /// would, m. Two drones that may lose each other get a line along the flight, if they are far enough beside each other, and were on the same
-    /// sides in the formation at the start (`aside_m`): then each of them can fly on without a word from the other.
-    fn normal(&self, apart: Vec2, aside_m: f64) -> Option<Vec2> {
-        let is_far = apart.norm() > FAR * self.radio_range_m;
-        let stay_aside = aside_m * apart.y.signum() >= self.keep_m / 2.0;
-        let least_m = self.keep_m * if stay_aside { ASIDE } else { FAR_ASIDE };
-        if is_far && apart.y.abs() >= least_m {
+    /// would, m. Two drones that may lose each other get a line along the flight, if they are far enough beside each other: then each of them
+    /// can fly on without a word from the other.
+    fn normal(&self, apart: Vec2) -> Option<Vec2> {
+        if self.is_far(apart) && apart.y.abs() >= ASIDE * self.keep_m {
             return Some(Vec2::new(0.0, apart.y.signum()));
         }
         apart.try_normalize(1e-9)
@@ -549,7 +546,7 @@ impl SeparationParams {
     ) -> Option<SeparatingLine> {
         let (now, peer) = (path.now(), &other.stop);
         let half_m = self.keep_m / 2.0;
-        let wanted = self.normal(own.at - peer.at, other.aside_m)? * side.sign();
+        let wanted = self.normal(own.at - peer.at)? * side.sign();
         let keeps =
             |line: &&SeparatingLine| line.normal().perp(&wanted).abs() < TURN && line.normal().dot(&wanted) > 0.0;
         let resting = match present.filter(keeps) {
@@ -564,7 +561,10 @@ impl SeparationParams {
         let peer_needs_m = peer_m.max(peer_m + peer_mps * late_s) + half_m;
         let close = own_m - peer_m < CLOSE * self.keep_m;
         let still = own.velocity.norm().max(peer.velocity.norm()) < self.scale().speed(STILL_MPS);
-        let leads = n.x > AHEAD && own_mps > 0.0 && (own_mps + peer_mps) / 2.0 > self.scale().speed(ABREAST_MPS);
+        let leads = self.is_far(own.at - peer.at)
+            && n.x > AHEAD
+            && own_mps > 0.0
+            && (own_mps + peer_mps) / 2.0 > self.scale().speed(ABREAST_MPS);
         // The first line is in the middle: the other drone, which hovers, must keep to it.
         let aimed_m = match (close && still && present.is_some(), side == turn_at(now)) {
             // A drone that flies far behind has most of the room: it may hear of the next line late.
