@@ -110,15 +110,21 @@ mod tests {
         LoneFlight::new(2, &PlannerParams { destination, ..crate::test_params::planner() })
     }
 
-    /// The speed of a drone that has passed nothing, m/s.
+    /// The speed of a drone that has passed nothing and ranges the others, m/s.
     fn speed_mps(flight: &mut LoneFlight, now: SimTime, x_m: f64, peers: &Peers, reach_m: Option<f64>) -> f64 {
-        flight.speed_mps(
-            now,
-            Vec2::new(x_m, 0.0),
-            f64::NEG_INFINITY,
-            &Others { peers, reach_m, by_words: false },
-            &GUIDANCE,
-        )
+        let others = Others { peers, reach_m, by_words: false };
+        flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &others, &GUIDANCE)
+    }
+
+    /// The speed 2 s after the start of a drone at `x_m` that hears other ones at these abscissas over `reach_m`, m/s.
+    fn speed_among_mps(places_x_m: &[f64], x_m: f64, reach_m: Option<f64>, by_words: bool) -> f64 {
+        let (mut peers, now) = (Peers::new(3, 1.0), SimTime::from_secs(2.0));
+        for (drone, &x_m) in (0..).zip(places_x_m) {
+            peers.hear(now, DroneId(drone), Pose { stamp: now, position_m: [x_m, 0.0, 0.0], ..Pose::zeroed() });
+        }
+        let others = Others { peers: &peers, reach_m, by_words };
+        let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
+        flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &others, &GUIDANCE)
     }
 
     #[test]
@@ -154,31 +160,15 @@ mod tests {
 
     #[test]
     fn a_drone_stays_in_reach_of_the_nearest_one() {
-        let mut peers = Peers::new(3, 1.0);
-        let now = SimTime::from_secs(2.0);
-        for (drone, x_m) in [(0, 0.0), (1, 100.0)] {
-            peers.hear(now, DroneId(drone), Pose { stamp: now, position_m: [x_m, 0.0, 0.0], ..Pose::zeroed() });
-        }
-        let speed_mps = |x_m: f64, reach_m| {
-            let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
-            speed_mps(&mut flight, now, x_m, &peers, reach_m)
-        };
+        let speed_mps = |x_m, reach_m| speed_among_mps(&[0.0, 100.0], x_m, reach_m, false);
         assert_eq!(speed_mps(130.0, Some(100.0)), 10.0);
         assert_eq!(speed_mps(180.0, Some(100.0)), 0.0);
         assert_eq!(speed_mps(180.0, None), 10.0, "all drones hear each other");
     }
+
     #[test]
     fn by_words_a_drone_stays_in_reach_of_the_nearest_one_behind() {
-        let mut peers = Peers::new(3, 1.0);
-        let now = SimTime::from_secs(2.0);
-        for (drone, x_m) in [(0, 0.0), (1, 190.0)] {
-            peers.hear(now, DroneId(drone), Pose { stamp: now, position_m: [x_m, 0.0, 0.0], ..Pose::zeroed() });
-        }
-        let speed_mps = |x_m, by_words| {
-            let mut flight = flight(Destination::Hold { stop_x_m: f64::INFINITY });
-            let others = Others { peers: &peers, reach_m: Some(100.0), by_words };
-            flight.speed_mps(now, Vec2::new(x_m, 0.0), f64::NEG_INFINITY, &others, &GUIDANCE)
-        };
+        let speed_mps = |x_m, by_words| speed_among_mps(&[0.0, 190.0], x_m, Some(100.0), by_words);
         assert_eq!((speed_mps(180.0, false), speed_mps(180.0, true)), (10.0, 0.0));
         assert_eq!(speed_mps(50.0, true), 10.0);
     }

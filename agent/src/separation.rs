@@ -399,12 +399,6 @@ struct Stop {
     velocity: Vec2,
 }
 
-/// Another drone, as far as this drone knows.
-#[derive(Clone, Copy, Debug)]
-struct Other {
-    stop: Stop,
-}
-
 /// Which of two drones that are still and close has all the room between them. Each of the two says so by its own clock: where their clocks
 /// differ, they differ for that long in each turn about the line to make, and in nothing else.
 fn turn_at(now: SimTime) -> Side {
@@ -470,11 +464,10 @@ impl SeparationParams {
         let late_s = age_s.max(delay_s);
         let stopped = pose.position() + pose.velocity() * (pose.velocity().norm() / (2.0 * self.braking_mps2));
         let stop = self.peer_stop(known, stopped, pose.velocity(), age_s);
-        let peer = Other { stop };
         let own = Stop { at: path.end(), velocity: path.velocity() };
         let Some(towards_me) = (own.at - stop.at).try_normalize(1e-9) else { return };
         let Some(Statement { bound_to: stated, .. }) = known.pair.statement() else {
-            let first = if known.opens { self.line(None, known.pair.side(), &own, &peer, late_s, path) } else { None };
+            let first = if known.opens { self.line(None, known.pair.side(), &own, &stop, late_s, path) } else { None };
             if first.is_some_and(|line| known.pair.open(line)) {
                 known.changed = now;
             }
@@ -493,7 +486,7 @@ impl SeparationParams {
         if !ahead && unchanged_s < patience_s {
             return;
         }
-        let Some(line) = self.line(Some(&stated.line), side, &own, &peer, late_s, path) else { return };
+        let Some(line) = self.line(Some(&stated.line), side, &own, &stop, late_s, path) else { return };
         let turned = line.normal() != stated.line.normal();
         let shifted_m = (line.offset_m(now, late_s) - stated.line.offset_m(now, late_s)).abs();
         let most = if unchanged_s < LAST_PATIENCE * patience_s { MAX_LINES } else { usize::MAX };
@@ -540,11 +533,11 @@ impl SeparationParams {
         present: Option<&SeparatingLine>,
         side: Side,
         own: &Stop,
-        other: &Other,
+        peer: &Stop,
         late_s: f64,
         path: &OwnPath,
     ) -> Option<SeparatingLine> {
-        let (now, peer) = (path.now(), &other.stop);
+        let now = path.now();
         let half_m = self.keep_m / 2.0;
         let wanted = self.normal(own.at - peer.at)? * side.sign();
         let keeps =

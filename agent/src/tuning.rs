@@ -51,7 +51,7 @@ pub(crate) const UNHEARD_S: f64 = 5.0;
 pub(crate) const LEAD_S: f64 = 60.0;
 
 /// A drone without a task stays within this share of the distance over which drones hear each other from the nearest other one. So does a
-/// drone that leads a lost one, and one that gives another one room by words. Chosen by hand.
+/// drone that leads a lost one. Chosen by hand.
 pub(crate) const IN_REACH: f64 = 0.75;
 
 /// A drone looks for a lost one after it has stayed in one place for this long, s; a headway per drone is added. Chosen by hand: longer

@@ -5,7 +5,7 @@
 //! | 0 | the mission reached its goal and every invariant held |
 //! | 1 | the goal was not reached: the mission's time ran out, or some drone has no way there |
 //! | 2 | bad usage or a bad scenario; nothing was started |
-//! | 3 | the environment failed: shared memory, limits, a process that could not be started, a killed world |
+//! | 3 | the environment failed: shared memory, limits, a process that could not be started, a killed world, a pilot that ended an inline run |
 //! | 4 | an invariant was broken |
 //! | 129, 130, 143 | interrupted by SIGHUP, SIGINT or SIGTERM, after a clean shutdown |
 //!

@@ -43,8 +43,8 @@ mod tests {
         let name = |words: &[&str]| {
             program_name(&Program::of_command(&words.iter().map(|&w| w.to_owned()).collect::<Vec<_>>()))
         };
-        assert_eq!(name(&["/work/target/release/swirl"]), "swirl");
-        assert_eq!(name(&["/usr/bin/python3", "/home/me/my boids.py"]), "python3 '/home/me/my boids.py'");
+        assert_eq!(name(&["/opt/swirl/bin/swirl"]), "swirl");
+        assert_eq!(name(&["/usr/bin/python3", "pilots/my boids.py"]), "python3 'pilots/my boids.py'");
         assert_eq!(name(&[]), "skein");
     }
 }

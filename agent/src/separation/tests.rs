@@ -287,9 +287,9 @@ fn a_drone_far_behind_has_most_of_the_room() {
         let velocity = Vec2::new(speed_mps, 0.0);
         let path = path(0, Vec2::new(ahead_m, 0.0), velocity);
         let own = Stop { at: path.end(), velocity };
-        let other = Other { stop: Stop { at: own.at - Vec2::new(ahead_m, 0.0), velocity } };
+        let other = Stop { at: own.at - Vec2::new(ahead_m, 0.0), velocity };
         let line = params.line(None, Side::Front, &own, &other, 0.0, &path).unwrap();
-        line.stop_m() - other.stop.at.x
+        line.stop_m() - other.at.x
     };
     let keep_m = FILTER.keep_m();
     for (ahead_m, speed_mps, wanted_m) in
