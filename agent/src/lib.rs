@@ -1,6 +1,6 @@
 //! The paper's pilot of a drone: senses and messages in, a command and messages out.
 //!
-//! [`SwarmPilot`] is the paper's [`skein_pilot::Pilot`]. It is composed of machines that can be used on their own:
+//! [`SwarmPilot`] is the paper's [`skein_pilot::Pilot`]. It flies along +x; a [`CoursePilot`] flies it in any of the four directions. It is composed of machines that can be used on their own:
 //!
 //! - [`detection`] computes stopping distances and the danger zone (paper, equations 1 to 4);
 //! - [`route_follower`] follows the routes past obstacles, and [`emergency_route`] finds one that no leader has planned;
@@ -22,6 +22,7 @@ pub mod braking_filter;
 mod braking_motion;
 pub mod braking_path;
 pub mod command_delay;
+mod course_pilot;
 pub mod detection;
 mod detour;
 mod distant_peers;
@@ -54,5 +55,6 @@ mod test_params;
 mod tuning;
 pub mod visibility;
 
+pub use course_pilot::CoursePilot;
 pub use params::PilotParams;
 pub use swarm_pilot::SwarmPilot;

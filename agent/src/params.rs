@@ -20,7 +20,7 @@ use skein_protocol::{DroneId, SimTime, Vec2};
 use std::iter;
 use std::sync::Arc;
 
-/// Parameters of a [`crate::SwarmPilot`].
+/// Parameters of a [`crate::SwarmPilot`]. Places are in the frame of the mission's course.
 #[derive(Clone, Debug)]
 pub struct PilotParams {
     /// The drone that it flies.
@@ -51,7 +51,7 @@ pub struct PilotParams {
     pub apart_by_words: bool,
     /// Bounds on the errors of what it senses.
     pub sensing: SensingErrors,
-    /// Where each drone starts, world frame, m. A drone whose distances are kept by messages keeps its first distances by it.
+    /// Where each drone starts, m. A drone whose distances are kept by messages keeps its first distances by it.
     pub starts_m: Arc<[Vec2]>,
     /// Stopping distances.
     pub braking: Braking,

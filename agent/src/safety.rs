@@ -285,6 +285,15 @@ impl SafetyParams {
         self.scale.length(OBSTACLE_MARGIN_M).min((narrowest_m / 2.0 - self.clearance_m).max(0.0))
     }
 
+    /// A lower bound on the distance of a neighbour beyond the distance to keep, m, that does not depend on how old its beacon is.
+    fn beyond_unsensed_m(&self, neighbour: &Neighbour) -> f64 {
+        let keep_m = self.keep_m(self.reaction_time_s);
+        // Where drones range each other less far than they keep apart, one that is not ranged needs no more room than one that is.
+        let is_short = 0.0 < neighbour.least_m && neighbour.least_m < keep_m;
+        let least_m = if is_short { neighbour.position_m.norm().max(neighbour.least_m) } else { neighbour.least_m };
+        least_m - keep_m
+    }
+
     fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
         let distance = neighbour.position_m.norm().max(1e-6);
         let normal = -neighbour.position_m / distance;
@@ -292,7 +301,7 @@ impl SafetyParams {
         // The state is old and the reaction is late. Meanwhile the neighbour may have turned.
         let late_s = neighbour.age_s + if neighbour.sensed { self.reaction_time_s } else { 0.0 };
         let alpha = self.braking_mps2;
-        let unsensed_m = neighbour.least_m - self.keep_m(self.reaction_time_s);
+        let unsensed_m = self.beyond_unsensed_m(neighbour);
         let beyond_m = (distance - self.keep_m(late_s)).max(unsensed_m);
         let (root, slope) = self.root(alpha, beyond_m);
         let speed = normal.dot(&velocity);

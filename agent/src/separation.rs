@@ -43,15 +43,15 @@ const FRONT_TURN_S: f64 = 60.0;
 /// Then the one with the higher id, for this long, s.
 const BACK_TURN_S: f64 = 20.0;
 
-/// Two drones that are farther from each other than this share of the distance over which drones hear each other may lose each other soon.
-/// Chosen by hand.
-const FAR: f64 = 0.5;
 /// Two drones that are this far beside each other, in distances to keep, can fly past each other. Chosen by hand: drones that follow each other
 /// round a corner are less far aside.
 const ASIDE: f64 = 2.0;
 /// One drone flies ahead of another one if the direction from this to that has at least this component along the flight. No unit. The cosine
 /// of 45°.
 const AHEAD: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// It flies beside the other one if that component is at most this. No unit. The cosine of 30°. Chosen by hand: a line along the flight leaves
+/// little room to the side between drones of which one is almost straight ahead.
+const BESIDE: f64 = 0.866;
 /// A drone of which the last word is older than this is lost, s. Chosen by hand: longer than words take over several other drones.
 const OLD_S: f64 = 5.0;
 
@@ -510,19 +510,18 @@ impl SeparationParams {
         Stop { at: at + velocity * flown_s, velocity }
     }
 
-    /// Whether two drones that would stop this far `apart` (m) may lose each other.
+    /// Whether two drones that would stop this far `apart` (m) hear of each other over other drones only, or not at all.
     fn is_far(&self, apart: Vec2) -> bool {
-        apart.norm() > FAR * self.radio_range_m
+        apart.norm() > self.radio_range_m
     }
 
     /// The normal of a line between this drone and another one, on this drone's side. `apart`: from where that one would stop to where this one
-    /// would, m. Two drones that may lose each other get a line along the flight, if they are far enough beside each other: then each of them
-    /// can fly on without a word from the other.
+    /// would, m. Two drones that do not hear each other get a line along the flight, if they fly beside each other and far enough from each
+    /// other: then each of them can fly on without a word from the other.
     fn normal(&self, apart: Vec2) -> Option<Vec2> {
-        if self.is_far(apart) && apart.y.abs() >= ASIDE * self.keep_m {
-            return Some(Vec2::new(0.0, apart.y.signum()));
-        }
-        apart.try_normalize(1e-9)
+        let direction = apart.try_normalize(1e-9)?;
+        let beside = direction.x.abs() <= BESIDE && apart.y.abs() >= ASIDE * self.keep_m;
+        Some(if beside && self.is_far(apart) { Vec2::new(0.0, apart.y.signum()) } else { direction })
     }
 
     /// The best line between this drone and another one, to which this drone's path keeps; `None` if there is none. When the

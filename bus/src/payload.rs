@@ -8,7 +8,7 @@ use std::fmt;
 
 // The names below carry the version of the protocol's payloads: raise both together. Downlinks and records have changed
 // once more than frames.
-const _: () = assert!(skein_protocol::payload::VERSION == 6);
+const _: () = assert!(skein_protocol::payload::VERSION == 7);
 
 /// Eight bytes of a byte stream. The type tells the streams apart.
 ///
@@ -29,14 +29,14 @@ pub struct RecordWord(u64);
 // SAFETY: a `repr(transparent)` integer: it has no pointers, and the same layout in every process.
 unsafe impl ZeroCopySend for DownWord {
     unsafe fn type_name() -> &'static str {
-        "skein.downlink.v7"
+        "skein.downlink.v8"
     }
 }
 
 // SAFETY: a `repr(transparent)` integer: it has no pointers, and the same layout in every process.
 unsafe impl ZeroCopySend for RecordWord {
     unsafe fn type_name() -> &'static str {
-        "skein.record.v8"
+        "skein.record.v9"
     }
 }
 
@@ -53,7 +53,7 @@ pub struct WireFrame(pub(crate) Frame);
 // SAFETY: transparent over `Frame`, which is plain `repr(C)` data without padding or pointers.
 unsafe impl ZeroCopySend for WireFrame {
     unsafe fn type_name() -> &'static str {
-        "skein.frame.v6"
+        "skein.frame.v7"
     }
 }
 

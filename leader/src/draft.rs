@@ -27,6 +27,6 @@ pub(crate) fn draft(s: &Situation<'_>, phase: Phase, set: &[ObstacleId], anchor:
         routes: 0,
         set_count,
         set,
-        reserved: 0,
+        course: 0,
     }
 }

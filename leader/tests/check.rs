@@ -24,7 +24,7 @@ fn the_properties_hold_without_faults() {
 
 #[test]
 fn the_properties_hold_if_a_message_is_lost_late_or_doubled() {
-    explore(3, 2, 16, Faults { messages: 1, ..Faults::default() }, 2627);
+    explore(3, 2, 16, Faults { messages: 1, ..Faults::default() }, 2591);
 }
 
 #[test]

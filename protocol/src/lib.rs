@@ -16,7 +16,7 @@
 //!
 //! This crate is pure: it has no clock, thread, socket, file, or randomness of the operating system. It does not know how
 //! frames move between processes, how a leader is elected, or how a drone flies. Units are SI, angles are in radians, and
-//! the world frame is ENU with x along the flight direction and y to its left.
+//! the world frame is ENU. [`Course`] is the direction in which a mission flies.
 //!
 //! ```
 //! use skein_protocol::message::DecodeError;
@@ -42,6 +42,7 @@
 //! assert_eq!(delivery, Delivery::Deliver { due: SimTime::ZERO, again: None });
 //! ```
 
+mod course;
 mod decode_error;
 pub mod digest;
 pub mod downlink;
@@ -69,10 +70,12 @@ pub mod thin_plate;
 pub mod time;
 mod topic;
 mod topic_name;
+mod turned;
 mod unfinished;
 mod user_message;
 pub mod wire;
 
+pub use course::Course;
 pub use ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 pub use message::{Message, MessageRef};
 pub use metric_name::{MetricName, MetricNameError};

@@ -241,6 +241,7 @@ impl<'a> MessageRef<'a> {
                     finite(&[p.predicted_s], "prediction")?;
                 }
                 known(Phase::from_wire(p.phase))?;
+                below(p.course, 4, "course")?;
                 below(p.set_count, set_limit, "obstacle count")
             }
             Self::Assignment(a) => {

@@ -4,6 +4,7 @@
 //! check every field. Kinds and phases are integers in payloads and enums in all other code: see [`crate::wire`].
 
 use crate::Vec2;
+use crate::course::Course;
 use crate::ids::{Ballot, DroneId, GroupId, ObstacleId, PlanStamp};
 use crate::shape::ConvexShape;
 use crate::space::horizontal;
@@ -13,7 +14,7 @@ use bytemuck::{Pod, Zeroable};
 use std::fmt;
 
 /// Version of all layouts in this module. A receiver rejects a frame of another version.
-pub const VERSION: u16 = 6;
+pub const VERSION: u16 = 7;
 
 /// Maximum number of obstacles in one set.
 pub const MAX_SET: usize = 32;
@@ -266,7 +267,7 @@ pub struct Plan {
     pub anchor_m: [f64; 2],
     /// Velocity of the front slot, world frame, m/s.
     pub anchor_mps: [f64; 2],
-    /// x coordinate at which the anchor stops, world frame, m; infinity if it never stops.
+    /// How far along the course the anchor stops, m; infinity if it never stops. With [`Course::East`] this is an x coordinate.
     pub anchor_stop_x_m: f64,
     /// Predicted time from `stamp` until the last drone passes the gate, s; NaN unless the phase is [`Phase::Avoid`].
     pub predicted_s: f64,
@@ -279,8 +280,8 @@ pub struct Plan {
     /// In ascending order: the obstacles of the set while avoiding; the obstacles that all drones of the plan have passed, of more than
     /// [`MAX_SET`] those that end farthest on, while re-forming; none while cruising.
     pub set: [ObstacleId; MAX_SET],
-    /// Always 0.
-    pub reserved: u32,
+    /// The course of the mission, see [`Plan::course`].
+    pub course: u32,
 }
 
 impl Plan {
@@ -291,23 +292,32 @@ impl Plan {
         Phase::from_wire(self.phase).unwrap_or_default()
     }
 
+    /// The course of the mission: [`Course::quarters`] on the wire. Decoding rejects unknown numbers.
+    #[must_use]
+    pub fn course(&self) -> Course {
+        Course::from_quarters(self.course)
+    }
+
     /// Position (world frame, m) and velocity (world frame, m/s) of the anchor at `now`. The anchor moves from the time
     /// of its stamp until it reaches [`Plan::anchor_stop_x_m`].
     #[must_use]
     pub fn anchor_at(&self, now: SimTime) -> (Vec2, Vec2) {
-        let (start, velocity) = (Vec2::from(self.anchor_m), Vec2::from(self.anchor_mps));
+        let course = self.course();
+        let (start, velocity) = (course.from_world(self.anchor_m.into()), course.from_world(self.anchor_mps.into()));
         let here = start + velocity * now.since(self.stamp);
         if velocity.x > 0.0 && here.x >= self.anchor_stop_x_m {
             let moved_s = ((self.anchor_stop_x_m - start.x) / velocity.x).max(0.0);
-            return (Vec2::new(self.anchor_stop_x_m.max(start.x), start.y + velocity.y * moved_s), Vec2::zeros());
+            let stop = Vec2::new(self.anchor_stop_x_m.max(start.x), start.y + velocity.y * moved_s);
+            return (course.to_world(stop), Vec2::zeros());
         }
-        (here, velocity)
+        (course.to_world(here), course.to_world(velocity))
     }
 
     /// When the anchor has come to its stop; `None` if it never does.
     #[must_use]
     pub fn anchor_stops(&self) -> Option<SimTime> {
-        let (way_m, speed_mps) = (self.anchor_stop_x_m - self.anchor_m[0], self.anchor_mps[0]);
+        let along = |v: [f64; 2]| self.course().along(v.into());
+        let (way_m, speed_mps) = (self.anchor_stop_x_m - along(self.anchor_m), along(self.anchor_mps));
         if speed_mps <= 0.0 || way_m <= 0.0 {
             return (self.anchor_mps == [0.0; 2] || speed_mps > 0.0).then_some(self.stamp);
         }
@@ -331,7 +341,7 @@ impl fmt::Debug for Plan {
             .field("routes", &self.routes)
             .field("set_count", &self.set_count)
             .field("set", &self.set)
-            .field("reserved", &self.reserved)
+            .field("course", &self.course())
             .finish()
     }
 }
@@ -523,9 +533,9 @@ impl Passed {
 pub struct Separator {
     /// The time from which the line brakes. Before it, the line moves at `speed_mps`.
     pub stamp: SimTime,
-    /// Where the line stops: the component of its points along the normal, world frame, m.
+    /// Where the line stops: the component of its points along the normal, m from the origin of the world frame.
     pub stop_m: f64,
-    /// Direction of the normal in the world frame, rad. The normal points to the side of the drone with the lower id.
+    /// Direction of the normal, rad, counter-clockwise from the course of the mission ([`Course`]; from +x with [`Course::East`]). The normal points to the side of the drone with the lower id.
     pub angle_rad: f32,
     /// Speed of the line along the normal, m/s. It is positive if the line moves to the side of the drone with the lower id.
     pub speed_mps: f32,

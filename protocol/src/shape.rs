@@ -1,7 +1,7 @@
 //! The shape of every obstacle: an upright prism over a convex polygon with a rounding radius. A circle is one vertex with a
 //! radius. A rectangle is four vertices with radius 0. The prism reaches from its floor to its top; by default it has neither.
 
-use crate::Vec2;
+use crate::{Course, Vec2};
 use bytemuck::{Pod, Zeroable};
 use thiserror::Error;
 
@@ -95,6 +95,21 @@ impl ConvexShape {
             *vertex = [vertex[0] + by_m.x, vertex[1] + by_m.y];
         }
         self
+    }
+
+    /// The same shape of the course's frame, in the world frame.
+    #[must_use]
+    pub fn to_world(mut self, course: Course) -> Self {
+        for vertex in self.vertices_m.iter_mut().take(self.count as usize) {
+            *vertex = course.to_world((*vertex).into()).into();
+        }
+        self
+    }
+
+    /// Where the shape begins and ends along a course, m.
+    #[must_use]
+    pub fn extent(&self, course: Course) -> (f64, f64) {
+        course.extent(self.bounds())
     }
 
     /// Whether a drone at this altitude could come closer to the shape than `margin_m` by flying on at its altitude.

@@ -4,9 +4,9 @@ use crate::pilot_entry::PilotEntry;
 use crate::scene_facts::SceneFacts;
 use crate::topic_schema::TopicSchema;
 use serde::{Deserialize, Serialize};
-use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Course, Vec2};
 
 /// A run as it was ordered. SI units, world frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,7 +31,10 @@ pub struct RunFacts {
     pub spacing_m: f64,
     /// Where the mission ends.
     pub end: MissionEnd,
-    /// Ordinate of the line along which the formation's front slot flies, m.
+    /// The direction in which the mission flies. The formation faces it.
+    #[serde(default)]
+    pub course: Course,
+    /// Distance of the line along which the formation's front slot flies from the origin, to the left of the course, m.
     pub course_y_m: f64,
     /// Least distance that two bodies must keep, m.
     pub safe_distance_m: f64,
@@ -79,30 +82,30 @@ pub enum MissionEnd {
 pub(crate) struct ObstacleSet {
     /// The ids of its obstacles, ascending.
     pub obstacles: Vec<u32>,
-    /// Mean abscissa of the obstacles' centres, m. A drone beyond it has passed the set.
+    /// Mean of the obstacles' centres along the course, m. A drone beyond it has passed the set.
     pub gate_x_m: f64,
 }
 
 impl RunFacts {
     /// The obstacle sets in flight order: obstacles clustered by their extents in flight direction.
     pub(crate) fn sets(&self) -> Vec<ObstacleSet> {
-        let bounds: Vec<(Vec2, Vec2)> = self.obstacles.iter().map(ConvexShape::bounds).collect();
-        let mut order: Vec<usize> = (0..bounds.len()).collect();
-        order.sort_by(|&a, &b| bounds[a].0.x.total_cmp(&bounds[b].0.x));
+        let extents: Vec<(f64, f64)> = self.obstacles.iter().map(|shape| shape.extent(self.course)).collect();
+        let mut order: Vec<usize> = (0..extents.len()).collect();
+        order.sort_by(|&a, &b| extents[a].0.total_cmp(&extents[b].0));
         let mut sets: Vec<Vec<usize>> = Vec::new();
         let mut reach = f64::NEG_INFINITY;
         for obstacle in order {
-            let (low, high) = bounds[obstacle];
+            let (front, rear) = extents[obstacle];
             match sets.last_mut() {
-                Some(set) if low.x - reach < 2.0 * self.planning_distance_m => set.push(obstacle),
+                Some(set) if front - reach < 2.0 * self.planning_distance_m => set.push(obstacle),
                 _ => sets.push(vec![obstacle]),
             }
-            reach = reach.max(high.x);
+            reach = reach.max(rear);
         }
         sets.into_iter().map(|set| self.set_of(set)).collect()
     }
 
-    /// Abscissa of the last obstacle set's gate, m; `None` without obstacles.
+    /// How far along the course the last obstacle set's gate is, m; `None` without obstacles.
     #[must_use]
     pub fn last_gate_x_m(&self) -> Option<f64> {
         self.sets().last().map(|set| set.gate_x_m)
@@ -110,7 +113,7 @@ impl RunFacts {
 
     fn set_of(&self, mut set: Vec<usize>) -> ObstacleSet {
         set.sort_unstable();
-        let sum: f64 = set.iter().map(|&o| self.obstacles[o].centre().x).sum();
+        let sum: f64 = set.iter().map(|&o| self.course.along(self.obstacles[o].centre())).sum();
         ObstacleSet { gate_x_m: sum / set.len() as f64, obstacles: set.into_iter().map(|o| o as u32).collect() }
     }
 }

@@ -42,11 +42,18 @@ pub(crate) fn slots(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Option<Vec
     (count > 0 && slots.len() == count).then(|| centred(slots))
 }
 
-/// The slots of `count` drones relative to the front slot, m. At the goal, slots beside which drones hang dead at the places `dead`, m, stay
+/// The slots of `count` drones relative to the front slot, axes of the world frame, m. At the goal, slots beside which drones hang dead at the places `dead`, m, stay
 /// free.
 pub(crate) fn around_dead(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Vec<Vec2> {
-    let MissionEnd::Goal { front_m } = facts.end else { return facts.shape.slots(count, facts.spacing_m) };
-    facts.shape.free_slots(count, facts.spacing_m, front_m.into(), dead, facts.safe_distance_m)
+    let course = facts.course;
+    let slots = if let MissionEnd::Goal { front_m } = facts.end {
+        let dead: Vec<Vec2> = dead.iter().map(|&place| course.from_world(place)).collect();
+        let front_m = course.from_world(front_m.into());
+        facts.shape.free_slots(count, facts.spacing_m, front_m, &dead, facts.safe_distance_m)
+    } else {
+        facts.shape.slots(count, facts.spacing_m)
+    };
+    slots.into_iter().map(|slot| course.to_world(slot)).collect()
 }
 
 /// The points relative to their mean.

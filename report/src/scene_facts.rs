@@ -32,7 +32,7 @@ impl SceneFacts {
 pub struct SetOutline {
     /// The ids of its obstacles.
     pub obstacles: Vec<u32>,
-    /// Abscissa of its gate, m.
+    /// How far along the course its gate is, m.
     pub gate_x_m: f64,
     /// Outlines of the inflated obstacles, m. Obstacles without a passable gap between them have one outline.
     pub hulls_m: Vec<Vec<[f64; 2]>>,

@@ -6,7 +6,7 @@ use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{GroupId, Message, Phase, PlanStamp};
+use skein_protocol::{Course, GroupId, Message, Phase, PlanStamp, horizontal};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -15,6 +15,7 @@ const ROUNDING_S: f64 = 1e-3;
 
 /// Follows all stages of a mission. A stage is an obstacle set that the swarm passes.
 pub(crate) struct Stages {
+    course: Course,
     stages: Vec<Progress>,
     plans: BTreeMap<PlanStamp, AvoidPlan>,
     /// By plan: the longest free flight to the gate that an assignment names, s.
@@ -66,7 +67,7 @@ impl Stages {
             beyond: vec![false; drones],
         };
         let stages = facts.sets().into_iter().map(stage).collect();
-        Self { stages, plans: BTreeMap::new(), free_flights_s: BTreeMap::new() }
+        Self { course: facts.course, stages, plans: BTreeMap::new(), free_flights_s: BTreeMap::new() }
     }
 
     /// Notes that a living drone senses the set for the first time. Returns whether it is the first set that any drone
@@ -125,7 +126,7 @@ impl Stages {
                     let leader = leader(rows, row).or(before);
                     stage.flown[drone] = Some(Flown { stamp, group, route, leader });
                 }
-                stage.beyond[drone] = row.position_m[0] >= stage.set.gate_x_m;
+                stage.beyond[drone] = self.course.along(horizontal(row.position_m)) >= stage.set.gate_x_m;
             }
         }
     }

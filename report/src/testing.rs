@@ -17,6 +17,7 @@ pub(crate) fn facts(drones: u32) -> RunFacts {
         shape: Shape::NestedV,
         spacing_m: 35.0,
         end: MissionEnd::Hold,
+        course: skein_protocol::Course::East,
         course_y_m: 0.0,
         safe_distance_m: 25.0,
         clearance_m: 15.0,

@@ -30,6 +30,7 @@ fn facts() -> RunFacts {
         shape: Shape::Line,
         spacing_m: 30.0,
         end: MissionEnd::Hold,
+        course: skein_protocol::Course::East,
         course_y_m: 0.0,
         safe_distance_m: 25.0,
         clearance_m: 15.0,

@@ -32,6 +32,7 @@ fn facts() -> RunFacts {
         shape: Shape::Line,
         spacing_m: 30.0,
         end: MissionEnd::Hold,
+        course: skein_protocol::Course::East,
         course_y_m: 0.0,
         safe_distance_m: 25.0,
         clearance_m: 4.0,
@@ -93,7 +94,7 @@ fn frames(tick: u64) -> Vec<AirFrame> {
         routes: 2,
         set_count: 1,
         set,
-        reserved: 0,
+        course: 0,
     };
     let part = |drone: u32| Assignment {
         id: STAMP,

@@ -193,7 +193,7 @@ fn nearest_pair_m(points: &[Vec2]) -> Option<f64> {
 fn start_too_fast(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<String> {
     let (stop_m, clearance_m) = (scenario.stopping_distance_m(), scenario.avoidance.clearance_m);
     scenario.starts().into_iter().enumerate().find_map(|(drone, start)| {
-        let end = start + Vec2::new(stop_m, 0.0);
+        let end = start + scenario.course().direction() * stop_m;
         let distance_m = |(id, shape): &(u32, ConvexShape)| (*id, skein_agent::braking_filter::distance_m(shape, start, end));
         let (obstacle, nearest_m) =
             shapes.iter().map(distance_m).min_by(|a, b| a.1.total_cmp(&b.1))?;

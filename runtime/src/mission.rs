@@ -20,6 +20,7 @@ use skein_scenario::{
     Strategy as StrategyKey, Thrust,
 };
 use skein_world::{ClockErrors, EnergyModel, PositionError, RangingErrors, SensorErrors, World, WorldParams};
+use std::sync::Arc;
 
 /// Number of drones in a scenario.
 #[must_use]
@@ -34,7 +35,7 @@ pub fn dt_ns(scenario: &Scenario) -> i64 {
 }
 
 /// The world at the start of the mission: every drone is at its start, at the formation's altitude, and flies at nominal
-/// speed along x.
+/// speed along its course.
 ///
 /// # Errors
 /// [`RuntimeError::Scenario`] and [`RuntimeError::Shape`]. A checked scenario gives no error.
@@ -46,7 +47,7 @@ pub fn world(scenario: &Scenario) -> Result<World, RuntimeError> {
 /// Position (m) and velocity (m/s) of each drone at the start of the mission, world frame.
 #[must_use]
 pub fn starts(scenario: &Scenario) -> Vec<(Vec3, Vec3)> {
-    let velocity = Vec3::new(scenario.drone.speed_mps, 0.0, 0.0);
+    let velocity = (scenario.course().direction() * scenario.drone.speed_mps).push(0.0);
     let start = |place: Vec2| (place.push(scenario.altitude_m()), velocity);
     scenario.starts().into_iter().map(start).collect()
 }
@@ -81,6 +82,7 @@ pub fn world_params(scenario: &Scenario) -> Result<WorldParams, RuntimeError> {
         parts: parts(scenario),
         arrival_error_m: scenario.mission.arrival_error_m,
         hold_speed_mps: scale(scenario).speed(HOLD_SPEED_MPS),
+        course: scenario.course(),
         shape: scenario.formation_shape(),
         spacing_m: scenario.formation.spacing_m,
         energy: EnergyModel {
@@ -130,7 +132,7 @@ fn end(scenario: &Scenario) -> skein_world::End {
         (End::Time, _) => skein_world::End::Time { duration_s: scenario.mission.duration_s.unwrap_or_default() },
         (End::Pilots, _) => skein_world::End::Pilots,
         (_, Destination::Hold { stop_x_m }) => skein_world::End::Hold { stop_x_m },
-        (_, Destination::Goal { front_m }) => skein_world::End::Goal { front_m },
+        (_, Destination::Goal { front_m }) => skein_world::End::Goal { front_m: scenario.course().to_world(front_m) },
     }
 }
 
@@ -155,16 +157,16 @@ fn without_way(scenario: &Scenario) -> Result<Vec<DroneId>, RuntimeError> {
     Ok(drones.into_iter().map(DroneId).collect())
 }
 
-/// Where the mission ends, as the pilots know it.
+/// Where the mission ends, in the frame of its course.
 #[must_use]
 pub fn destination(scenario: &Scenario) -> Destination {
     match (scenario.mission.end, scenario.mission.goal_m) {
-        (End::Goal, Some(goal)) => Destination::Goal { front_m: goal.into() },
+        (End::Goal, Some(goal)) => Destination::Goal { front_m: scenario.course().from_world(goal.into()) },
         _ => Destination::Hold { stop_x_m: scenario.mission.stop_x_m },
     }
 }
 
-/// The parameters of one pilot. `incarnation` counts the processes of the drone, from 1; `start` is the time of its first tick.
+/// The parameters of one pilot, in the frame of the mission's course. `incarnation` counts the processes of the drone, from 1; `start` is the time of its first tick.
 #[must_use]
 pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: SimTime) -> PilotParams {
     let (drone, protocol) = (&scenario.drone, &scenario.protocol);
@@ -203,7 +205,7 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
             clock_s: scenario.clock_error_max_s(),
             partial_outlines: scenario.sensors.outline == OutlineSensing::Seen,
         },
-        starts_m: if scenario.apart_by_words() { scenario.starts().into() } else { [].into() },
+        starts_m: if scenario.apart_by_words() { starts_on_course(scenario) } else { [].into() },
         braking: Braking { deceleration_mps2: scenario.braking_mps2(), reaction_time_s: drone.reaction_time_s },
         planner: planner(scenario),
         election: ElectionParams {
@@ -227,6 +229,11 @@ pub fn pilot_params(scenario: &Scenario, me: DroneId, incarnation: u32, start: S
     };
     params.planner.speed_on_sight_mps = params.speed_on_sight_mps(reaction_ticks(scenario));
     params
+}
+
+/// The start position of each drone in the frame of the mission's course, m.
+fn starts_on_course(scenario: &Scenario) -> Arc<[Vec2]> {
+    scenario.starts().into_iter().map(|start| scenario.course().from_world(start)).collect()
 }
 
 /// Delay from a command to its effect, in ticks.
@@ -269,7 +276,7 @@ fn planner(scenario: &Scenario) -> PlannerParams {
         },
         arrival_error_m: scenario.mission.arrival_error_m,
         safe_distance_m: drone.safe_distance_m,
-        course_y_m: scenario.formation.start_m[1],
+        course_y_m: scenario.course().from_world(scenario.formation.start_m.into()).y,
         destination: destination(scenario),
         between: match scenario.mission.between {
             BetweenKey::CloseUp => Between::CloseUp,

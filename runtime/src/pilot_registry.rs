@@ -12,7 +12,7 @@ use crate::reported_panic::catch;
 use crate::run_facts::pilot_groups;
 use crate::talker::TalkerPilot;
 use serde_json::Value;
-use skein_agent::SwarmPilot;
+use skein_agent::CoursePilot;
 use skein_bus::ForkGuard;
 use skein_pilot::{Birth, Params, Pilot, PilotError};
 use skein_protocol::{DroneId, SimTime};
@@ -224,9 +224,9 @@ impl PilotRegistry {
     }
 }
 
-fn swarm_pilot(scenario: &Scenario, birth: &Birth) -> SwarmPilot {
+fn swarm_pilot(scenario: &Scenario, birth: &Birth) -> CoursePilot {
     let (id, start) = (DroneId(birth.drone), SimTime::from_secs(birth.start_s));
-    SwarmPilot::new(mission::pilot_params(scenario, id, birth.incarnation, start))
+    CoursePilot::new(scenario.course(), mission::pilot_params(scenario, id, birth.incarnation, start))
 }
 
 fn without_params(birth: &Birth) -> Result<(), PilotError> {

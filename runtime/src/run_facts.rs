@@ -18,7 +18,8 @@ pub struct SetPlan {
     pub routes: Routes,
 }
 
-/// The sets of the obstacles that are in the way at the formation's altitude, in flight order.
+/// The sets of the obstacles that are in the way at the formation's altitude, in flight order, with their routes in the frame of the
+/// mission's course.
 ///
 /// # Errors
 /// [`ShapeError`] if an obstacle of the scenario is not a convex shape; never for a scenario that was checked.
@@ -28,7 +29,7 @@ pub fn obstacle_sets(scenario: &Scenario) -> Result<Vec<SetPlan>, ShapeError> {
     let reach_m = 2.0 * planner.routes.planning_distance_m;
     let mut obstacles = Obstacles::new(scenario.formation.drones, reach_m);
     for (id, shape) in shapes {
-        obstacles.learn(SimTime::ZERO, ObstacleId(id), shape, DroneId(0));
+        obstacles.learn(SimTime::ZERO, ObstacleId(id), shape.to_world(scenario.course().inverse()), DroneId(0));
     }
     let plan = |ids: Vec<ObstacleId>| {
         let routes = Routes::new(&obstacles.shapes(&ids).unwrap_or_default(), &planner.routes);
@@ -59,7 +60,8 @@ pub fn run_facts(scenario: &Scenario, runtime: &str, clock: &str) -> Result<RunF
             (End::Time, _) => MissionEnd::Time,
             (End::Pilots, _) => MissionEnd::Pilots,
         },
-        course_y_m: scenario.formation.start_m[1],
+        course: scenario.course(),
+        course_y_m: scenario.course().from_world(scenario.formation.start_m.into()).y,
         safe_distance_m: scenario.drone.safe_distance_m,
         clearance_m: scenario.avoidance.clearance_m,
         planning_distance_m: scenario.avoidance.planning_distance_m,
@@ -92,11 +94,14 @@ pub(crate) fn pilot_groups(scenario: &Scenario) -> Vec<(Option<&PilotKeys>, Pilo
 /// What the recording and the page draw beside the drones.
 fn scene(scenario: &Scenario) -> Result<SceneFacts, ShapeError> {
     let pilot = mission::pilot_params(scenario, DroneId(0), 1, SimTime::ZERO);
+    let to_world = |line: Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+        line.into_iter().map(|point| scenario.course().to_world(point.into()).into()).collect()
+    };
     let sets = obstacle_sets(scenario)?.into_iter().map(|set| SetOutline {
         obstacles: set.obstacles.iter().map(|id| id.0).collect(),
         gate_x_m: set.routes.gate_x_m(),
-        hulls_m: hulls(&set.routes),
-        routes_m: (0..set.routes.count()).map(|route| centre_line(set.routes.route(route))).collect(),
+        hulls_m: hulls(&set.routes).into_iter().map(to_world).collect(),
+        routes_m: (0..set.routes.count()).map(|route| to_world(centre_line(set.routes.route(route)))).collect(),
     });
     Ok(SceneFacts {
         altitude_m: scenario.altitude_m(),

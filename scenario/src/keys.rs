@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Map;
 
 /// A mission: the drones, their formation, the obstacles, the radio, the faults. SI units and radians. In the world
-/// frame, x is the flight direction and y is left, m.
+/// frame, x is east and y is north, m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -106,7 +106,7 @@ pub struct Time {
     /// `drone.safe_distance_m`.
     #[schemars(range(min = 1e-4, max = 0.1))]
     pub dt_s: f64,
-    /// Time limit. A mission that takes longer has failed. Default: 180 s, or twice what a smooth flight takes from the last slot
+    /// Time limit. A mission that takes longer has failed. Default: 600 s, or five times what a smooth flight takes from the last slot
     /// past all obstacles and to the goal or the stop, one drone behind another, if that is longer, but
     /// at most 36000 s; at least `mission.duration_s`.
     #[schemars(range(max = 36_000.0), extend("exclusiveMinimum" = 0.0))]
@@ -125,7 +125,7 @@ impl Default for Time {
 pub struct Formation {
     /// Shape of the formation at the start and after every reformation.
     pub shape: Option<FormationShape>,
-    /// Slots relative to the anchor, each [x, y], instead of `shape`. The first one is the front slot.
+    /// Slots relative to the anchor, each [x, y], instead of `shape`: x along the course, y to its left. The first one is the front slot.
     #[schemars(length(min = 1, max = MAX_DRONES), inner(inner(range(min = -1e6, max = 1e6))))]
     pub offsets_m: Option<Vec<[f64; 2]>>,
     /// Number of drones. With `offsets_m` it may be left out; if it is written, it must equal the number of slots.
@@ -191,8 +191,9 @@ pub struct Mission {
     /// With `end = "hold"`: the formation stops once the x of its anchor is at least this.
     #[schemars(range(min = -1e6, max = 1e6))]
     pub stop_x_m: f64,
-    /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y]. Routes past obstacles lead along x, and the
-    /// formation faces along x. So the way to a goal that is beside the start or behind it may be longer than it has to be.
+    /// Required with `end = "goal"`: the position of the front slot at the goal, [x, y]. Of the four directions +x, +y, −x and −y, the
+    /// one nearest to the way from `formation.start_m` to the goal is the course. The formation faces along the course, and routes past
+    /// obstacles lead along it. A mission without a goal flies along +x.
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     pub goal_m: Option<[f64; 2]>,
     /// What groups do between two obstacle sets.

@@ -158,8 +158,8 @@ const HEAD: &str = "# Scenario files
 This page is generated from the types of the crate `scenario`. A test keeps it up to date. `skein schema scenario` prints
 the same as a JSON schema. `skein check FILE` checks a file without flying it.
 
-A scenario is a TOML file. Quantities are in SI units, angles in radians. In the world frame, x is the flight direction
-and y is left. Only the table `[formation]` is required, and it may be empty.
+A scenario is a TOML file. Quantities are in SI units, angles in radians. In the world frame, x is east and
+y is north; a mission flies along +x unless its goal lies elsewhere (`mission.goal_m`). Only the table `[formation]` is required, and it may be empty.
 
 Any key can be set on the command line: `--set radio.delay_s=0.2`, `--set obstacle.0.centre_m=[150,20]`. The value is
 TOML; a value that is not valid TOML is taken as a string.

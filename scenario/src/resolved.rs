@@ -9,11 +9,11 @@ use crate::parse::{self, ScenarioSource};
 use crate::passage::Barrier;
 use crate::pilots::DEFAULT_PILOT;
 use crate::radio;
-use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
 use skein_protocol::payload::{Pose, Separation};
 use skein_protocol::radio::{HEAD_BYTES, Radio, SharedChannel};
 use skein_protocol::shape::{ConvexShape, ShapeError};
+use skein_protocol::{Course, Vec2};
 
 /// Gravity as in the paper, m/s².
 const GRAVITY_MPS2: f64 = 9.81;
@@ -22,11 +22,12 @@ const GRAVITY_MPS2: f64 = 9.81;
 /// rounding errors, and a drone that flies through the middle deviates by less than the rest.
 const GAP_ROOM_M: f64 = 0.004;
 /// Default of `time.timeout_s` for a small swarm, s.
-const TIMEOUT_S: f64 = 180.0;
+const TIMEOUT_S: f64 = 600.0;
 /// Longest default of `time.timeout_s`, s: the greatest value of that key.
 const TIMEOUT_MAX_S: f64 = 36_000.0;
-/// The default of `time.timeout_s` is at least this many times the duration of a smooth flight.
-const TIMEOUT_FACTOR: f64 = 2.0;
+/// The default of `time.timeout_s` is at least this many times the duration of a smooth flight. Chosen by hand: the way round walls and out of dead
+/// ends is longer than the straight way, and drones wait for each other.
+const TIMEOUT_FACTOR: f64 = 5.0;
 /// Default of `formation.altitude_m`, m.
 const ALTITUDE_M: f64 = 50.0;
 /// Default of `protocol.beacon_period_s` where bandwidth is no limit, s.
@@ -130,19 +131,28 @@ impl Scenario {
         }
     }
 
-    /// The slots of the formation relative to its anchor, front slot first, m.
+    /// The direction in which the mission flies: along the axis nearest to the way from the start to the goal, or along +x without a goal.
     #[must_use]
-    pub fn slots(&self) -> Vec<Vec2> {
-        self.formation_shape().slots(self.formation.drones as usize, self.formation.spacing_m)
+    pub fn course(&self) -> Course {
+        let goal = self.mission.goal_m.filter(|_| self.mission.end == End::Goal);
+        goal.map_or(Course::East, |goal| Course::along_way(Vec2::from(goal) - Vec2::from(self.formation.start_m)))
     }
 
-    /// The start position of each drone, world frame, m: its slot plus a jitter that depends on the seed and the drone
+    /// The slots of the formation relative to its anchor, front slot first, axes of the world frame, m. The formation faces along the course.
+    #[must_use]
+    pub fn slots(&self) -> Vec<Vec2> {
+        let slots = self.formation_shape().slots(self.formation.drones as usize, self.formation.spacing_m);
+        slots.into_iter().map(|slot| self.course().to_world(slot)).collect()
+    }
+
+    /// The start position of each drone, world frame, m: its slot plus a jitter that depends on the seed, the drone and the course
     /// only.
     #[must_use]
     pub fn starts(&self) -> Vec<Vec2> {
         let start = Vec2::from(self.formation.start_m);
         let jitter = |drone: usize| in_unit_disc(self.seed, drone as u64) * self.formation.start_jitter_m;
-        self.slots().into_iter().enumerate().map(|(drone, slot)| start + slot + jitter(drone)).collect()
+        let place = |(drone, slot)| start + slot + self.course().to_world(jitter(drone));
+        self.slots().into_iter().enumerate().map(place).collect()
     }
 
     /// The height above the ground at which the formation starts, m: `formation.altitude_m`; or 50 m, or
@@ -377,7 +387,7 @@ impl Scenario {
         Ok(starts.filter(|(start, _)| barrier.separates(*start, to)).map(|(_, drone)| drone).collect())
     }
 
-    /// The time limit of the mission, s: `time.timeout_s`; or 180 s, or twice what a smooth flight takes
+    /// The time limit of the mission, s: `time.timeout_s`; or 600 s, or five times what a smooth flight takes
     /// from the last slot past all obstacles and to the destination, one drone behind another, if that is longer, but at most 10 hours; at
     /// least the duration of a mission that lasts a time.
     #[must_use]
@@ -391,8 +401,9 @@ impl Scenario {
     fn smooth_flight_s(&self) -> f64 {
         let drone = &self.drone;
         let outlines = self.shapes().unwrap_or_default();
-        let rear_m = outlines.iter().map(|shape| shape.bounds().1.x).fold(f64::NEG_INFINITY, f64::max);
-        let past_m = rear_m + self.avoidance.planning_distance_m - self.formation.start_m[0];
+        let course = self.course();
+        let rear_m = outlines.iter().map(|shape| shape.extent(course).1).fold(f64::NEG_INFINITY, f64::max);
+        let past_m = rear_m + self.avoidance.planning_distance_m - course.along(self.formation.start_m.into());
         let farthest_m = self.slots().iter().map(|slot| slot.norm()).fold(0.0, f64::max);
         let way_m = farthest_m + self.formation.start_jitter_m + self.way_m().max(past_m);
         let headway_s = self.avoidance.headway_factor * drone.safe_distance_m / drone.speed_mps;

@@ -44,12 +44,12 @@ fn defaults_follow_the_scenario() {
         |preset: &str| of(&[("radio.preset", preset), ("formation.shape", "column"), ("formation.drones", "64")]);
     assert_eq!((column("wifi").channel_drones(), column("satellite").channel_drones()), (31, 64));
     // A column of 64 is 2520 m long, and its stop is 100 m ahead: 262 s at 10 m/s. 64 headways of 3.85 s come on top.
-    assert_eq!(of(&[]).timeout_s(), 180.0);
+    assert_eq!(of(&[]).timeout_s(), 600.0);
     let column = of(&[("formation.shape", "column"), ("formation.drones", "64")]);
-    assert_eq!(column.timeout_s(), (2.0 * (262.0 + 64.0 * 3.85_f64)).ceil());
-    // One drone: twice the way and one headway, wherever the destination is.
+    assert_eq!(column.timeout_s(), (5.0 * (262.0 + 64.0 * 3.85_f64)).ceil());
+    // One drone: five times the way and one headway, wherever the destination is.
     let to = |end: &[(&str, &str)]| of(&[end, &[("formation.drones", "1")]].concat()).timeout_s();
-    let smooth_s = |way_m: f64| (2.0 * (way_m / 10.0 + 3.85)).ceil();
+    let smooth_s = |way_m: f64| (5.0 * (way_m / 10.0 + 3.85)).ceil();
     assert_eq!(to(&[("mission.stop_x_m", "5000")]), smooth_s(5000.0));
     for goal in ["[3000, 0]", "[0, -3000]", "[-3000, 0]"] {
         assert_eq!(to(&[("mission.end", "'goal'"), ("mission.goal_m", goal)]), smooth_s(3000.0), "{goal}");

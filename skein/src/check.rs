@@ -5,6 +5,7 @@ use crate::exit::{Exit, Failure};
 use crate::input;
 use crate::output::{print, print_line};
 use serde_json::json;
+use skein_protocol::{Course, Vec2};
 use skein_runtime::{PilotRegistry, advice, mission, run_facts};
 
 /// Prints the processes, services and routes of a mission.
@@ -24,7 +25,7 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         let services = services(shards);
         let plan = json!({
             "scenario": scenario.name, "strategy": scenario.strategy.to_string(), "seed": scenario.seed,
-            "drones": drones, "processes": drones + 2, "services": services, "sets": sets,
+            "course": scenario.course(), "drones": drones, "processes": drones + 2, "services": services, "sets": sets,
             "speed_on_sight_mps": on_sight_mps, "separation_kept_m": kept.separation_m,
             "clearance_kept_m": kept.clearance_m, "warnings": warnings,
         });
@@ -37,8 +38,8 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         for (number, set) in sets.iter().enumerate() {
             let ids: Vec<String> = set.obstacles.iter().map(|id| id.0.to_string()).collect();
             let ids = ids.join(", ");
-            let (routes, gate_x_m) = (set.routes.count(), (set.routes.gate_x_m() * 1e3).round() / 1e3);
-            text += &format!("set {number}      obstacles {ids}: {routes} routes, gate at x = {gate_x_m} m\n");
+            let (routes, gate) = (set.routes.count(), gate(scenario.course(), set.routes.gate_x_m()));
+            text += &format!("set {number}      obstacles {ids}: {routes} routes, gate at {gate}\n");
         }
         text += &format!("on sight   {on_sight_mps:.2} m/s at most: drones can stop within what they sense\n");
         text += &format!(
@@ -53,6 +54,13 @@ pub(crate) fn check(args: &CheckArgs, pilots: &PilotRegistry) -> Result<Exit, Fa
         print(text)?;
     }
     Ok(Exit::Reached)
+}
+
+/// Where a gate is that is this far along the course, m, for example `x = 320 m`.
+fn gate(course: Course, along_m: f64) -> String {
+    let place = course.to_world(Vec2::new(along_m, 0.0));
+    let (axis, at_m) = if matches!(course, Course::East | Course::West) { ("x", place.x) } else { ("y", place.y) };
+    format!("{axis} = {} m", (at_m * 1e3).round() / 1e3)
 }
 
 fn services(shards: usize) -> Vec<String> {

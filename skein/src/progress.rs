@@ -2,6 +2,7 @@
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use skein_protocol::record::{RecordSink, RecordView, SinkError};
+use skein_protocol::{Course, horizontal};
 use skein_sweep::Progress;
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -17,21 +18,22 @@ pub(crate) struct MissionBar<S> {
     inner: S,
     bar: ProgressBar,
     timeout_s: f64,
-    /// Abscissa of the end of the way, m; `None` without obstacles.
+    course: Course,
+    /// How far along the course the way ends, m; `None` without obstacles.
     end_x_m: Option<f64>,
-    /// Abscissa of its start, m, once it is known.
+    /// How far along the course it starts, m, once it is known.
     start_x_m: Option<f64>,
     /// Its length in steps of the bar.
     length: u64,
 }
 
 impl<S: RecordSink> MissionBar<S> {
-    /// A bar for a mission that ends at the latest after `timeout_s`. `end_x_m`: abscissa of the last obstacle set, m. The bar
-    /// is hidden if `quiet` or if stderr is not a terminal.
-    pub(crate) fn new(inner: S, quiet: bool, timeout_s: f64, end_x_m: Option<f64>) -> Self {
+    /// A bar for a mission that ends at the latest after `timeout_s`. `end_x_m`: how far along the course the last obstacle set is, m. The
+    /// bar is hidden if `quiet` or if stderr is not a terminal.
+    pub(crate) fn new(inner: S, quiet: bool, timeout_s: f64, course: Course, end_x_m: Option<f64>) -> Self {
         let template = if end_x_m.is_some() { "{spinner} {msg} {wide_bar}" } else { "{spinner} {msg}" };
         let bar = bar(quiet, 1, template);
-        Self { inner, bar, timeout_s, end_x_m, start_x_m: None, length: 1 }
+        Self { inner, bar, timeout_s, course, end_x_m, start_x_m: None, length: 1 }
     }
 
     /// Removes the bar from the screen and returns the recorder.
@@ -42,7 +44,7 @@ impl<S: RecordSink> MissionBar<S> {
 
     fn show(&mut self, record: RecordView<'_>) {
         let living = record.rows.iter().filter(|row| row.alive());
-        let last_x_m = living.map(|row| row.position_m[0]).fold(f64::INFINITY, f64::min);
+        let last_x_m = living.map(|row| self.course.along(horizontal(row.position_m))).fold(f64::INFINITY, f64::min);
         if let Some(end) = self.end_x_m.filter(|_| last_x_m.is_finite()) {
             let start = *self.start_x_m.get_or_insert(last_x_m);
             self.length = steps(end - start).max(1);

@@ -142,13 +142,13 @@ struct Begun {
 fn begin(args: &RunArgs, folder: &RunFolder, manifest: &Manifest, timeout_s: f64) -> Result<Begun, Failure> {
     folder.begin(manifest).map_err(Failure::environment)?;
     let facts = manifest.facts.clone();
-    let (quiet, gate_x_m) = (args.quiet || args.json, facts.last_gate_x_m());
+    let (quiet, course, gate_x_m) = (args.quiet || args.json, facts.course, facts.last_gate_x_m());
     let reserved = folder.reserve_summary(facts.drones).map_err(Failure::environment)?;
     let recorder = match args.no_record {
         true => Recorder::in_memory(facts),
         false => Recorder::in_folder(facts, folder).map_err(Failure::environment)?,
     };
-    Ok(Begun { reserved, sink: MissionBar::new(recorder, quiet, timeout_s, gate_x_m) })
+    Ok(Begun { reserved, sink: MissionBar::new(recorder, quiet, timeout_s, course, gate_x_m) })
 }
 
 /// Refuses process faults if drones share processes: the fault would hit all drones of the process.

@@ -159,7 +159,7 @@ mod tests {
             routes: 2,
             set_count: 1,
             set,
-            reserved: 0,
+            course: 0,
         }))
     }
 

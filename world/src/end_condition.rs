@@ -109,7 +109,7 @@ impl EndCondition {
             return;
         }
         self.taken = vec![false; drones];
-        self.slots = params.shape.slots(drones, params.spacing_m);
+        self.slots = goal_slots::all(params, drones);
         self.middle = self.slots.iter().sum::<Vec2>() / self.slots.len().max(1) as f64;
         let cell_m = params.spacing_m.max(params.arrival_error_m);
         self.grid.fill(cell_m, self.slots.iter().enumerate().map(|(i, &slot)| (i as u32, slot)));
@@ -156,9 +156,9 @@ mod tests {
     use super::*;
     use crate::geometry::Outline;
     use crate::testing::{params, rectangle, starts};
-    use skein_protocol::Vec3;
     use skein_protocol::formation::Shape;
     use skein_protocol::shape::ConvexShape;
+    use skein_protocol::{Course, Vec3};
 
     /// Eight drones at rest in a nested V with its front at this point, m.
     fn formed(front: Vec2) -> Vec<Body> {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     fn open() -> Stages {
-        Stages::new(&[], 40.0)
+        Stages::new(Course::East, &[], 40.0)
     }
 
     /// With one obstacle, which a drone has sensed.
@@ -219,7 +219,7 @@ mod tests {
         let ahead = rectangle(300.0, 0.0, 20.0, 20.0);
         let long = rectangle(450.0, 400.0, 500.0, 1.0);
         for shape in [beside, ahead, long] {
-            assert!(is_met(&hold(0.0), &all, &Stages::new(&[Outline::new(&shape)], 40.0)));
+            assert!(is_met(&hold(0.0), &all, &Stages::new(Course::East, &[Outline::new(&shape)], 40.0)));
             assert!(!is_met(&hold(0.0), &all, &sensed(&shape)));
         }
     }
@@ -291,7 +291,7 @@ mod tests {
         let all = formed(Vec2::new(425.0, 0.5));
         assert!(is_met(&goal(425.0), &all, &open()));
         assert!(!is_met(&goal(424.0), &all, &open()));
-        let behind = Stages::new(&[Outline::new(&rectangle(500.0, 0.0, 5.0, 5.0))], 40.0);
+        let behind = Stages::new(Course::East, &[Outline::new(&rectangle(500.0, 0.0, 5.0, 5.0))], 40.0);
         assert!(is_met(&goal(425.0), &all, &behind), "an obstacle behind the goal does not have to be passed");
     }
 

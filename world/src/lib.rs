@@ -27,7 +27,7 @@
 //! use skein_protocol::formation::Shape;
 //! use skein_protocol::nearby::Locality;
 //! use skein_protocol::slot::Slot;
-//! use skein_protocol::{DroneId, Vec3};
+//! use skein_protocol::{Course, DroneId, Vec3};
 //! use skein_world::faults::FaultPlan;
 //! use skein_world::{End, EnergyModel, Failsafe, PartsRule, SensorErrors, World, WorldParams};
 //!
@@ -52,6 +52,7 @@
 //!     parts: PartsRule::One,
 //!     arrival_error_m: 0.8,
 //!     hold_speed_mps: 1.0,
+//!     course: Course::East,
 //!     shape: Shape::NestedV,
 //!     spacing_m: 35.0,
 //!     energy: EnergyModel::default(),

@@ -7,7 +7,7 @@ use skein_protocol::formation::Shape;
 use skein_protocol::nearby::Locality;
 use skein_protocol::radio::SharedChannel;
 use skein_protocol::shape::ShapeError;
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{Course, DroneId, Vec2};
 use thiserror::Error;
 
 /// What a drone without a process does.
@@ -97,6 +97,8 @@ pub struct WorldParams {
     pub arrival_error_m: f64,
     /// Greatest speed of a drone in a formation that is held, m/s.
     pub hold_speed_mps: f64,
+    /// The direction in which the mission flies. The formation faces it.
+    pub course: Course,
     /// The shape of the formation.
     pub shape: Shape,
     /// The spacing of the formation, m.

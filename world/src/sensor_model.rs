@@ -7,7 +7,7 @@ use crate::params::WorldParams;
 use crate::sensor_errors::{PositionError, RangingErrors, SensorErrors};
 use crate::view::in_view;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{SimTime, Tick, Vec2, Vec3};
+use skein_protocol::{Course, SimTime, Tick, Vec2, Vec3};
 use std::collections::VecDeque;
 
 /// What a draw is for. Draws for different purposes are independent.
@@ -25,6 +25,8 @@ type Motions = Vec<(Vec3, Vec3)>;
 /// The errors, and what they depend on of the ticks before.
 #[derive(Clone, Debug)]
 pub(crate) struct SensorModel {
+    /// Where the field of view of a drone at rest is centred.
+    course: Course,
     errors: SensorErrors,
     /// Whether what is measured of neighbours is exact.
     exact_ranging: bool,
@@ -51,6 +53,7 @@ impl SensorModel {
         let clock = errors.clock;
         let exact = clock.is_exact();
         let mut model = Self {
+            course: params.course,
             errors,
             exact_ranging: errors.ranging.is_ideal(),
             dt_s,
@@ -140,7 +143,8 @@ impl SensorModel {
         };
         let ((here, own), (there, theirs)) = (motion(drone), motion(other));
         let (position, velocity) = (there - here, theirs - own);
-        if !sees(errors.field_rad, own.xy(), position.xy()) {
+        let ahead = own.xy().try_normalize(1e-6).unwrap_or(self.course.direction());
+        if !sees(errors.field_rad, ahead, position.xy()) {
             return None;
         }
         if errors.occlusion && outlines.iter().any(|outline| outline.hides(here, there)) {
@@ -190,9 +194,8 @@ fn ticks(seconds: f64, dt_s: f64) -> usize {
     (seconds / dt_s).round() as usize
 }
 
-/// Whether a neighbour in this direction is in a field of view of this width, rad.
-fn sees(field_rad: f64, velocity: Vec2, towards: Vec2) -> bool {
-    let ahead = velocity.try_normalize(1e-6).unwrap_or(Vec2::x());
+/// Whether a neighbour in this direction is in a field of view of this width (rad) around `ahead`, which has length 1.
+fn sees(field_rad: f64, ahead: Vec2, towards: Vec2) -> bool {
     field_rad >= std::f64::consts::TAU || ahead.dot(&towards) >= towards.norm() * libm::cos(field_rad / 2.0)
 }
 

@@ -5,20 +5,21 @@ use crate::event_log::EventLog;
 use crate::geometry::Outline;
 use crate::sweep::Contact;
 use skein_protocol::record::EventKind;
-use skein_protocol::{DroneId, ObstacleId, SimTime};
+use skein_protocol::{Course, DroneId, ObstacleId, SimTime};
 
 /// One set: obstacles whose extents along the flight overlap or nearly overlap.
 #[derive(Clone, Debug)]
 struct Stage {
-    /// Mean abscissa of the centres of the obstacles' bounding boxes, m.
+    /// Mean of the centres of the obstacles' bounding boxes along the course, m.
     centre_x_m: f64,
     detected: bool,
     passed: bool,
 }
 
-/// All sets, in flight order.
+/// All sets, in flight order. All abscissae are along the course.
 #[derive(Clone, Debug)]
 pub(crate) struct Stages {
+    course: Course,
     stages: Vec<Stage>,
     obstacles: Vec<Extent>,
     begun_x_m: f64,
@@ -38,17 +39,19 @@ struct Extent {
 }
 
 impl Stages {
-    /// Puts obstacles whose extents along x are closer than `gap_m`, twice the planning distance, into one set.
-    pub(crate) fn new(outlines: &[Outline], gap_m: f64) -> Self {
+    /// Puts obstacles whose extents along the course are closer than `gap_m`, twice the planning distance, into one set.
+    pub(crate) fn new(course: Course, outlines: &[Outline], gap_m: f64) -> Self {
+        let extents: Vec<(f64, f64)> =
+            outlines.iter().map(|outline| course.extent((outline.low(), outline.high()))).collect();
         let mut order: Vec<usize> = (0..outlines.len()).collect();
-        order.sort_by(|&a, &b| outlines[a].low().x.total_cmp(&outlines[b].low().x));
+        order.sort_by(|&a, &b| extents[a].0.total_cmp(&extents[b].0));
         let obstacles = vec![Extent::default(); outlines.len()];
         let mut made =
-            Self { stages: Vec::new(), obstacles, begun_x_m: f64::NEG_INFINITY, past_x_m: f64::NEG_INFINITY };
+            Self { course, stages: Vec::new(), obstacles, begun_x_m: f64::NEG_INFINITY, past_x_m: f64::NEG_INFINITY };
         let mut centres: Vec<f64> = Vec::new();
         let mut last_x_m = f64::NEG_INFINITY;
         for obstacle in order {
-            let (front_x_m, rear_x_m) = (outlines[obstacle].low().x, outlines[obstacle].high().x);
+            let (front_x_m, rear_x_m) = extents[obstacle];
             if !centres.is_empty() && front_x_m - last_x_m >= gap_m {
                 made.close(&centres);
                 centres.clear();
@@ -68,7 +71,7 @@ impl Stages {
     /// With obstacles that were all sensed.
     #[cfg(test)]
     pub(crate) fn sensed(outlines: &[Outline], gap_m: f64) -> Self {
-        let mut made = Self::new(outlines, gap_m);
+        let mut made = Self::new(Course::East, outlines, gap_m);
         made.past_x_m = made.obstacles.iter().map(|obstacle| obstacle.rear_x_m).fold(f64::NEG_INFINITY, f64::max);
         made.begun_x_m = made.obstacles.iter().map(|obstacle| obstacle.front_x_m).fold(f64::NEG_INFINITY, f64::max);
         made
@@ -88,6 +91,11 @@ impl Stages {
     /// The greatest abscissa at which such an obstacle begins, m; −∞ without any.
     pub(crate) fn begun_x_m(&self) -> f64 {
         self.begun_x_m
+    }
+
+    /// How far along the course a drone is, m.
+    pub(crate) fn along_m(&self, body: &Body) -> f64 {
+        self.course.along(body.position().xy())
     }
 
     /// Number of sets.
@@ -138,7 +146,7 @@ impl Stages {
 
     /// Logs the sets that the last living drone has passed, at the time when the tick ends.
     pub(crate) fn pass(&mut self, bodies: &[Body], end: SimTime, log: &mut EventLog) {
-        let living = bodies.iter().filter(|body| body.is_alive()).map(|body| body.position().x);
+        let living = bodies.iter().filter(|body| body.is_alive()).map(|body| self.along_m(body));
         let Some(last) = living.reduce(f64::min) else { return };
         for (number, stage) in self.stages.iter_mut().enumerate() {
             if !stage.passed && last >= stage.centre_x_m {
@@ -164,7 +172,7 @@ mod tests {
             rectangle(640.0, -45.0, 10.0, 15.0),
             rectangle(320.0, 0.0, 10.0, 110.0),
         ];
-        Stages::new(&shapes.each_ref().map(Outline::new), 40.0)
+        Stages::new(Course::East, &shapes.each_ref().map(Outline::new), 40.0)
     }
 
     fn contact(drone: u32, obstacle: u32) -> Contact {
@@ -182,6 +190,7 @@ mod tests {
     fn extents_closer_than_the_gap_are_one_set() {
         let sets = |x| {
             Stages::new(
+                Course::East,
                 &[rectangle(0.0, 0.0, 10.0, 5.0), rectangle(x, 90.0, 10.0, 5.0)].map(|s| Outline::new(&s)),
                 40.0,
             )
@@ -209,7 +218,7 @@ mod tests {
     fn an_obstacle_that_drones_fly_over_is_not_in_the_way() {
         let low = |top_m| rectangle(100.0, 0.0, 10.0, 10.0).between(0.0, top_m).unwrap();
         let past_x_m = |top_m| {
-            let mut stages = Stages::new(&[Outline::new(&low(top_m))], 40.0);
+            let mut stages = Stages::new(Course::East, &[Outline::new(&low(top_m))], 40.0);
             let above = [Body::new(Vec3::new(60.0, 0.0, 50.0), Vec3::zeros())];
             stages.detect(&[contact(0, 0)], &above, SimTime(5), &mut EventLog::default());
             assert!(stages.is_detected(0));
@@ -236,7 +245,7 @@ mod tests {
 
     #[test]
     fn without_obstacles_all_sets_are_passed() {
-        let stages = Stages::new(&[], 40.0);
+        let stages = Stages::new(Course::East, &[], 40.0);
         assert_eq!(stages.past_x_m, f64::NEG_INFINITY);
     }
 }

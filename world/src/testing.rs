@@ -11,7 +11,7 @@ use skein_protocol::nearby::Locality;
 use skein_protocol::record::{EventKind, RunEvent};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::slot::Slot;
-use skein_protocol::{DroneId, Vec2, Vec3};
+use skein_protocol::{Course, DroneId, Vec2, Vec3};
 
 /// The paper's first scene: spacing 35 m, safe distance 33 m, ticks of 20 ms.
 pub(crate) fn params() -> WorldParams {
@@ -36,6 +36,7 @@ pub(crate) fn params() -> WorldParams {
         parts: PartsRule::One,
         arrival_error_m: 0.8,
         hold_speed_mps: 1.0,
+        course: Course::East,
         shape: Shape::NestedV,
         spacing_m: 35.0,
         energy: EnergyModel::default(),

@@ -64,7 +64,7 @@ impl Unfinished<'_> {
             lack,
             slot_distance_m,
             still_s: self.stillness.still_s(drone, self.now),
-            stage: self.stages.ahead_of(self.bodies[drone].position().x),
+            stage: self.stages.ahead_of(self.stages.along_m(&self.bodies[drone])),
             group: slot.group.to_string(),
             leader: slot.obeyed.ballot.is_some().then_some(slot.obeyed.ballot.claimant),
             phase: slot.phase(),

@@ -81,7 +81,7 @@ impl World {
             tick: 0,
             open: false,
             faults: FaultEngine::new(params.faults.clone(), starts.len()),
-            stages: Stages::new(&outlines, 2.0 * params.planning_distance_m),
+            stages: Stages::new(params.course, &outlines, 2.0 * params.planning_distance_m),
             monitor: InvariantMonitor::new(drones.bodies(), params.safe_distance_m, params.clearance_m),
             sweep: SensorSweep::new(outlines),
             decisions: DecisionLog::new(starts.len()),

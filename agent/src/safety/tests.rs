@@ -139,3 +139,25 @@ fn a_silent_chaser_does_not_push_a_drone_into_a_neighbour_ahead() {
     let chased = filtered(Vec2::zeros(), own, &[ahead, chaser]);
     assert!((chased - alone).norm() < 0.2, "the chaser changed the command from {alone} to {chased}");
 }
+
+#[test]
+fn one_that_is_too_far_away_to_be_ranged_needs_no_more_room_than_one_that_is_ranged() {
+    let late = SafetyParams { acceleration_max_mps2: 13.0, reaction_time_s: 0.4, ..PARAMS };
+    let kept_m = late.keep_m(late.reaction_time_s);
+    let beyond_m = |distance_m: f64, least_m: f64| {
+        let position_m = Vec2::new(distance_m, 0.0);
+        let (id, velocity_mps) = (DroneId(1), Vec2::zeros());
+        let neighbour = Neighbour { id, position_m, velocity_mps, age_s: 0.7, sensed: false, least_m, share: 0.5 };
+        late.neighbour_barrier(&neighbour).beyond_m
+    };
+    let old_m = late.keep_m(0.7);
+    assert!(kept_m + 1.0 < old_m);
+    for (distance_m, least_m, wanted_m) in [
+        (kept_m + 1.0, kept_m - 2.0, 1.0),
+        (kept_m - 3.0, kept_m - 2.0, -2.0),
+        (kept_m + 1.0, kept_m + 9.0, 9.0),
+        (kept_m + 1.0, 0.0, kept_m + 1.0 - old_m),
+    ] {
+        assert!((beyond_m(distance_m, least_m) - wanted_m).abs() < 1e-9, "{distance_m} m away, at least {least_m} m");
+    }
+}

@@ -272,12 +272,14 @@ fn a_drone_makes_no_line_that_a_lost_one_cannot_hear_of() {
 }
 
 #[test]
-fn drones_that_may_lose_each_other_get_a_line_along_the_flight() {
+fn drones_that_do_not_hear_each_other_get_a_line_along_the_flight() {
     let params = SeparationParams { radio_range_m: 200.0, ..separations(0, 1).params };
     let normal = |x_m, y_m| params.normal(Vec2::new(x_m, y_m)).unwrap();
-    assert_eq!((normal(100.0, 80.0), normal(-100.0, -80.0)), (Vec2::y(), -Vec2::y()));
+    assert_eq!((normal(160.0, 130.0), normal(-160.0, -130.0)), (Vec2::y(), -Vec2::y()));
     assert_eq!(normal(60.0, 80.0), Vec2::new(0.6, 0.8), "they are near");
-    assert_eq!(normal(120.0, 50.0), Vec2::new(12.0, 5.0).normalize(), "they are not far aside");
+    assert_eq!(normal(240.0, 100.0), Vec2::new(12.0, 5.0).normalize(), "one is almost straight ahead");
+    let close = SeparationParams { radio_range_m: 50.0, ..params.clone() };
+    assert_eq!(close.normal(Vec2::new(40.0, 50.0)), Some(Vec2::new(4.0, 5.0).normalize()), "they are not far aside");
 }
 
 #[test]
@@ -293,7 +295,7 @@ fn a_drone_far_behind_has_most_of_the_room() {
     };
     let keep_m = FILTER.keep_m();
     for (ahead_m, speed_mps, wanted_m) in
-        [(150.0, 10.0, 150.0 - keep_m), (40.0, 10.0, 20.0), (150.0, 0.0, 75.0), (150.0, -10.0, 75.0)]
+        [(250.0, 10.0, 250.0 - keep_m), (150.0, 10.0, 75.0), (250.0, 0.0, 125.0), (250.0, -10.0, 125.0)]
     {
         assert!((stop_m(ahead_m, speed_mps) - wanted_m).abs() < 1e-3, "{ahead_m} m ahead at {speed_mps} m/s");
     }

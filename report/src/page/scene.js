@@ -1,5 +1,5 @@
 "use strict";
-// Draws the swarm at one time on a canvas. World frame: x along the flight direction, y to its left, metres.
+// Draws the swarm at one time on a canvas. World frame: x to the right, y upwards, metres.
 
 // The colours of Okabe and Ito, which colour-blind people can distinguish; the same as in the plots.
 const PALETTE = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#785e3c", "#d55e00"];

@@ -1,5 +1,5 @@
 "use strict";
-// The side view: altitude over the flight direction, below the view from above and with the same scale along the flight.
+// The side view: altitude over x, below the view from above and with the same scale along x.
 
 class Side {
   constructor(canvas, scene) {

@@ -9,7 +9,7 @@ use crate::facts::RunFacts;
 use crate::geometry::outline;
 use crate::markup::escaped;
 use crate::tuning::{ANIMATION_DRONES_MAX, ANIMATION_LABELS_MAX};
-use skein_protocol::Vec2;
+use skein_protocol::{Course, Vec2};
 use std::fmt::Write;
 
 /// Width of the drawing, px.
@@ -22,8 +22,8 @@ const BAR: f64 = 160.0;
 const SAMPLES_PER_KEY: usize = 5;
 /// Simulated time per time of the animation.
 const SPEED: f64 = 8.0;
-/// The symbol of a drone, which points along the flight direction, px.
-const ARROW: &str = "M9 0L-7 6L-3 0L-7 -6Z";
+/// The corners of a drone's symbol, the tip first, in the frame of the course, px.
+const ARROW: [[f64; 2]; 4] = [[9.0, 0.0], [-7.0, 6.0], [-3.0, 0.0], [-7.0, -6.0]];
 
 /// Draws the animation: the drones, and the marks and lines of their pilots. `None` without drones, and for a swarm that is too
 /// large. A viewer that does not animate shows the middle of the flight.
@@ -57,8 +57,9 @@ pub(super) fn draw(samples: &Samples, recording: &Recording, facts: &RunFacts) -
         }
     }
     signs(&mut svg, recording, samples.end_s, place);
+    let arrow = arrow(facts.course);
     for track in samples.tracks.values() {
-        drone(&mut svg, &key_frames(track, longest), place, &colours, samples.end_s / SPEED);
+        drone(&mut svg, &key_frames(track, longest), (place, &arrow), &colours, samples.end_s / SPEED);
     }
     svg.push_str("</svg>\n");
     Some(svg)
@@ -119,8 +120,20 @@ fn scale_bar(svg: &mut String, scale: f64, height: f64) {
     );
 }
 
-/// The arrow of a drone at its key frames.
-fn drone(svg: &mut String, keys: &[TrackPoint], place: impl Fn(Vec2) -> [f64; 2], colours: &[String], seconds: f64) {
+/// The outline of a drone's symbol, which points along the course.
+fn arrow(course: Course) -> String {
+    let corners = ARROW.map(|corner| course.to_world(corner.into())).map(|at| format!("{} {}", at.x, 0.0 - at.y));
+    format!("M{}Z", corners.join("L"))
+}
+
+/// A drone's symbol at its key frames. `place`: of a point of the world in the drawing. `arrow`: the symbol's outline.
+fn drone(
+    svg: &mut String,
+    keys: &[TrackPoint],
+    (place, arrow): (impl Fn(Vec2) -> [f64; 2], &str),
+    colours: &[String],
+    seconds: f64,
+) {
     let Some(still) = keys.get(keys.len() / 2) else { return };
     let at = |point: &TrackPoint| {
         let [x, y] = place(point.at_m);
@@ -130,7 +143,7 @@ fn drone(svg: &mut String, keys: &[TrackPoint], place: impl Fn(Vec2) -> [f64; 2]
     let repeated = format!("dur=\"{seconds:.2}s\" repeatCount=\"indefinite\"");
     let _ = write!(
         svg,
-        "<path d=\"{ARROW}\" fill=\"{}\" transform=\"translate({})\"><animateTransform attributeName=\"transform\" \
+        "<path d=\"{arrow}\" fill=\"{}\" transform=\"translate({})\"><animateTransform attributeName=\"transform\" \
          type=\"translate\" {repeated} values=\"{}\"/>",
         colours[still.group],
         at(still),

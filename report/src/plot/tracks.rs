@@ -10,8 +10,8 @@ use crate::formation::around_dead;
 use crate::geometry::outline;
 use crate::group_order::GroupOrder;
 use plotters::prelude::*;
-use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
+use skein_protocol::{Course, Vec2};
 
 /// Least height of the plotting area.
 const HEIGHT_MIN: u32 = px(260);
@@ -28,12 +28,12 @@ pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts, titl
     let heading = Heading::new(title, signs(samples, facts, &colours));
     let (low, high, height) = frame(samples, facts, f64::from(WIDTH - LEFT - 2 * EDGE));
     let axes = Axes {
-        x: ("x (m), flight direction", low.x..high.x),
-        y: ("y (m), left", low.y..high.y),
+        x: (if facts.course == Course::East { "x (m), flight direction" } else { "x (m)" }, low.x..high.x),
+        y: (if facts.course == Course::East { "y (m), left" } else { "y (m)" }, low.y..high.y),
         height: height.round() as u32,
     };
     plot(&heading, axes, |canvas, chart| {
-        let course = [(low.x, facts.course_y_m), (high.x, facts.course_y_m)];
+        let course = course_line(facts, low, high);
         let (dash, gap) = (px(6), px(6));
         chart
             .draw_series(DashedLineSeries::new(course, dash, gap, GREY.stroke_width(px(1))))
@@ -46,6 +46,15 @@ pub(super) fn draw(samples: &Samples, order: &GroupOrder, facts: &RunFacts, titl
             canvas.draw(&goal(chart.backend_coord(&(slot.x, slot.y)))).map_err(DrawError::new)?;
         }
         Ok(())
+    })
+}
+
+/// The ends of the line along which the formation's front slot flies, within these corners, m.
+fn course_line(facts: &RunFacts, low: Vec2, high: Vec2) -> [(f64, f64); 2] {
+    let (from_m, to_m) = facts.course.extent((low, high));
+    [from_m, to_m].map(|along_m| {
+        let end = facts.course.to_world(Vec2::new(along_m, facts.course_y_m));
+        (end.x, end.y)
     })
 }
 

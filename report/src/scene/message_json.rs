@@ -64,7 +64,7 @@ fn of_plan(plan: &Plan) -> Value {
     json!({
         "stamp_s": plan.stamp.secs(), "plan": stamp(plan.id), "group": plan.group.to_string(), "phase": plan.phase(),
         "members": plan.members, "anchor_m": plan.anchor_m, "anchor_mps": plan.anchor_mps,
-        "anchor_stop_x_m": finite(plan.anchor_stop_x_m), "predicted_s": finite(plan.predicted_s),
+        "anchor_stop_x_m": finite(plan.anchor_stop_x_m), "course": plan.course(), "predicted_s": finite(plan.predicted_s),
         "candidates": plan.candidates, "routes": plan.routes, "obstacles": set(plan.set_count, &plan.set),
     })
 }
@@ -182,7 +182,7 @@ mod tests {
             routes: 0,
             set_count: 1,
             set: [ObstacleId(4); MAX_SET],
-            reserved: 0,
+            course: 0,
         };
         let plan = message_json(&Message::Plan(plan));
         assert_eq!((&plan["anchor_stop_x_m"], &plan["predicted_s"]), (&Value::Null, &Value::Null));

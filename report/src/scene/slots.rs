@@ -86,7 +86,7 @@ mod tests {
             routes: 0,
             set_count: 0,
             set: [ObstacleId(0); MAX_SET],
-            reserved: 0,
+            course: 0,
         };
         let assignment = Assignment {
             id,

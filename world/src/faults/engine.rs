@@ -155,7 +155,7 @@ fn is_of_swarm(targets: &FaultTargets, effect: &FaultEffect) -> bool {
 mod tests {
     use super::*;
     use crate::fault_plan::{Fault, FaultTime};
-    use skein_protocol::Vec3;
+    use skein_protocol::{Course, Vec3};
 
     /// When one drone's process is stopped, in whole seconds, in which it has these faults: effect, time and length, s.
     fn stopped(faults: &[(FaultEffect, f64, f64)]) -> Vec<u32> {
@@ -168,7 +168,8 @@ mod tests {
         };
         let plan = FaultPlan { seed: 1, faults: faults.iter().map(fault).collect() };
         let mut drones = DroneTable::new(&[(Vec3::zeros(), Vec3::zeros())]);
-        let (mut engine, stages, mut log) = (FaultEngine::new(plan, 1), Stages::new(&[], 40.0), EventLog::default());
+        let (mut engine, stages, mut log) =
+            (FaultEngine::new(plan, 1), Stages::new(Course::East, &[], 40.0), EventLog::default());
         let mut stopped = false;
         let mut tick = |second: u32| {
             let now = SimTime::from_secs(second.into());

@@ -51,7 +51,7 @@ fn queued<'a>(view: &FaultView<'a>) -> impl Iterator<Item = (usize, &'a Slot)> {
 }
 
 fn along(view: &FaultView<'_>, drone: usize) -> OrderedX {
-    OrderedX(view.drones.bodies()[drone].position().x)
+    OrderedX(view.stages.along_m(&view.drones.bodies()[drone]))
 }
 
 /// An abscissa (m) in its total order.
@@ -78,7 +78,7 @@ mod tests {
     use crate::drones::DroneTable;
     use crate::stages::Stages;
     use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED};
-    use skein_protocol::{Ballot, PlanStamp, Vec3};
+    use skein_protocol::{Ballot, Course, PlanStamp, Vec3};
 
     fn slot(flags: u32, led: GroupId, round: u32, rank: u16) -> Slot {
         let ballot = Ballot { round, incarnation: 1, claimant: DroneId(0) };
@@ -102,7 +102,7 @@ mod tests {
             drones.take_slot(id, slot);
         }
         change(&mut drones);
-        let stages = Stages::new(&[], 40.0);
+        let stages = Stages::new(Course::East, &[], 40.0);
         let view = FaultView { drones: &drones, stages: &stages };
         resolve(targets, &view, KeyedRng::new(1, [0; 3])).into_iter().map(|id| id.0).collect()
     }

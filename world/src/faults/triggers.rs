@@ -81,7 +81,7 @@ impl SetTimes {
             }
         };
         let any = |holds: &dyn Fn(usize, &Slot) -> bool| view.drones.answers().any(|(drone, slot)| holds(drone, slot));
-        let past = |drone: usize| view.drones.bodies()[drone].position().x >= gate_x_m;
+        let past = |drone: usize| stages.along_m(&view.drones.bodies()[drone]) >= gate_x_m;
         if self.detected.is_some() {
             let avoids = |drone: usize, slot: &Slot| {
                 slot.phase() == Phase::Avoid && slot.obeyed != self.before[drone] && !past(drone)

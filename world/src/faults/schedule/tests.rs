@@ -10,7 +10,7 @@ use crate::stages::Stages;
 use crate::sweep::Contact;
 use crate::testing::rectangle;
 use skein_protocol::slot::{SLOT_LEADS, SLOT_QUEUED, Slot};
-use skein_protocol::{Ballot, GroupId, Phase, PlanStamp, Vec3};
+use skein_protocol::{Ballot, Course, GroupId, Phase, PlanStamp, Vec3};
 
 /// Three drones and one obstacle set around x = 100 m.
 struct Scene {
@@ -22,7 +22,7 @@ impl Scene {
     fn new() -> Self {
         Self {
             drones: DroneTable::new(&[0.0, -50.0, -100.0].map(|x| (Vec3::new(x, 0.0, 50.0), Vec3::zeros()))),
-            stages: Stages::new(&[Outline::new(&rectangle(100.0, 0.0, 5.0, 50.0))], 40.0),
+            stages: Stages::new(Course::East, &[Outline::new(&rectangle(100.0, 0.0, 5.0, 50.0))], 40.0),
         }
     }
 
