@@ -103,7 +103,7 @@ pub struct Fault {
     /// With `kind = "ranging"`: age of a measurement when the drone reads it.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub ranging_latency_s: Option<f64>,
-    /// With `kind = "ranging"`: width of the field of view in which neighbours are sensed, centred on the direction of flight (at rest on +x).
+    /// With `kind = "ranging"`: width of the field of view in which neighbours are sensed, centred on the direction of flight (at rest on the course).
     #[schemars(range(max = TAU), extend("exclusiveMinimum" = 0.0))]
     pub ranging_field_rad: Option<f64>,
     /// With `kind = "ranging"`: whether obstacles hide the neighbours behind them.

@@ -49,7 +49,7 @@ pub struct Sensors {
     /// Age of a measurement when the drone reads it.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub ranging_latency_s: f64,
-    /// Width of the field of view in which neighbours are sensed, centred on the direction of flight (at rest on +x). The default is
+    /// Width of the field of view in which neighbours are sensed, centred on the direction of flight (at rest on the course). The default is
     /// the full circle.
     #[schemars(range(max = TAU), extend("exclusiveMinimum" = 0.0))]
     pub ranging_field_rad: f64,
