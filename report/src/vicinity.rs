@@ -70,7 +70,8 @@ impl Vicinity {
             for BoxedShape { shape, low, high } in &self.obstacles {
                 let place = body.xy();
                 let box_distance = (low - place).sup(&(place - high)).sup(&Vec2::zeros()).norm();
-                if self.clearance_m.is_none_or(|least| box_distance <= least) {
+                // Within the box, where its distance is 0, a body may be deeper inside the obstacle than any before.
+                if self.clearance_m.is_none_or(|least| box_distance <= least.max(0.0)) {
                     self.clearance_m = least(self.clearance_m, Some(clearance(shape, body)));
                 }
             }
@@ -105,5 +106,9 @@ mod tests {
             vicinity.take(&[row(x, 0.0), row(x - 30.0, 0.0)]);
         }
         assert_eq!((vicinity.clearance_m, vicinity.separation_m), (Some(4.0), Some(30.0)));
+        for x in [-1.5, -0.5, -1.0] {
+            vicinity.take(&[row(x, 0.0)]);
+        }
+        assert_eq!(vicinity.clearance_m, Some(-1.5), "the deepest place counts, not the first one inside");
     }
 }

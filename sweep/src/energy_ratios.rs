@@ -8,6 +8,7 @@ use crate::row::Row;
 use crate::statistics::{self, Estimate, rate};
 use serde_json::{Value, json};
 use skein_report::plot::sweep::{Lines, Point, Series};
+use skein_report::table::quoted;
 use std::fmt::Write as _;
 
 /// The strategy that the others are compared with.
@@ -149,7 +150,8 @@ pub(crate) fn csv(all: &[EnergyRatios], keys: &[&str]) -> String {
     for ratios in all {
         let mut by_seed = ratios.by_ratio.clone();
         by_seed.sort_by_key(|pair| pair.seed);
-        let values: String = ratios.values.iter().map(|value| format!("{},", value.trim_matches('"'))).collect();
+        let values: String =
+            ratios.values.iter().map(|value| format!("{},", quoted(value.trim_matches('"')))).collect();
         for SeedRatio { seed, ratio } in by_seed {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{},{values}{},{seed},{ratio}", ratios.scenario, ratios.strategy);
