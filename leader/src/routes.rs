@@ -297,6 +297,12 @@ impl Routes {
         &self.routes[self.index(index)]
     }
 
+    /// The obstacles from right to left, those without a passable gap between them together. A route leads past each of them.
+    #[must_use]
+    pub fn envelopes(&self) -> &[Vec<ObstacleId>] {
+        &self.order
+    }
+
     /// The gate: abscissa at which the set counts as passed (paper, C1). It is the mean of the envelopes' centres, m.
     #[must_use]
     pub fn gate_x_m(&self) -> f64 {

@@ -169,6 +169,10 @@ pub enum ViolationKind {
 }
 
 impl ViolationKind {
+    /// All invariants.
+    pub const ALL: [Self; 5] =
+        [Self::Separation, Self::Clearance, Self::Ground, Self::ConflictingAssignment, Self::BallotWentBack];
+
     /// Whether the invariant is about a distance, which the event then has.
     #[must_use]
     pub fn is_distance(self) -> bool {

@@ -181,7 +181,8 @@ impl Accumulator {
             }
         }
         self.stages.take_rows(rows);
-        self.leading.take(t_s, dt_s, rows, self.facts.radio_range_m);
+        // Drones decide at the beginning of a tick. The events about leaders have that time.
+        self.leading.take(t_s - self.facts.dt_s, dt_s, rows, self.facts.radio_range_m);
         self.vicinity.take(rows);
         self.gather_living(rows);
         if tick.is_multiple_of((METRICS_PERIOD_S / self.facts.dt_s).round().max(1.0) as u64) {

@@ -44,6 +44,7 @@ fn energies(rows: &[DroneRow]) -> Vec<f64> {
     rows.iter().map(|row| row.energy_j).collect()
 }
 
+/// The sum over living drones. `Iterator::sum` would give −0 without a living drone.
 fn sum_of_living(rows: &[DroneRow], values: Vec<f64>) -> f64 {
-    rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).sum()
+    rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).fold(0.0, |sum, value| sum + value)
 }

@@ -1,5 +1,6 @@
 //! What is known of a run before it starts and is not in its record.
 
+use crate::obstacle_set::ObstacleSet;
 use crate::pilot_entry::PilotEntry;
 use crate::scene_facts::SceneFacts;
 use crate::topic_schema::TopicSchema;
@@ -75,15 +76,6 @@ pub enum MissionEnd {
     Time,
     /// When the pilots say so.
     Pilots,
-}
-
-/// Obstacles that the swarm passes together: one stage of the mission.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ObstacleSet {
-    /// The ids of its obstacles, ascending.
-    pub obstacles: Vec<u32>,
-    /// Mean of the obstacles' centres along the course, m. A drone beyond it has passed the set.
-    pub gate_x_m: f64,
 }
 
 impl RunFacts {

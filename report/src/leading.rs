@@ -93,7 +93,7 @@ impl Leading {
         }
     }
 
-    /// Takes the rows of a tick that lasted `dt_s`. Dead and frozen drones lead no group.
+    /// Takes the rows of a tick that began at `t_s`. The last rows before it were taken `dt_s` earlier. Dead and frozen drones lead no group.
     pub(crate) fn take(&mut self, t_s: f64, dt_s: f64, rows: &[DroneRow], range_m: Option<f64>) {
         self.leaders.clear();
         self.leaders.extend(rows.iter().enumerate().filter(|(_, row)| leads(row)).map(|(drone, row)| (row.led, drone)));

@@ -38,6 +38,9 @@ pub struct SetOutline {
     pub hulls_m: Vec<Vec<[f64; 2]>>,
     /// A polyline for each route, m, from the rightmost route to the leftmost.
     pub routes_m: Vec<Vec<[f64; 2]>>,
+    /// The obstacles from right to left, those without a passable gap between them together.
+    #[serde(default)]
+    pub envelopes: Vec<Vec<u32>>,
 }
 
 #[cfg(test)]

@@ -1,12 +1,17 @@
 //! How each obstacle set was passed: by which routes, in which groups, under which plan.
+//!
+//! The routes are those that were flown: they follow from the tracks of the drones. A plan may be for a part of a set, and then it numbers
+//! other routes.
 
-use crate::facts::{ObstacleSet, RunFacts};
+use crate::facts::RunFacts;
+use crate::flown_routes::FlownRoutes;
+use crate::obstacle_set::ObstacleSet;
 use crate::summary::{Stage, StageGroup};
 use skein_protocol::frame::AirFrame;
 use skein_protocol::message::Topic;
 use skein_protocol::payload::{MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::record::DroneRow;
-use skein_protocol::{Course, GroupId, Message, Phase, PlanStamp, horizontal};
+use skein_protocol::{Course, GroupId, Message, Phase, PlanStamp, Vec2, horizontal};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -17,6 +22,8 @@ const ROUNDING_S: f64 = 1e-3;
 pub(crate) struct Stages {
     course: Course,
     stages: Vec<Progress>,
+    /// Where each drone was at the end of the last tick, in the frame of the course, m.
+    places: Vec<Option<Vec2>>,
     plans: BTreeMap<PlanStamp, AvoidPlan>,
     /// By plan: the longest free flight to the gate that an assignment names, s.
     free_flights_s: BTreeMap<PlanStamp, f64>,
@@ -27,19 +34,21 @@ struct Progress {
     set: ObstacleSet,
     detected_s: Option<f64>,
     passed_s: Option<f64>,
-    /// For each drone, how it passes the set, or how it passed the gate.
+    /// For each drone that flies under a plan for the set or has passed the gate, in what company.
     flown: Vec<Option<Flown>>,
     /// For each drone, whether it is past the gate.
     beyond: Vec<bool>,
+    /// For each drone, whether it has flown past the gate. A drone that starts behind the gate has not.
+    passed: Vec<bool>,
+    routes: FlownRoutes,
 }
 
-/// How a drone passes a set.
+/// In what company a drone passes a set.
 #[derive(Clone, Copy)]
 struct Flown {
-    /// The plan that it obeys.
-    stamp: PlanStamp,
+    /// The plan that it obeys; none if it passed without a plan for the set.
+    stamp: Option<PlanStamp>,
     group: GroupId,
-    route: u16,
     /// The drone that led it.
     leader: Option<u32>,
 }
@@ -48,7 +57,6 @@ struct Flown {
 struct AvoidPlan {
     group: GroupId,
     obstacles: Vec<u32>,
-    routes: u32,
     candidates: u32,
     /// When the plan was made, s.
     made_s: f64,
@@ -59,15 +67,18 @@ impl Stages {
     /// For a run with these facts, before its first tick.
     pub(crate) fn new(facts: &RunFacts) -> Self {
         let drones = facts.drones as usize;
-        let stage = |set| Progress {
+        let stage = |set: ObstacleSet| Progress {
+            routes: FlownRoutes::new(facts, &set),
             set,
             detected_s: None,
             passed_s: None,
             flown: vec![None; drones],
             beyond: vec![false; drones],
+            passed: vec![false; drones],
         };
         let stages = facts.sets().into_iter().map(stage).collect();
-        Self { course: facts.course, stages, plans: BTreeMap::new(), free_flights_s: BTreeMap::new() }
+        let (plans, free_flights_s) = Default::default();
+        Self { course: facts.course, stages, places: vec![None; drones], plans, free_flights_s }
     }
 
     /// Notes that a living drone senses the set for the first time. Returns whether it is the first set that any drone
@@ -113,20 +124,29 @@ impl Stages {
         }
     }
 
-    /// Takes the rows of a tick. Until a drone is past the gate, its plan and route may change.
+    /// Takes the rows of a tick. Until a drone is past the gate, its plan may change.
     pub(crate) fn take_rows(&mut self, rows: &[DroneRow]) {
         for (drone, row) in rows.iter().enumerate().filter(|(_, row)| row.alive()) {
+            let Some(before) = self.places.get_mut(drone) else { continue };
+            let place = self.course.from_world(horizontal(row.position_m));
+            let before = before.replace(place);
             let queued = row.is_queued() && row.route != NO_ROUTE;
             let plan = self.plans.get(&row.obeyed).filter(|_| queued);
-            let ahead = self.stages.iter_mut().filter(|stage| stage.beyond.get(drone) == Some(&false));
-            for stage in ahead {
-                if plan.is_some_and(|plan| plan.obstacles.iter().any(|id| stage.set.obstacles.contains(id))) {
-                    let (stamp, group, route) = (row.obeyed, row.group, row.route);
-                    let before = stage.flown[drone].filter(|flown| flown.group == group).and_then(|flown| flown.leader);
-                    let leader = leader(rows, row).or(before);
-                    stage.flown[drone] = Some(Flown { stamp, group, route, leader });
+            for stage in &mut self.stages {
+                stage.routes.take(drone, before, place);
+                if stage.beyond[drone] {
+                    continue;
                 }
-                stage.beyond[drone] = self.course.along(horizontal(row.position_m)) >= stage.set.gate_x_m;
+                if plan.is_some_and(|plan| plan.obstacles.iter().any(|id| stage.set.obstacles.contains(id))) {
+                    stage.flies_with(drone, rows, Some(row.obeyed));
+                }
+                stage.beyond[drone] = place.x >= stage.set.gate_x_m;
+                if stage.beyond[drone] && before.is_some() {
+                    stage.passed[drone] = true;
+                    if stage.flown[drone].is_none() {
+                        stage.flies_with(drone, rows, None);
+                    }
+                }
             }
         }
     }
@@ -138,15 +158,14 @@ impl Stages {
 
     fn summary(&self, stage: &Progress) -> Stage {
         let plans = self.last_plans(stage);
-        let routes = plans.iter().map(|plan| plan.routes).max();
-        let split = routes.map(|routes| stage.split(routes));
+        let split = stage.detected_s.map(|_| self.split(stage));
         let predicted = plans.iter().filter_map(|plan| Some(plan.made_s + plan.predicted_s?)).max_by(f64::total_cmp);
         Stage {
             obstacles: stage.set.obstacles.clone(),
             detected_s: stage.detected_s,
             passed_s: stage.passed_s,
             pass_time_s: stage.passed_s.zip(stage.detected_s).map(|(passed, detected)| passed - detected),
-            routes,
+            routes: Some(stage.routes.count()),
             split_left_right: split.as_deref().and_then(left_right),
             split,
             predicted_s: predicted.zip(stage.detected_s).map(|(instant, detected)| instant - detected),
@@ -170,7 +189,7 @@ impl Stages {
     /// The last plan for each group, among the plans under which drones passed the set.
     fn last_plans(&self, stage: &Progress) -> Vec<&AvoidPlan> {
         let mut last: BTreeMap<GroupId, &AvoidPlan> = BTreeMap::new();
-        for plan in stage.flown.iter().flatten().filter_map(|flown| self.plans.get(&flown.stamp)) {
+        for plan in stage.flown.iter().flatten().filter_map(|flown| self.plans.get(&flown.stamp?)) {
             let newest = last.entry(plan.group).or_insert(plan);
             if plan.made_s > newest.made_s {
                 *newest = plan;
@@ -179,10 +198,28 @@ impl Stages {
         last.into_values().collect()
     }
 
+    /// The drones that passed the gate of a stage, each with its group and the route that it flew.
+    fn passed_by<'a>(&'a self, stage: &'a Progress) -> impl Iterator<Item = (u32, GroupId, u16)> + 'a {
+        let one = |drone: usize| {
+            let flown = stage.flown[drone].filter(|_| stage.passed[drone])?;
+            Some((drone as u32, flown.group, stage.routes.of(drone, self.places[drone]?)))
+        };
+        (0..stage.flown.len()).filter_map(one)
+    }
+
+    /// Number of drones that passed by each route.
+    fn split(&self, stage: &Progress) -> Vec<u32> {
+        let mut split = vec![0; stage.routes.count() as usize];
+        for (_, _, route) in self.passed_by(stage) {
+            split[usize::from(route)] += 1;
+        }
+        split
+    }
+
     fn groups(&self, stage: &Progress) -> Vec<StageGroup> {
         let mut groups: BTreeMap<(GroupId, u16), Vec<u32>> = BTreeMap::new();
-        for (drone, flown) in stage.passed_by() {
-            groups.entry((flown.group, flown.route)).or_default().push(drone);
+        for (drone, group, route) in self.passed_by(stage) {
+            groups.entry((group, route)).or_default().push(drone);
         }
         let group = |((group, route), drones): (_, Vec<u32>)| {
             let leader = stage.leader(&drones);
@@ -193,10 +230,11 @@ impl Stages {
 }
 
 impl Progress {
-    /// The drones past the gate, and how they passed it.
-    fn passed_by(&self) -> impl Iterator<Item = (u32, Flown)> + '_ {
-        let flown = self.flown.iter().zip(&self.beyond).zip(0..);
-        flown.filter_map(|((flown, beyond), drone)| flown.filter(|_| *beyond).map(|flown| (drone, flown)))
+    /// Notes in what company a drone flies now, and under which plan for the set.
+    fn flies_with(&mut self, drone: usize, rows: &[DroneRow], stamp: Option<PlanStamp>) {
+        let group = rows[drone].group;
+        let before = self.flown[drone].filter(|flown| flown.group == group).and_then(|flown| flown.leader);
+        self.flown[drone] = Some(Flown { stamp, group, leader: leader(rows, &rows[drone]).or(before) });
     }
 
     /// The drone that led most of these drones to the gate; of several, the one with the least number.
@@ -207,17 +245,6 @@ impl Progress {
         }
         followers.into_iter().max_by_key(|&(leader, count)| (count, Reverse(leader))).map(|(leader, _)| leader)
     }
-
-    /// Number of drones that passed by each route.
-    fn split(&self, routes: u32) -> Vec<u32> {
-        let mut split = vec![0; routes as usize];
-        for (_, flown) in self.passed_by() {
-            if let Some(count) = split.get_mut(usize::from(flown.route)) {
-                *count += 1;
-            }
-        }
-        split
-    }
 }
 
 impl AvoidPlan {
@@ -226,8 +253,6 @@ impl AvoidPlan {
         Self {
             group: plan.group,
             obstacles: plan.set[..count].iter().map(|id| id.0).collect(),
-            // The index of a route is a u16; a frame with more routes is invalid.
-            routes: plan.routes.min(u32::from(NO_ROUTE)),
             candidates: plan.candidates,
             made_s: plan.stamp.secs(),
             predicted_s: plan.predicted_s.is_finite().then_some(plan.predicted_s),

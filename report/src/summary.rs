@@ -94,7 +94,8 @@ pub struct Summary {
     pub elections: u32,
     /// The drones that became leaders, in order of time.
     pub leaders: Vec<LeaderEntry>,
-    /// Total time in which two leaders of one group could hear each other, s.
+    /// Total time in which two leaders of one group could hear each other, s. A drone that leads a group under a later term is also a leader of
+    /// the parts of that group.
     pub split_brain_s: f64,
     /// For each leader that died or was frozen, the time from then until its group had a leader again, s; null if it had none to the end. If
     /// the group splits meanwhile, the leader's part of it counts. A leader that goes on after a freeze before another drone leads is left out.
@@ -210,7 +211,7 @@ pub struct Stage {
     pub pass_time_s: Option<f64>,
     /// Number of routes past the set.
     pub routes: Option<u32>,
-    /// Number of drones that passed by each route, rightmost route first.
+    /// Number of drones that passed by each route, rightmost route first, as their tracks show; null if no drone sensed the set.
     pub split: Option<Vec<u32>>,
     /// The same as `[left, right]`; null if there are not exactly two routes.
     pub split_left_right: Option<[u32; 2]>,
@@ -260,12 +261,12 @@ pub struct Violation {
     /// The invariant.
     #[schemars(
         with = "String",
-        extend("enum" = ["separation", "clearance", "conflicting-assignment", "ballot-went-back"])
+        extend("enum" = ViolationKind::ALL.map(|kind| serde_json::json!(kind)))
     )]
     pub kind: ViolationKind,
     /// The drones involved.
     pub drones: Vec<u32>,
-    /// The violating distance, m; 0 if the invariant is not about a distance.
+    /// The violating distance when the violation began, m; 0 if the invariant is not about a distance. It may become worse later.
     pub value_m: f64,
 }
 

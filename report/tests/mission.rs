@@ -40,7 +40,7 @@ fn facts() -> RunFacts {
         arrival_error_m: 0.8,
         radio_range_m: None,
         pilots: Vec::new(),
-        obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 0.0), 10.0).unwrap()],
+        obstacles: vec![ConvexShape::circle(Vec2::new(50.0, 30.0), 10.0).unwrap()],
         topics: vec![],
         scene: Default::default(),
     }
@@ -143,9 +143,9 @@ fn events(tick: u64) -> Vec<RunEvent> {
         )],
         49 => vec![at(5.0, EventKind::Passed { stage: 0 })],
         DEATH => vec![
-            at(6.1, leader(3, false)),
+            at(6.0, leader(3, false)),
             at(
-                6.1,
+                6.0,
                 EventKind::Fault {
                     kind: FaultKind::Kill,
                     target: DroneId(3),
@@ -154,7 +154,7 @@ fn events(tick: u64) -> Vec<RunEvent> {
                 },
             ),
         ],
-        NEW_LEADER => vec![at(6.6, leader(0, true))],
+        NEW_LEADER => vec![at(6.5, leader(0, true))],
         _ => Vec::new(),
     }
 }
@@ -260,7 +260,7 @@ fn leadership_and_faults_are_in_the_summary() {
     assert!(summary.failover_s.len() == 1 && near(summary.failover_s[0], 0.5), "{:?}", summary.failover_s);
     let fault = serde_json::to_value(&summary.faults).unwrap();
     let wanted =
-        serde_json::json!([{"t_s": 6.1, "kind": "kill", "target": 3, "scheduled": false, "detail": "signal 9"}]);
+        serde_json::json!([{"t_s": 6.0, "kind": "kill", "target": 3, "scheduled": false, "detail": "signal 9"}]);
     assert_eq!(fault, wanted);
     let violations = serde_json::to_value(&summary.violations).unwrap();
     let wanted = serde_json::json!([{"t_s": 3.1, "kind": "separation", "drones": [0, 1], "value_m": 24.0}]);
@@ -442,7 +442,7 @@ reached after 10.00 s: goal met and every invariant held
   leadership    1 election; time without a leader after a leader's death or freeze: 0.50 s
   messages      10 sent, 30 received, 8 duplicates, 1 dropped (loss), 2 dropped (burst), 3 dropped (range), 4 dropped (partition), \
 5 dropped (deaf), 6 dropped (malformed), 7 dropped (queue); delay: median 20 ms, p99 40 ms
-  fault         6.10 s: kill, drone 3 (not scheduled; signal 9)
+  fault         6.00 s: kill, drone 3 (not scheduled; signal 9)
   speed         2.00 s of wall time, 5.0 × real time; step of a drone: median 20 µs, p99 20 µs
   digest        0000000000000b1f
 ";

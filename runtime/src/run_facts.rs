@@ -102,6 +102,7 @@ fn scene(scenario: &Scenario) -> Result<SceneFacts, ShapeError> {
         gate_x_m: set.routes.gate_x_m(),
         hulls_m: hulls(&set.routes).into_iter().map(to_world).collect(),
         routes_m: (0..set.routes.count()).map(|route| to_world(centre_line(set.routes.route(route)))).collect(),
+        envelopes: set.routes.envelopes().iter().map(|ids| ids.iter().map(|id| id.0).collect()).collect(),
     });
     Ok(SceneFacts {
         altitude_m: scenario.altitude_m(),

@@ -54,17 +54,20 @@ impl Cell {
 
     /// The cell as it stands in summary.json.
     pub(crate) fn json(&self, keys: &[&str]) -> Value {
-        let grid: Map<String, Value> =
-            keys.iter().zip(&self.values).map(|(key, v)| ((*key).to_owned(), toml_json(v))).collect();
         let metrics: Map<String, Value> =
             METRICS.iter().zip(&self.metrics).map(|(metric, found)| (metric.name.to_owned(), json!(found))).collect();
         json!({
-            "scenario": self.scenario, "strategy": self.strategy, "grid": grid,
+            "scenario": self.scenario, "strategy": self.strategy, "grid": grid_json(keys, &self.values),
             "n": self.outcomes.values().sum::<usize>(), "outcomes": self.outcomes,
             "equal_digests": self.equal > 0, "success": self.success,
             "failures_at_most": self.failures_at_most(), "metrics": metrics, "metrics_own": self.metrics_own,
         })
     }
+}
+
+/// A JSON object with the value of each key of a grid. The values are TOML.
+pub(crate) fn grid_json(keys: &[&str], values: &[String]) -> Map<String, Value> {
+    keys.iter().zip(values).map(|(key, value)| ((*key).to_owned(), toml_json(value))).collect()
 }
 
 /// A TOML value as JSON. What is not TOML stays text.

@@ -1,6 +1,7 @@
 //! Energy ratios: the energy of each run over that of `shortest-path` on the same mission with the same seed.
 
 use crate::cells::are_equal;
+use crate::cells::grid_json;
 use crate::error::SweepError;
 use crate::grid::Grid;
 use crate::metrics::METRICS;
@@ -102,11 +103,11 @@ impl EnergyRatios {
     }
 
     /// The ratios as they stand in summary.json.
-    pub(crate) fn json(&self) -> Value {
+    pub(crate) fn json(&self, keys: &[&str]) -> Value {
         let (mean, within) = (self.mean(), self.within_one_percent());
         let worst: Vec<Value> = self.worst().map(|pair| json!({ "seed": pair.seed, "ratio": pair.ratio })).collect();
         json!({
-            "scenario": self.scenario, "grid": self.values, "strategy": self.strategy, "metric": METRIC,
+            "scenario": self.scenario, "grid": grid_json(keys, &self.values), "strategy": self.strategy, "metric": METRIC,
             "reference": REFERENCE, "n": self.by_ratio.len(), "mean": mean.map(|found| found.mean),
             "interval": mean.and_then(|found| found.interval()),
             "at_most_1_percent_worse": within.map(|found| found.mean),
@@ -224,7 +225,7 @@ mod tests {
         assert!((mean.mean - 1.0).abs() < 1e-12 && (within.mean - 0.5).abs() < 1e-12);
         // 0.9, 1.1: standard deviation 0.1414, 12.7062 · 0.1414 / √2 = 1.2706.
         assert!((mean.interval().unwrap()[1] - 2.2706).abs() < 1e-3 && within.interval().is_some(), "{mean:?}");
-        assert_eq!(all[0].json()["worst"][0]["seed"], 8);
+        assert_eq!(all[0].json(&[])["worst"][0]["seed"], 8);
         assert_eq!(csv(&all, &[]).lines().nth(1), Some("random,congestion-aware,7,0.9"));
         assert!(text(&all).contains("worst seeds 8 (1.100) 7 (0.900)"));
         assert!(figure("e", &all).is_ok_and(|svg| svg.is_some_and(|svg| svg.contains("congestion-aware"))));

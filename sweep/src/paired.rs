@@ -2,6 +2,7 @@
 //! both cancels, so a difference is known much better than the two means.
 
 use crate::cells::are_equal;
+use crate::cells::grid_json;
 use crate::error::SweepError;
 use crate::experiment::Experiment;
 use crate::grid::Grid;
@@ -95,9 +96,9 @@ fn pairs(grid: &Grid<'_>, rows: &[Row], others: &[Row], metric: &Metric) -> Vec<
 
 impl PairedDifference {
     /// The difference as it stands in summary.json.
-    pub(crate) fn json(&self) -> Value {
+    pub(crate) fn json(&self, keys: &[&str]) -> Value {
         json!({
-            "scenario": self.scenario, "grid": self.values, "strategy": self.strategy, "against": self.against,
+            "scenario": self.scenario, "grid": grid_json(keys, &self.values), "strategy": self.strategy, "against": self.against,
             "metric": self.metric, "difference": self.difference, "ratio": self.ratio,
             "lower": self.lower, "higher": self.higher,
         })
@@ -282,8 +283,9 @@ mod tests {
         let text = text(&all);
         assert!(text.contains("congestion-aware minus shortest-path, 3 pairs: energy_j -4 [-18.9"), "{text}");
         assert!(text.contains("(less 2, more 1)"), "{text}");
-        let json = all[0].json();
+        let json = all[0].json(&["radio.loss"]);
         assert_eq!((&json["metric"], &json["difference"]["mean"]), (&json!("energy_j"), &json!(-4.0)));
+        assert_eq!(json["grid"], json!({ "radio.loss": 0 }));
     }
 
     #[test]

@@ -79,8 +79,8 @@ impl<'a> SweepReport<'a> {
             "scenarios": experiment.scenarios.iter().map(scenario).collect::<Vec<Value>>(),
             "seeds": experiment.seeds, "keys": keys,
             "cells": self.cells.iter().map(|cell| cell.json(&keys)).collect::<Vec<Value>>(),
-            "ratios": self.ratios.iter().map(EnergyRatios::json).collect::<Vec<Value>>(),
-            "paired": self.paired.iter().map(PairedDifference::json).collect::<Vec<Value>>(),
+            "ratios": self.ratios.iter().map(|ratios| ratios.json(&keys)).collect::<Vec<Value>>(),
+            "paired": self.paired.iter().map(|difference| difference.json(&keys)).collect::<Vec<Value>>(),
         })
     }
 

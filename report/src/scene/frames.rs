@@ -11,14 +11,13 @@ use skein_protocol::{DroneId, Message, UserMessage, Vec3};
 use std::borrow::Cow;
 use std::sync::LazyLock;
 
-/// The letter of a receiver that a frame does not concern: its sender or a dead drone.
+/// The letter of a receiver that a frame does not concern: its sender, a dead drone or a frozen one.
 const ABSENT: char = '-';
 
 /// The delivery of a frame to one receiver, as a letter of [`SentFrame::deliveries`](super::SentFrame::deliveries).
 pub(super) fn delivery(scene: &SceneFacts, frame: &AirFrame, receiver: DroneId, rows: &[DroneRow], dt_ns: i64) -> char {
-    let Some(row) = rows.get(receiver.index()).filter(|row| row.alive() && receiver != frame.source) else {
-        return ABSENT;
-    };
+    let receives = |row: &&DroneRow| row.alive() && !row.is_frozen() && receiver != frame.source;
+    let Some(row) = rows.get(receiver.index()).filter(receives) else { return ABSENT };
     if Message::decode(&frame.frame).is_err() {
         return letter(DropReason::Malformed);
     }
@@ -100,6 +99,7 @@ mod tests {
     use skein_protocol::SimTime;
     use skein_protocol::payload::Passed;
     use skein_protocol::radio::{ChannelModel, Radio, Range};
+    use skein_protocol::record::ROW_FROZEN;
 
     fn frame(sequence: u32) -> AirFrame {
         let passed = Passed { stamp: SimTime::ZERO, set_count: 2, set: Default::default(), of: 0 };
@@ -132,6 +132,8 @@ mod tests {
             (0..4).map(|drone| delivery(scene, frame, DroneId(drone), &rows, 20_000_000)).collect()
         };
         assert_eq!(deliveries(&near, &frame(0)), "-hr-");
+        let frozen = [rows[0], DroneRow { flags: rows[1].flags | ROW_FROZEN, ..rows[1] }];
+        assert_eq!(delivery(&near, &frame(0), DroneId(1), &frozen, 20_000_000), '-');
         let lossy = scene(Radio { channel: ChannelModel { loss: 1.0, ..ChannelModel::default() }, ..Radio::default() });
         assert_eq!(deliveries(&lossy, &frame(0)), "-ll-");
         let mut broken = frame(0);

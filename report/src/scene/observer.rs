@@ -148,7 +148,8 @@ fn add(counts: &mut BTreeMap<String, u32>, name: &str, count: u32) {
 }
 
 fn energy(rows: &[DroneRow]) -> EnergySample {
-    let total_j: f64 = rows.iter().filter(|row| row.alive()).map(|row| row.energy_j).sum();
+    // The sum of no numbers is −0.
+    let total_j = 0.0 + rows.iter().filter(|row| row.alive()).map(|row| row.energy_j).sum::<f64>();
     EnergySample { total_j: rounded(total_j), drone_j: rows.iter().map(|row| rounded(row.energy_j)).collect() }
 }
 

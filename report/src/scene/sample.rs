@@ -104,8 +104,8 @@ pub struct SentFrame {
     /// A short description of its content; empty for beacons.
     #[serde(rename = "says")]
     pub content: String,
-    /// A letter per receiver: `h` for delivered, `-` for the sender and for dead drones, or the reason for which it was
-    /// dropped: `l`oss, `b`urst, `r`ange, `p`artition, `d`eaf, `m`alformed, `q`ueue, `?` for any other.
+    /// A letter per receiver: `h` for delivered, `-` for the sender and for dead and frozen drones, or the reason for which it
+    /// was dropped: `l`oss, `b`urst, `r`ange, `p`artition, `d`eaf, `m`alformed, `q`ueue, `?` for any other.
     #[serde(rename = "fate")]
     pub deliveries: String,
 }
