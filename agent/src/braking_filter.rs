@@ -57,8 +57,9 @@ use crate::program::{HalfPlane, Program};
 use crate::sensing_errors::SensingErrors;
 use crate::separation::separating_line::{SeparatingLine, Side};
 use crate::sights::Sights;
+use skein_leader::nearest_on_segment::{NearestOnSegment, core_distance_m};
 use skein_protocol::Vec2;
-use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
+use skein_protocol::shape::ConvexShape;
 
 /// The share of the room between two braking paths that each of the two drones may use in a tick.
 const SHARE: f64 = 0.5;
@@ -404,7 +405,7 @@ impl Candidate {
             }
             let way_m = (braked.end() - braked.start()).norm();
             let moved = [(0.0, from - braked.at(1)), (1.0, to - braked.end())];
-            return near.aside(errors.obstacle_m + way_m, moved);
+            return aside(&near, errors.obstacle_m + way_m, moved);
         }
         let hit = Hit { normal: nearest.normal, share: nearest.share, missing_m: keep_m.min(braked_m) - distance_m };
         [(hit.missing_m > MET_M).then_some(hit), None, None, None]
@@ -413,7 +414,7 @@ impl Candidate {
     /// The violation of the distance to `shape` by the candidate's braking path, if there is one.
     fn hit(&self, params: &BrakingFilterParams, own: &OwnMotion, shape: &ConvexShape) -> Option<Hit> {
         let (from, to) = (own.position + self.path.start(), own.position + self.path.end());
-        let nearest = segment_to_core(shape, from, to);
+        let nearest = NearestOnSegment::to_core(shape, from, to);
         let keep_m = params.clear_m();
         let distance_m = nearest.distance_m - shape.radius_m;
         if distance_m >= keep_m {
@@ -421,105 +422,40 @@ impl Candidate {
         }
         let braked = BrakingPath::new(own.position, own.velocity, params.law());
         // A drone that is already too close may come no closer than full braking brings it.
-        let braked_m = segment_to_core(shape, braked.start(), braked.end()).distance_m - shape.radius_m;
+        let braked_m = NearestOnSegment::to_core(shape, braked.start(), braked.end()).distance_m - shape.radius_m;
         let missing_m = keep_m.min(braked_m) - distance_m;
         (missing_m > MET_M).then_some(Hit { normal: nearest.normal, share: nearest.share, missing_m })
     }
 }
 
-/// The point of a segment that is nearest to the core of a shape.
-struct Nearest {
-    /// Distance to the core, m; negative inside.
-    distance_m: f64,
-    /// Unit vector from the core to the segment.
-    normal: Vec2,
-    /// Position on the segment, 0 at its start to 1 at its end.
-    share: f64,
-}
-
-impl Nearest {
-    /// The outline is nearer than it can be, or full braking leads too near. Only ways that lead away from it, wherever it is within
-    /// `error_m` of the braking path, are allowed. Returns the ways that do not. `moved`: two shares of the path, and by how much
-    /// the path moves there, m.
-    fn aside(&self, error_m: f64, moved: [(f64, Vec2); 2]) -> [Option<Hit>; 4] {
-        let sin = if self.distance_m > 0.0 { error_m / self.distance_m } else { 1.0 };
-        let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        let across = Vec2::new(-self.normal.y, self.normal.x) * sin.min(1.0);
-        let limits = [self.normal * cos + across, self.normal * cos - across];
-        let hit = |normal: Vec2, (share, by): (f64, Vec2)| {
-            let missing_m = if sin < 1.0 { -normal.dot(&by) } else { by.norm() };
-            (missing_m > MET_M).then_some(Hit { normal, share, missing_m })
-        };
-        let [begin, end] = moved;
-        [hit(limits[0], begin), hit(limits[1], begin), hit(limits[0], end), hit(limits[1], end)]
-    }
+/// The outline is nearer than it can be, or full braking leads too near. Only ways that lead away from it, wherever it is within
+/// `error_m` of the braking path, are allowed. Returns the ways that do not. `moved`: two shares of the path, and by how much
+/// the path moves there, m.
+fn aside(nearest: &NearestOnSegment, error_m: f64, moved: [(f64, Vec2); 2]) -> [Option<Hit>; 4] {
+    let sin = if nearest.distance_m > 0.0 { error_m / nearest.distance_m } else { 1.0 };
+    let cos = (1.0 - sin * sin).max(0.0).sqrt();
+    let across = Vec2::new(-nearest.normal.y, nearest.normal.x) * sin.min(1.0);
+    let limits = [nearest.normal * cos + across, nearest.normal * cos - across];
+    let hit = |normal: Vec2, (share, by): (f64, Vec2)| {
+        let missing_m = if sin < 1.0 { -normal.dot(&by) } else { by.norm() };
+        (missing_m > MET_M).then_some(Hit { normal, share, missing_m })
+    };
+    let [begin, end] = moved;
+    [hit(limits[0], begin), hit(limits[1], begin), hit(limits[0], end), hit(limits[1], end)]
 }
 
 /// The nearest point to the core of a shape on the segment, or on the sides of the triangle of it and the place from which the drone `looks`.
-fn swept_to_core(shape: &ConvexShape, looks: Option<Vec2>, from: Vec2, to: Vec2) -> Nearest {
+fn swept_to_core(shape: &ConvexShape, looks: Option<Vec2>, from: Vec2, to: Vec2) -> NearestOnSegment {
     let sides = looks.into_iter().flat_map(|looks| [(looks, to), (looks, from)]);
     sides
-        .map(|(from, to)| segment_to_core(shape, from, to))
-        .fold(segment_to_core(shape, from, to), |a, b| if b.distance_m < a.distance_m { b } else { a })
-}
-
-/// Distance between a segment and the core of a shape, m. Negative if the segment enters the core.
-pub(crate) fn core_distance_m(shape: &ConvexShape, from: Vec2, to: Vec2) -> f64 {
-    segment_to_core(shape, from, to).distance_m
+        .map(|(from, to)| NearestOnSegment::to_core(shape, from, to))
+        .fold(NearestOnSegment::to_core(shape, from, to), |a, b| if b.distance_m < a.distance_m { b } else { a })
 }
 
 /// Distance between a segment and a shape, m. Negative if the segment enters the shape.
 #[must_use]
 pub fn distance_m(shape: &ConvexShape, from: Vec2, to: Vec2) -> f64 {
     core_distance_m(shape, from, to) - shape.radius_m
-}
-
-/// Finds the segment's point nearest to the core of a shape. The core is the polygon of the shape's vertices, without the
-/// rounding radius.
-fn segment_to_core(shape: &ConvexShape, from: Vec2, to: Vec2) -> Nearest {
-    let along = to - from;
-    let length2 = along.norm_squared();
-    let count = (shape.count as usize).min(MAX_VERTICES);
-    let vertex = |i: usize| Vec2::from(shape.vertices_m[i % count]);
-    let mut best = Nearest { distance_m: f64::INFINITY, normal: Vec2::x(), share: 0.0 };
-    let mut take = |on_core: Vec2, share: f64| {
-        let offset = from + along * share - on_core;
-        let distance_m = offset.norm();
-        if distance_m < best.distance_m {
-            let normal = if distance_m > 1e-9 { offset / distance_m } else { best.normal };
-            best = Nearest { distance_m, normal, share };
-        }
-    };
-    let mut crossing = None;
-    let mut inside = count >= 3;
-    for i in 0..count {
-        let a = vertex(i);
-        let edge = vertex(i + 1) - a;
-        let share = if length2 > 0.0 { ((a - from).dot(&along) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        take(a, share);
-        for (end, share) in [(from, 0.0), (to, 1.0)] {
-            let edge2 = edge.norm_squared();
-            let t = if edge2 > 0.0 { ((end - a).dot(&edge) / edge2).clamp(0.0, 1.0) } else { 0.0 };
-            take(a + edge * t, share);
-        }
-        inside &= edge.perp(&(from - a)) >= 0.0;
-        let (turn, reach) = (along.perp(&edge), a - from);
-        if turn.abs() > 1e-12 {
-            let (t, u) = (reach.perp(&edge) / turn, reach.perp(&along) / turn);
-            if (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u) && crossing.is_none_or(|(earlier, _)| t < earlier) {
-                crossing = Some((t, Vec2::new(edge.y, -edge.x).normalize()));
-            }
-        }
-    }
-    match crossing {
-        // Vertices are counter-clockwise, so the outer normal is to the right of an edge. A depth is a negative distance.
-        Some((t, normal)) if !inside => {
-            let depth_m = -normal.dot(&(along * (1.0 - t)));
-            Nearest { distance_m: -depth_m.max(0.0), normal, share: 1.0 }
-        }
-        _ if inside => Nearest { distance_m: -best.distance_m, normal: -best.normal, share: best.share },
-        _ => best,
-    }
 }
 
 #[cfg(test)]

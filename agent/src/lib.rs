@@ -53,7 +53,6 @@ mod swarm_pilot;
 #[cfg(test)]
 mod test_params;
 mod tuning;
-pub mod visibility;
 
 pub use course_pilot::CoursePilot;
 pub use params::PilotParams;

@@ -20,8 +20,8 @@
 //! ```
 
 use crate::silent_drones::have_moved;
-use crate::visibility::VisibilityMap;
 use skein_leader::routes::Body;
+use skein_leader::visibility::VisibilityMap;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 

@@ -8,8 +8,9 @@ use crate::params::Destination;
 use crate::plan_bundle::PlanBundle;
 use crate::silent::Silent;
 use crate::situation::Situation;
-use crate::slots::{self, Reformation};
-use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, OPEN_RANKS, OPENINGS, STALLED_S};
+use crate::slots::{self, Reformation, TooFewSlots};
+use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, MAX_WAYS_DRONES, OPEN_RANKS, OPENINGS, STALLED_S};
+use crate::visibility::VisibilityMap;
 use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
@@ -76,7 +77,7 @@ impl FormationPlanner {
             obeyed.is_some_and(|bundle| bundle.parts.iter().map(|part| part.drone).eq(s.members.iter().map(|m| m.id)));
         if !passed && same && missing(s) >= self.kept {
             self.changed = None;
-            if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s)) {
+            if obeyed.is_some_and(|bundle| has_stopped_short(bundle, s) || cruises_into_bay(bundle, s)) {
                 return self.assign(s, Phase::Reform);
             }
             if obeyed.is_some_and(|bundle| ends_before_obstacle(bundle, s)) && self.pace.allows(s) {
@@ -97,7 +98,8 @@ impl FormationPlanner {
         // A part of the swarm cruises only between obstacle sets.
         let parted = |plan: &Plan| plan.group != GroupId::ALL;
         let avoided = s.ledger.obeyed().is_some_and(|b| b.plan.phase() != Phase::Cruise || parted(&b.plan));
-        self.assign(s, if passed || avoided { Phase::Reform } else { Phase::Cruise })
+        let reform = passed || avoided || s.obstacles.goal_is_in_bay();
+        self.assign(s, if reform { Phase::Reform } else { Phase::Cruise })
     }
 
     /// Whether the front slot at the goal is taken for ever, as far as this drone can tell, which hears no other.
@@ -215,7 +217,12 @@ impl FormationPlanner {
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
         let pin = pin.or_else(|| given(&places));
-        let taken = assign_pinned(method, positions, places, pin)?;
+        let taken = assign_pinned(positions, places, pin, |positions, places| match ways(s) {
+            Some(map) if phase == Phase::Reform => {
+                slots::assign_along(method, positions, places, |a, b| way_m(&map, a, b))
+            }
+            _ => slots::assign_by(method, positions, places),
+        })?;
         let passed = if phase == Phase::Reform { newest_passed(s) } else { Vec::new() };
         let plan = draft(s, phase, &passed, anchor);
         let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
@@ -240,8 +247,7 @@ impl FormationPlanner {
 /// The obstacles that all members have passed, as far as the leader knows obstacles, ascending: when the formation closes, all sets that
 /// it knows are passed. If they are more than a plan can name, those that end farthest on.
 fn newest_passed(s: &Situation<'_>) -> Vec<ObstacleId> {
-    let sets = s.obstacles.sets().iter().filter(|set| !s.is_behind_goal(set));
-    let mut ids: Vec<ObstacleId> = sets.flatten().copied().collect();
+    let mut ids: Vec<ObstacleId> = s.obstacles.to_be_passed().iter().flatten().copied().collect();
     let rear_m = |id: &ObstacleId| s.exit_x_m(slice::from_ref(id));
     ids.sort_by(|a, b| rear_m(b).total_cmp(&rear_m(a)).then(a.cmp(b)));
     ids.truncate(MAX_SET);
@@ -432,6 +438,11 @@ fn has_stopped_short(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
     bundle.plan.phase() == Phase::Cruise && velocity == Vec2::zeros() && (anchor - front_m).norm() > 0.0
 }
 
+/// Whether the swarm cruises towards a goal that lies in a bay. Its formation would be pushed against the walls.
+fn cruises_into_bay(bundle: &PlanBundle, s: &Situation<'_>) -> bool {
+    bundle.plan.phase() == Phase::Cruise && s.obstacles.goal_is_in_bay()
+}
+
 /// Whether a member has an obstacle ahead that the formation leaves behind it.
 fn is_before_obstacle(s: &Situation<'_>) -> bool {
     s.members.iter().any(|m| m.before)
@@ -456,18 +467,34 @@ fn is_alone(member: &Member, s: &Situation<'_>) -> bool {
     !member.follows || s.members.len() == 1
 }
 
-/// The slot of each member, by index. `None` without a slot for every member.
+/// The map of the ways to the slots, if these do not lead there straight: if the goal lies in a bay. `None` for swarms in which the search of a way
+/// from each drone to each slot would take long.
+fn ways(s: &Situation<'_>) -> Option<VisibilityMap> {
+    if !s.obstacles.goal_is_in_bay() || s.members.len() > MAX_WAYS_DRONES {
+        return None;
+    }
+    let mut map = VisibilityMap::new(s.params.routes.clearance_m);
+    s.obstacles.iter().for_each(|(_, known)| map.add(&known.shape));
+    Some(map)
+}
+
+/// The length of the way between two points, m: the distance if there is none.
+fn way_m(map: &VisibilityMap, from: Vec2, to: Vec2) -> f64 {
+    map.path(from, to).map_or_else(|| (to - from).norm(), |(_, length_m)| length_m)
+}
+
+/// The slot of each member, by index. `None` without a slot for every member. `assign` chooses the slots of those that are not given one.
 fn assign_pinned(
-    method: Reformation,
     mut positions: Vec<Vec2>,
     mut places: Vec<Vec2>,
     pin: Option<Pin>,
+    assign: impl Fn(&[Vec2], &[Vec2]) -> Result<Vec<usize>, TooFewSlots>,
 ) -> Option<Vec<usize>> {
     if let Some(Pin { member, slot }) = pin {
         positions.remove(member);
         places.remove(slot);
     }
-    let mut taken = slots::assign_by(method, &positions, &places).ok()?;
+    let mut taken = assign(&positions, &places).ok()?;
     if let Some(Pin { member, slot }) = pin {
         for other in taken.iter_mut().filter(|other| **other >= slot) {
             *other += 1;
@@ -516,12 +543,13 @@ mod tests {
     fn a_pinned_member_keeps_its_slot_and_the_others_share_the_rest() {
         let line = |xs: &[f64]| -> Vec<Vec2> { xs.iter().map(|&x| Vec2::new(x, 0.0)).collect() };
         let (drones, slots) = (line(&[0.0, 10.0, 20.0]), line(&[0.0, 10.0, 20.0]));
-        let assign = |pin| assign_pinned(Reformation::Optimal, drones.clone(), slots.clone(), pin);
+        let optimal = |drones: &[Vec2], slots: &[Vec2]| slots::assign(drones, slots);
+        let assign = |pin| assign_pinned(drones.clone(), slots.clone(), pin, optimal);
         assert_eq!(assign(None), Some(vec![0, 1, 2]));
         assert_eq!(assign(Some(Pin { member: 2, slot: 0 })), Some(vec![1, 2, 0]));
         assert_eq!(assign(Some(Pin { member: 0, slot: 1 })), Some(vec![1, 0, 2]));
         let front = Some(Pin { member: 0, slot: 0 });
-        assert_eq!(assign_pinned(Reformation::Optimal, drones, line(&[0.0]), front), None);
+        assert_eq!(assign_pinned(drones.clone(), line(&[0.0]), front, optimal), None);
     }
 
     /// Slots in a square whose sides are 10 m, and an obstacle of 2 m by 200 m at x = `wall_x_m`.

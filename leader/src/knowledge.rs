@@ -47,7 +47,8 @@ impl Knowledge {
             impaired: false,
             reached_x_m: f64::NEG_INFINITY,
             peers: Peers::new(params.drones, params.peer_timeout_s).relayed_less(params.thinning()),
-            obstacles: Obstacles::new(params.drones, reach_m),
+            obstacles: Obstacles::new(params.drones, reach_m)
+                .bound_for(params.planner.destination, params.planner.routes),
             ledger: Ledger::new(params.me, params.drones, params.planner.routes),
             election: Election::new(params.me, params.incarnation, params.election, params.start),
             formed: PlanStamp::default(),

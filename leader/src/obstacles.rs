@@ -2,6 +2,8 @@
 
 use crate::drone_set::DroneSet;
 use crate::geometry::{hull, nearest};
+use crate::params::Destination;
+use crate::routes::{RouteParams, Routes};
 use crate::tuning::{OUTLINE_GROWTH, OUTLINE_GROWTH_M};
 use skein_protocol::payload::{MAX_SET, Passed};
 use skein_protocol::shape::{ConvexShape, MAX_VERTICES};
@@ -32,6 +34,11 @@ pub struct Obstacles {
     drones: u32,
     reach_m: f64,
     sets: Vec<Vec<ObstacleId>>,
+    /// Those of the sets that are to be passed.
+    ahead: Vec<Vec<ObstacleId>>,
+    goal_is_in_bay: bool,
+    /// Where the mission ends, and the clearances of routes.
+    mission: Option<(Destination, RouteParams)>,
     /// How often an outline was learnt or has grown.
     changes: usize,
 }
@@ -42,6 +49,11 @@ impl Obstacles {
     #[must_use]
     pub fn new(drones: u32, reach_m: f64) -> Self {
         Self { drones, reach_m, ..Self::default() }
+    }
+
+    /// The same, on a mission that ends here. Sets behind the goal, and sets with the goal among their obstacles, are not to be passed.
+    pub(crate) fn bound_for(self, destination: Destination, routes: RouteParams) -> Self {
+        Self { mission: Some((destination, routes)), ..self }
     }
 
     /// Learns of an obstacle, or that its outline reaches farther than was known. Returns whether that is new.
@@ -56,7 +68,7 @@ impl Obstacles {
             return false;
         }
         self.changes += 1;
-        self.sets = self.cluster();
+        self.find_sets();
         true
     }
 
@@ -150,6 +162,33 @@ impl Obstacles {
     #[must_use]
     pub fn sets(&self) -> &[Vec<ObstacleId>] {
         &self.sets
+    }
+
+    /// The obstacle sets that are to be passed, in flight order.
+    #[must_use]
+    pub fn to_be_passed(&self) -> &[Vec<ObstacleId>] {
+        &self.ahead
+    }
+
+    /// Whether the goal lies in a bay: among obstacles without a passable gap between them.
+    #[must_use]
+    pub fn goal_is_in_bay(&self) -> bool {
+        self.goal_is_in_bay
+    }
+
+    /// Finds the sets, and those that drones have to pass. A goal behind which a set begins is reached before the set. If the goal lies in a bay, a
+    /// route past all obstacles of the bay leads away from it.
+    fn find_sets(&mut self) {
+        self.sets = self.cluster();
+        let Some((Destination::Goal { front_m }, params)) = self.mission else {
+            self.ahead.clone_from(&self.sets);
+            return;
+        };
+        let holds_goal = |shapes: Vec<_>| Routes::enclose(&shapes, &params, front_m);
+        let bay = |set: &&Vec<ObstacleId>| self.shapes(set).is_some_and(holds_goal);
+        let begins = |set: &Vec<ObstacleId>| self.front_x_m(set) - params.planning_distance_m;
+        let ahead = self.sets.iter().filter(|set| begins(set) < front_m.x && !bay(set)).cloned().collect();
+        (self.goal_is_in_bay, self.ahead) = (self.sets.iter().any(|set| bay(&set)), ahead);
     }
 
     fn cluster(&self) -> Vec<Vec<ObstacleId>> {
@@ -266,5 +305,38 @@ mod tests {
         obstacles.hear_passed(DroneId(99), &message);
         assert!(obstacles.has_passed(DroneId(2), ObstacleId(1)));
         assert!(!obstacles.has_passed(DroneId(2), ObstacleId(9)) && !obstacles.has_passed(DroneId(99), ObstacleId(1)));
+    }
+
+    /// Which of the sets are to be passed, and whether the goal lies in a bay, with a goal at this abscissa on the course line.
+    fn with_goal_at(x_m: f64, walls: &[(f64, f64, f64, f64)]) -> (Vec<Vec<u32>>, bool) {
+        let routes = RouteParams {
+            clearance_m: 15.0,
+            half_gap_m: 15.0,
+            planning_distance_m: 20.0,
+            scale: skein_protocol::scale::Scale::FULL,
+        };
+        let goal = Destination::Goal { front_m: Vec2::new(x_m, 0.0) };
+        let mut obstacles = Obstacles::new(4, 40.0).bound_for(goal, routes);
+        for (&(x, y, hx, hy), id) in walls.iter().zip(0..) {
+            let wall = ConvexShape::rectangle(Vec2::new(x, y), Vec2::new(hx, hy), 0.0).unwrap();
+            obstacles.learn(SimTime::ZERO, ObstacleId(id), wall, DroneId(0));
+        }
+        let ids = |set: &Vec<ObstacleId>| set.iter().map(|id| id.0).collect();
+        (obstacles.to_be_passed().iter().map(ids).collect(), obstacles.goal_is_in_bay())
+    }
+
+    #[test]
+    fn sets_behind_the_goal_and_bays_around_it_are_not_to_be_passed() {
+        let (block, arms) = ((100.0, 0.0, 10.0, 10.0), [(400.0, 60.0, 100.0, 5.0), (400.0, -60.0, 100.0, 5.0)]);
+        let back = (505.0, 0.0, 5.0, 65.0);
+        let sets = |x_m, walls: &[_]| with_goal_at(x_m, walls);
+        assert_eq!(sets(420.0, &[block, arms[0], arms[1]]), (vec![vec![0], vec![1, 2]], false), "a passage");
+        assert_eq!(sets(420.0, &[block, arms[0], arms[1], back]), (vec![vec![0]], true), "a bay");
+        assert_eq!(
+            sets(700.0, &[block, arms[0], arms[1], back]),
+            (vec![vec![0], vec![1, 2, 3]], false),
+            "beyond the bay"
+        );
+        assert_eq!(sets(200.0, &[block, arms[0], arms[1], back]), (vec![vec![0]], false), "before the bay");
     }
 }

@@ -61,12 +61,6 @@ pub enum Destination {
 }
 
 impl Destination {
-    /// Whether the mission ends at a goal whose slots all lie before this abscissa, m.
-    #[must_use]
-    pub fn is_before(&self, x_m: f64) -> bool {
-        matches!(self, Self::Goal { front_m } if front_m.x <= x_m)
-    }
-
     /// The distance that decides elections, m. The drone with the smallest one claims first. For [`Self::Hold`] it is the
     /// negative abscissa of `position` (world frame, m).
     #[must_use]

@@ -9,7 +9,7 @@ use crate::params::Between;
 use crate::relays::Relays;
 use crate::tuning::{ARRIVED_S, BEHIND_S, LEFT_OUT_S};
 use skein_protocol::payload::Plan;
-use skein_protocol::{Ballot, DroneId, GroupId, ObstacleId, Phase, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Phase, SimTime, Vec2};
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -182,8 +182,7 @@ fn first_if_behind(k: &Knowledge, now: SimTime, own: &OwnState) -> Option<DroneI
 /// Whether some of these drones still have an obstacle set to pass.
 fn has_ahead(k: &Knowledge, drones: impl Iterator<Item = Member> + Clone) -> bool {
     let planning_m = k.params().routes.planning_distance_m;
-    let behind = |set: &[ObstacleId]| k.params().destination.is_before(k.obstacles().front_x_m(set) - planning_m);
-    k.obstacles().sets().iter().filter(|set| !behind(set)).any(|set| {
+    k.obstacles().to_be_passed().iter().any(|set| {
         let exit_x_m = k.obstacles().exit_x_m(set, planning_m);
         drones.clone().any(|m| !m.settled && !k.obstacles().is_past(m.id, m.position.x, set, exit_x_m))
     })

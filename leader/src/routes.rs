@@ -195,6 +195,12 @@ impl Routes {
         (0..self.routes.len()).min_by_key(moved).unwrap_or(0)
     }
 
+    /// Whether a point is in an envelope of several obstacles: among obstacles without a passable gap between them. World frame, m.
+    pub(crate) fn enclose(obstacles: &[(ObstacleId, ConvexShape)], params: &RouteParams, point: Vec2) -> bool {
+        let holds = |e: &Envelope| e.ids.len() > 1 && (nearest(&e.core, point) - point).norm() <= e.radius_m;
+        merged(obstacles, params).iter().any(holds)
+    }
+
     /// The routes past these envelopes, which are ordered from right to left.
     fn past(envelopes: &[Envelope], params: &RouteParams) -> Self {
         if envelopes.is_empty() {

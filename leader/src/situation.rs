@@ -41,12 +41,6 @@ impl Situation<'_> {
         self.obstacles.exit_x_m(set, self.params.routes.planning_distance_m)
     }
 
-    /// Whether a set lies behind the goal, so that no drone has to pass it.
-    pub(crate) fn is_behind_goal(&self, set: &[ObstacleId]) -> bool {
-        let front_x_m = self.obstacles.front_x_m(set) - self.params.routes.planning_distance_m;
-        self.params.destination.is_before(front_x_m)
-    }
-
     /// Drones of other groups that still have to pass a set.
     pub(crate) fn others_before(&self, set: &[ObstacleId]) -> Vec<DroneId> {
         let exit_x_m = self.exit_x_m(set);

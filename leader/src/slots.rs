@@ -54,6 +54,31 @@ pub fn assign_by(method: Reformation, positions: &[Vec2], slots: &[Vec2]) -> Res
     }
 }
 
+/// The slot of each drone, by index, no slot twice, for slots to which the way leads round obstacles. `way_m`: the length of the way from a
+/// position to a slot, m. The thin-plate mapping knows distances only, so the optimal method takes its place. Squares of lengths send the
+/// drone that is first at the mouth of a bay to the slot that is deepest in it.
+///
+/// # Errors
+/// [`TooFewSlots`] for fewer slots than drones.
+pub fn assign_along(
+    method: Reformation,
+    positions: &[Vec2],
+    slots: &[Vec2],
+    way_m: impl Fn(Vec2, Vec2) -> f64,
+) -> Result<Vec<usize>, TooFewSlots> {
+    let (drones, places) = (positions.len(), slots.len());
+    if places < drones {
+        return Err(TooFewSlots { drones, slots: places });
+    }
+    let lengths: Vec<f64> = positions.iter().flat_map(|from| slots.iter().map(|to| way_m(*from, *to))).collect();
+    let cost = |drone: usize, slot: usize| lengths[drone * places + slot].powi(2);
+    Ok(match method {
+        Reformation::Optimal | Reformation::Tps { .. } => least_cost(drones, places, cost),
+        Reformation::Greedy => cheapest_first(drones, places, &cost),
+        Reformation::Identity => (0..drones).collect(),
+    })
+}
+
 /// The slot of each drone, by index, no slot twice, so that the sum of squared distances is least (O(drones² · slots)).
 /// Positions and slots are in one frame, m, finite. Surplus slots stay empty.
 ///

@@ -24,7 +24,7 @@ impl Task {
         let split = s.members.iter().any(|m| m.group != s.scope && s.scope.contains(m.group));
         let unplaced = |m: &&Member| !s.scope.contains(m.group) || (split && m.group == s.scope);
         let mut task = Self::Form;
-        for set in s.obstacles.sets().iter().filter(|set| !s.is_behind_goal(set)) {
+        for set in s.obstacles.to_be_passed() {
             let exit_x_m = s.exit_x_m(set);
             let past = |m: &Member| m.settled || s.obstacles.is_past(m.id, m.position.x, set, exit_x_m);
             if s.members.iter().all(past) {

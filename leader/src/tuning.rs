@@ -252,3 +252,6 @@ pub(crate) const OUTLINE_GROWTH: f64 = 0.05;
 /// In how many intervals of the gossip a drone says an obstacle that a plan covers, or that it has passed, to drones that may not know it.
 /// No unit. 3: within 1.4 s by default. By hand.
 pub(crate) const NEWS_TURNS: u32 = 3;
+
+/// With up to so many drones, slots in a bay are assigned by the lengths of ways. A way is searched from each drone to each slot. By hand.
+pub(crate) const MAX_WAYS_DRONES: usize = 64;

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use proptest::prelude::*;
-use skein_leader::slots::{Reformation, TooFewSlots, assign, assign_by};
+use skein_leader::slots::{Reformation, TooFewSlots, assign, assign_along, assign_by};
 use skein_leader::tps;
 use skein_protocol::Vec2;
 use skein_protocol::formation::Shape;
@@ -161,4 +161,20 @@ fn two_hundred_drones_are_mapped() {
     let slots = Shape::Wedge.slots(200, 35.0);
     let taken = tps::assign(&disturbed(&slots), &slots, 1000.0).unwrap();
     assert!(is_matching(&taken, 200, 200));
+}
+
+#[test]
+fn the_drone_that_is_first_at_the_mouth_of_a_bay_goes_deepest() {
+    // The slots lie along a corridor whose mouth is at x = 0, and whose end is at x = 40 m. The drones wait in front of the mouth, one behind the other.
+    let line = |xs: [f64; 4]| xs.map(|x| Vec2::new(x, 0.0)).to_vec();
+    let (drones, slots) = (line([-5.0, -15.0, -25.0, -35.0]), line([10.0, 20.0, 30.0, 40.0]));
+    let way_m = |from: Vec2, to: Vec2| to.x - from.x;
+    assert_eq!(assign_along(Reformation::Optimal, &drones, &slots, way_m).unwrap(), [3, 2, 1, 0]);
+    // As the crow flies, from beside the end of the corridor, the drones would take the slots that are nearest to them.
+    let beside: Vec<Vec2> = slots.iter().map(|slot| slot + Vec2::new(0.0, 20.0)).collect();
+    assert_eq!(assign(&beside, &slots).unwrap(), [0, 1, 2, 3]);
+    let round_the_mouth_m = |from: Vec2, to: Vec2| (from.x + 20.0) + 20.0 + to.x;
+    assert_eq!(assign_along(Reformation::Optimal, &beside, &slots, round_the_mouth_m).unwrap(), [3, 2, 1, 0]);
+    assert_eq!(assign_along(Reformation::Identity, &beside, &slots, round_the_mouth_m).unwrap(), [0, 1, 2, 3]);
+    assert!(assign_along(Reformation::Optimal, &beside, &slots[1..], round_the_mouth_m).is_err());
 }

@@ -99,6 +99,7 @@ fn scenes_of_an_independent_generator_are_reached() {
         "end-of-an-outline",
         "first-step-too-late",
         "flown-over",
+        "goal-in-a-bay",
         "greedy-ranks",
         "head-on-at-a-gap",
         "identity-in-a-corridor",

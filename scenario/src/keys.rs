@@ -209,7 +209,8 @@ pub struct Mission {
     #[schemars(range(max = 1000.0), extend("exclusiveMinimum" = 0.0))]
     pub arrival_error_m: f64,
     /// How slots are assigned to drones when the formation closes. Drones that are shut out of their slots for long get the slots that
-    /// are best for all, as with `"optimal"`.
+    /// are best for all, as with `"optimal"`. If the goal lies in a bay of obstacles, their
+    /// distances are those along the way, for up to 64 drones.
     pub reformation: Reformation,
     /// With `reformation = "tps"`: λ of the thin-plate spline (the paper's E6), m². A greater value keeps the order of the
     /// formation better. With 0, each drone maps to the closest slot, whatever the order.

@@ -1,8 +1,8 @@
 //! Shortest paths around known obstacles: A* search on a visibility graph. Its nodes are the corners of inflated outlines, and
 //! its edges are tangents. Edges are generated during the search.
 
-use crate::braking_filter::core_distance_m;
-use skein_leader::geometry::inflate;
+use crate::geometry::inflate;
+use crate::nearest_on_segment::core_distance_m;
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
 use std::cmp::Reverse;
