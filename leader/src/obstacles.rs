@@ -184,11 +184,16 @@ impl Obstacles {
             self.ahead.clone_from(&self.sets);
             return;
         };
-        let holds_goal = |shapes: Vec<_>| Routes::enclose(&shapes, &params, front_m);
-        let bay = |set: &&Vec<ObstacleId>| self.shapes(set).is_some_and(holds_goal);
-        let begins = |set: &Vec<ObstacleId>| self.front_x_m(set) - params.planning_distance_m;
-        let ahead = self.sets.iter().filter(|set| begins(set) < front_m.x && !bay(set)).cloned().collect();
-        (self.goal_is_in_bay, self.ahead) = (self.sets.iter().any(|set| bay(&set)), ahead);
+        let begins_m = |set: &Vec<ObstacleId>| self.front_x_m(set) - params.planning_distance_m;
+        let bay = |set: &Vec<ObstacleId>| self.is_bay(set, &params, front_m);
+        let ahead = self.sets.iter().filter(|set| begins_m(set) < front_m.x && !bay(set)).cloned().collect();
+        (self.goal_is_in_bay, self.ahead) = (self.sets.iter().any(bay), ahead);
+    }
+
+    /// Whether a point lies among obstacles of a set that leave no passable gap between them. World frame, m.
+    fn is_bay(&self, set: &[ObstacleId], params: &RouteParams, point: Vec2) -> bool {
+        let extent_m = self.front_x_m(set)..=self.exit_x_m(set, 0.0);
+        extent_m.contains(&point.x) && self.shapes(set).is_some_and(|shapes| Routes::enclose(&shapes, params, point))
     }
 
     fn cluster(&self) -> Vec<Vec<ObstacleId>> {
