@@ -4,6 +4,7 @@ use crate::params::PilotParams;
 use crate::swarm_pilot::SwarmPilot;
 use skein_pilot::{Command, Inbox, Motion, Out, Pilot};
 use skein_protocol::downlink::{SensedNeighbour, SensedObstacle, SensedShape, Senses};
+use skein_protocol::turned::{depends_on_frame, turn_to_world};
 use skein_protocol::{Course, Message, MessageRef, SimTime, horizontal, raised};
 
 /// A [`SwarmPilot`] that senses, hears, commands and says everything in the world frame, and flies in the frame of its course. So a mission
@@ -33,9 +34,9 @@ impl CoursePilot {
 
     /// A message as it reads in the frame of the course; `None` if it is the same in both frames.
     fn turned(&self, message: MessageRef<'_>) -> Option<Message> {
-        message.depends_on_frame().then(|| {
+        depends_on_frame(&message).then(|| {
             let mut turned = message.to_message();
-            turned.turn_to_world(self.course.inverse());
+            turn_to_world(&mut turned, self.course.inverse());
             turned
         })
     }
@@ -73,7 +74,7 @@ impl CoursePilot {
         }
         let command = self.pilot.step(&turned, &Inbox::new(&heard), out);
         for message in out.messages_mut() {
-            message.turn_to_world(self.course);
+            turn_to_world(message, self.course);
         }
         self.commanded(&command)
     }

@@ -217,11 +217,10 @@ impl FormationPlanner {
         let positions: Vec<Vec2> = s.members.iter().map(|m| m.position).collect();
         let method = if self.shut_out { Reformation::Optimal } else { s.params.reformation };
         let pin = pin.or_else(|| given(&places));
-        let taken = assign_pinned(positions, places, pin, |positions, places| match ways(s) {
-            Some(map) if phase == Phase::Reform => {
-                slots::assign_along(method, positions, places, |a, b| way_m(&map, a, b))
-            }
-            _ => slots::assign_by(method, positions, places),
+        let ways = if phase == Phase::Reform { ways(s) } else { None };
+        let taken = assign_pinned(positions, places, pin, |positions, places| match &ways {
+            Some(map) => slots::assign_along(method, positions, places, |a, b| way_m(map, a, b)),
+            None => slots::assign_by(method, positions, places),
         })?;
         let passed = if phase == Phase::Reform { newest_passed(s) } else { Vec::new() };
         let plan = draft(s, phase, &passed, anchor);

@@ -41,17 +41,13 @@ pub fn assign_by(method: Reformation, positions: &[Vec2], slots: &[Vec2]) -> Res
     if slots.len() < positions.len() {
         return Err(TooFewSlots { drones: positions.len(), slots: slots.len() });
     }
-    match method {
-        Reformation::Optimal => assign(positions, slots),
-        Reformation::Tps { lambda_m2 } => {
-            tps::assign(positions, slots, lambda_m2).map_or_else(|| assign(positions, slots), Ok)
-        }
-        Reformation::Greedy => {
-            let cost = |drone: usize, slot: usize| (positions[drone] - slots[slot]).norm_squared();
-            Ok(cheapest_first(positions.len(), slots.len(), &cost))
-        }
-        Reformation::Identity => Ok((0..positions.len()).collect()),
+    if let Reformation::Tps { lambda_m2 } = method
+        && let Some(taken) = tps::assign(positions, slots, lambda_m2)
+    {
+        return Ok(taken);
     }
+    let cost = |drone: usize, slot: usize| (positions[drone] - slots[slot]).norm_squared();
+    Ok(assign_by_cost(method, positions.len(), slots.len(), cost))
 }
 
 /// The slot of each drone, by index, no slot twice, for slots to which the way leads round obstacles. `way_m`: the length of the way from a
@@ -72,11 +68,16 @@ pub fn assign_along(
     }
     let lengths: Vec<f64> = positions.iter().flat_map(|from| slots.iter().map(|to| way_m(*from, *to))).collect();
     let cost = |drone: usize, slot: usize| lengths[drone * places + slot].powi(2);
-    Ok(match method {
-        Reformation::Optimal | Reformation::Tps { .. } => least_cost(drones, places, cost),
-        Reformation::Greedy => cheapest_first(drones, places, &cost),
+    Ok(assign_by_cost(method, drones, places, cost))
+}
+
+/// The slot of each drone by the cost of each pair, for at least as many slots as drones. The thin-plate mapping has no such costs.
+fn assign_by_cost(method: Reformation, drones: usize, slots: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    match method {
+        Reformation::Optimal | Reformation::Tps { .. } => least_cost(drones, slots, cost),
+        Reformation::Greedy => cheapest_first(drones, slots, &cost),
         Reformation::Identity => (0..drones).collect(),
-    })
+    }
 }
 
 /// The slot of each drone, by index, no slot twice, so that the sum of squared distances is least (O(drones² · slots)).

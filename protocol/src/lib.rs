@@ -70,7 +70,7 @@ pub mod thin_plate;
 pub mod time;
 mod topic;
 mod topic_name;
-mod turned;
+pub mod turned;
 mod unfinished;
 mod user_message;
 pub mod wire;

@@ -5,53 +5,57 @@ use crate::message::{Message, MessageRef};
 use crate::space::horizontal;
 use crate::{Vec2, raised};
 
-impl MessageRef<'_> {
-    /// Whether the message reads otherwise in another frame. Those that name no place or direction do not, nor do pilots' own messages and
-    /// separating lines: their angles are from the course, and the frames have one origin.
-    #[must_use]
-    pub fn depends_on_frame(&self) -> bool {
-        match self {
-            Self::Pose(_)
-            | Self::Obstacle(_)
-            | Self::Plan(_)
-            | Self::Assignment(_)
-            | Self::AssignmentList(_)
-            | Self::Presence(_) => true,
-            Self::Leadership(_) | Self::Arrivals(_) | Self::Passed(_) | Self::Separation(_) | Self::User(_) => false,
-        }
+/// Whether the message reads otherwise in another frame. Those that name no place or direction do not, nor do pilots' own messages and
+/// separating lines: their angles are from the course, and the frames have one origin.
+#[must_use]
+pub fn depends_on_frame(message: &MessageRef<'_>) -> bool {
+    match message {
+        MessageRef::Pose(_)
+        | MessageRef::Obstacle(_)
+        | MessageRef::Plan(_)
+        | MessageRef::Assignment(_)
+        | MessageRef::AssignmentList(_)
+        | MessageRef::Presence(_) => true,
+        MessageRef::Leadership(_)
+        | MessageRef::Arrivals(_)
+        | MessageRef::Passed(_)
+        | MessageRef::Separation(_)
+        | MessageRef::User(_) => false,
     }
 }
 
-impl Message {
-    /// The same message of the course's frame, in the world frame. With [`Course::inverse`] it is the other way round.
-    pub fn turn_to_world(&mut self, course: Course) {
-        let plane = |v: &mut [f64; 2]| *v = course.to_world(Vec2::from(*v)).into();
-        match self {
-            Self::Pose(pose) => {
-                for v in [&mut pose.position_m, &mut pose.velocity_mps] {
-                    *v = raised(course.to_world(horizontal(*v)), v[2]);
-                }
+/// The same message of the course's frame, in the world frame. With [`Course::inverse`] it is the other way round.
+pub fn turn_to_world(message: &mut Message, course: Course) {
+    let plane = |v: &mut [f64; 2]| *v = course.to_world(Vec2::from(*v)).into();
+    match message {
+        Message::Pose(pose) => {
+            for v in [&mut pose.position_m, &mut pose.velocity_mps] {
+                *v = raised(course.to_world(horizontal(*v)), v[2]);
             }
-            Self::Obstacle(obstacle) => obstacle.shape = obstacle.shape.to_world(course),
-            Self::Plan(plan) => {
-                plane(&mut plan.anchor_m);
-                plane(&mut plan.anchor_mps);
-                plan.course = Course::from_quarters(plan.course % 4 + course.quarters()).quarters();
-            }
-            Self::Assignment(part) => plane(&mut part.slot_m),
-            Self::AssignmentList(list) => list.drones.iter_mut().for_each(|listed| plane(&mut listed.slot_m)),
-            Self::Presence(presence) => {
-                // A turn by a quarter keeps each number, so that no digit is lost.
-                let turned = |x: f32, y: f32| course.to_world(Vec2::new(x.into(), y.into())).map(|n| n as f32);
-                for present in &mut presence.drones {
-                    let ([x, y, z], [vx, vy]) = (present.position_m, present.velocity_mps);
-                    let place = turned(x, y);
-                    present.position_m = [place.x, place.y, z];
-                    present.velocity_mps = turned(vx, vy).into();
-                }
-            }
-            Self::Leadership(_) | Self::Arrivals(_) | Self::Passed(_) | Self::Separation(_) | Self::User(_) => {}
         }
+        Message::Obstacle(obstacle) => obstacle.shape = obstacle.shape.to_world(course),
+        Message::Plan(plan) => {
+            plane(&mut plan.anchor_m);
+            plane(&mut plan.anchor_mps);
+            plan.course = Course::from_quarters(plan.course % 4 + course.quarters()).quarters();
+        }
+        Message::Assignment(part) => plane(&mut part.slot_m),
+        Message::AssignmentList(list) => list.drones.iter_mut().for_each(|listed| plane(&mut listed.slot_m)),
+        Message::Presence(presence) => {
+            // A turn by a quarter keeps each number, so that no digit is lost.
+            let turned = |x: f32, y: f32| course.to_world(Vec2::new(x.into(), y.into())).map(|n| n as f32);
+            for present in &mut presence.drones {
+                let ([x, y, z], [vx, vy]) = (present.position_m, present.velocity_mps);
+                let place = turned(x, y);
+                present.position_m = [place.x, place.y, z];
+                present.velocity_mps = turned(vx, vy).into();
+            }
+        }
+        Message::Leadership(_)
+        | Message::Arrivals(_)
+        | Message::Passed(_)
+        | Message::Separation(_)
+        | Message::User(_) => {}
     }
 }
 
@@ -87,21 +91,21 @@ mod tests {
         for course in [Course::North, Course::West, Course::South] {
             for message in messages() {
                 let mut turned = message;
-                turned.turn_to_world(course);
-                assert!(MessageRef::from(&message).depends_on_frame() && turned != message, "{course:?} {message:?}");
-                turned.turn_to_world(course.inverse());
+                turn_to_world(&mut turned, course);
+                assert!(depends_on_frame(&MessageRef::from(&message)) && turned != message, "{course:?} {message:?}");
+                turn_to_world(&mut turned, course.inverse());
                 assert_eq!(turned, message, "{course:?}");
             }
         }
         let mut lines = Message::Separation(Separation::zeroed());
-        lines.turn_to_world(Course::North);
-        assert!(!MessageRef::from(&lines).depends_on_frame() && lines == Message::Separation(Separation::zeroed()));
+        turn_to_world(&mut lines, Course::North);
+        assert!(!depends_on_frame(&MessageRef::from(&lines)) && lines == Message::Separation(Separation::zeroed()));
     }
 
     #[test]
     fn places_are_turned_about_the_origin() {
         let mut pose = messages().remove(0);
-        pose.turn_to_world(Course::North);
+        turn_to_world(&mut pose, Course::North);
         let Message::Pose(pose) = pose else { panic!("it is a beacon") };
         assert_eq!((pose.position_m, pose.velocity_mps), ([-2.0, 1.0, 50.0], [4.0, 3.0, 0.5]));
     }
@@ -111,7 +115,7 @@ mod tests {
         let Message::Plan(plan) = messages().remove(2) else { panic!("it is a plan") };
         for course in Course::ALL {
             let mut turned = Message::Plan(plan);
-            turned.turn_to_world(course);
+            turn_to_world(&mut turned, course);
             let Message::Plan(turned) = turned else { panic!("it is a plan") };
             assert_eq!((turned.course(), turned.anchor_stops()), (course, plan.anchor_stops()));
             for now in [0.5, 1.5].map(SimTime::from_secs) {

@@ -48,3 +48,15 @@ fn energies(rows: &[DroneRow]) -> Vec<f64> {
 fn sum_of_living(rows: &[DroneRow], values: Vec<f64>) -> f64 {
     rows.iter().zip(values).filter(|(row, _)| row.alive()).map(|(_, value)| value).fold(0.0, |sum, value| sum + value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_swarm_without_a_living_drone_has_used_nothing() {
+        let dead = DroneRow { energy_j: 5.0, ..DroneRow::default() };
+        let energy = EnergyMarks::default().finish(&[dead], false);
+        assert!(energy.total == 0.0 && energy.total.is_sign_positive(), "{}", energy.total);
+    }
+}

@@ -2,8 +2,9 @@
 
 use crate::facts::RunFacts;
 use crate::obstacle_set::ObstacleSet;
+use skein_protocol::Vec2;
 use skein_protocol::payload::NO_ROUTE;
-use skein_protocol::{Course, Vec2};
+use skein_protocol::shape::ConvexShape;
 
 /// Notes on which side of each obstacle of a set each drone passes. Obstacles without a passable gap between them count as one. A set of k
 /// obstacles has k + 1 routes (paper, E5).
@@ -63,9 +64,9 @@ fn envelopes(facts: &RunFacts, set: &ObstacleSet) -> Vec<Vec<u32>> {
 
 /// The centre of the bounding box of these obstacles, in the frame of the course, m.
 fn centre(facts: &RunFacts, ids: &[u32]) -> Option<Vec2> {
-    let bounds = |&id: &u32| facts.obstacles.get(id as usize).map(skein_protocol::shape::ConvexShape::bounds);
+    let bounds = |&id: &u32| facts.obstacles.get(id as usize).map(ConvexShape::bounds);
     let (low, high) = ids.iter().filter_map(bounds).reduce(|(low, high), (a, b)| (low.inf(&a), high.sup(&b)))?;
-    Some(Course::from_world(facts.course, (low + high) / 2.0))
+    Some(facts.course.from_world((low + high) / 2.0))
 }
 
 #[cfg(test)]
@@ -73,7 +74,7 @@ mod tests {
     use super::*;
     use crate::scene_facts::SetOutline;
     use crate::testing::facts;
-    use skein_protocol::shape::ConvexShape;
+    use skein_protocol::Course;
 
     /// The route of a drone that flies along this track.
     fn flown(facts: &RunFacts, track: &[[f64; 2]]) -> (u16, u32) {
