@@ -50,6 +50,7 @@ pub fn warnings(scenario: &Scenario) -> Result<Vec<String>, ShapeError> {
         slots_too_close(scenario),
         slots_out_of_reach(scenario),
         slots_too_blurred(scenario),
+        goal_beside_an_obstacle(scenario, &shapes),
         radio_too_weak(scenario),
         start_too_fast(scenario, &shapes),
         stops_unseen(scenario, &shapes),
@@ -135,6 +136,29 @@ fn slots_too_blurred(scenario: &Scenario) -> Option<String> {
         format!(
             "sensors.position_std_m = {std_m} m, but a drone is in its slot within mission.arrival_error_m = {allowed_m} m: the \
              formation may not close while a drone is off by more than that; raise mission.arrival_error_m"
+        )
+    })
+}
+
+/// A slot at the goal from which an outline that is sensed wrongly may keep its drone away.
+fn goal_beside_an_obstacle(scenario: &Scenario, shapes: &[(u32, ConvexShape)]) -> Option<String> {
+    let goal = scenario.mission.goal_m.filter(|_| scenario.mission.end == End::Goal)?;
+    let (error_m, clearance_m) = (scenario.sensors.obstacle_error_max_m, scenario.avoidance.clearance_m);
+    // The outline may be sensed nearer than it is, and the drone allows for one that is nearer than it is sensed.
+    let (away_m, arrived_m) = (clearance_m + 2.0 * error_m, scenario.mission.arrival_error_m);
+    let slots: Vec<Vec2> = scenario.slots().iter().map(|slot| slot + Vec2::from(goal)).collect();
+    let distances = slots.iter().enumerate().flat_map(|(number, &at)| {
+        let distance_m = move |shape| skein_agent::braking_filter::distance_m(shape, at, at);
+        shapes.iter().map(move |(id, shape)| (number, *id, distance_m(shape)))
+    });
+    let (number, obstacle, nearest_m) = distances.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    (nearest_m + arrived_m < away_m - 1e-6).then(|| {
+        let at = slots[number];
+        format!(
+            "goal slot {number} at [{:.3}, {:.3}] m is {nearest_m:.2} m from obstacle {obstacle}, but with \
+             sensors.obstacle_error_max_m = {error_m} m a drone may have to stay {away_m:.2} m away from it, and it arrives within \
+             mission.arrival_error_m = {arrived_m} m: the mission may not end; move mission.goal_m, or raise mission.arrival_error_m",
+            at.x, at.y
         )
     })
 }
@@ -376,6 +400,22 @@ mod tests {
     fn positions_that_are_too_uncertain_for_slots_are_warned_of() {
         assert!(warned("[sensors]\nposition_std_m = 0.5").contains("raise mission.arrival_error_m"));
         assert_eq!(warned("[sensors]\nposition_std_m = 0.5\n[mission]\narrival_error_m = 1"), "");
+    }
+
+    #[test]
+    fn a_goal_slot_that_a_wrong_outline_may_keep_free_is_warned_of() {
+        let beside = |keys: &str| {
+            warned(&format!(
+                "[formation]\ndrones = 3\nshape = \"line\"\nspacing_m = 60\n[mission]\nend = \"goal\"\ngoal_m = [600, 0]\n{keys}\
+                 [[obstacle]]\nshape = \"rectangle\"\nhalf_size_m = [30, 10]\ncentre_m = [600, 85.2]\n"
+            ))
+        };
+        assert_eq!(beside(""), "");
+        assert_eq!(beside("[sensors]\nobstacle_error_max_m = 0.4\n"), "");
+        let close = beside("[sensors]\nobstacle_error_max_m = 1.5\n");
+        assert!(close.starts_with("goal slot 1 at [600.000, 60.000] m is 15.20 m from obstacle 0"), "{close}");
+        assert!(close.contains("stay 18.00 m away") && close.contains("raise mission.arrival_error_m"), "{close}");
+        assert_eq!(beside("arrival_error_m = 3\n[sensors]\nobstacle_error_max_m = 1.5\n"), "");
     }
 
     #[test]
