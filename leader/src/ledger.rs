@@ -126,11 +126,11 @@ impl Ledger {
         self.obeyed.as_ref()?.parts.get(self.me)
     }
 
-    /// Whether the newest plan, as far as it was heard, has no assignment for this drone.
+    /// The newest plan, if it has no assignment for this drone, as far as it was heard.
     #[must_use]
-    pub fn is_left_out(&self) -> bool {
-        let newer = self.plan.as_ref().is_some_and(|plan| plan.id > self.stamp());
-        newer && !self.parts.contains(self.me)
+    pub fn left_out_of(&self) -> Option<PlanStamp> {
+        let newer = self.plan.as_ref().map(|plan| plan.id).filter(|id| *id > self.stamp());
+        newer.filter(|_| !self.parts.contains(self.me))
     }
 
     /// The sets that are being passed, in flight order.

@@ -9,7 +9,7 @@ use crate::params::Between;
 use crate::relays::Relays;
 use crate::tuning::{ARRIVED_S, BEHIND_S, LEFT_OUT_S};
 use skein_protocol::payload::Plan;
-use skein_protocol::{Ballot, DroneId, GroupId, Phase, SimTime, Vec2};
+use skein_protocol::{Ballot, DroneId, GroupId, Phase, PlanStamp, SimTime, Vec2};
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,6 +23,9 @@ pub(crate) struct Roles {
     transfer: Option<Transfer>,
     /// The leader's term and since when it has planned without this drone.
     left_out: Option<(Ballot, SimTime)>,
+    /// The newest plan without this drone for which it has claimed to lead. It claims once for each: two drones that both missed their
+    /// assignments would otherwise take over from each other for ever.
+    claimed_for: PlanStamp,
     /// Whether a drone obeys a plan of this leader's term that this leader never made. A new term ends that.
     plan_conflict_seen: bool,
 }
@@ -96,10 +99,11 @@ impl Roles {
     /// Either that leader hears no other drone: then the others wait as well, and those closer to the destination claim
     /// first. Or no drone hears this one: then its claim does not matter.
     fn scope_of_deaf_leader(&mut self, k: &Knowledge, now: SimTime, own: &OwnState) -> Option<GroupId> {
-        if k.election().leads() || !k.ledger().is_left_out() {
+        let plan = k.ledger().left_out_of().filter(|plan| !k.election().leads() && *plan > self.claimed_for);
+        let Some(plan) = plan else {
             self.left_out = None;
             return None;
-        }
+        };
         // Far from the leader, its neighbours notice first. And word takes longer there, to the leader and back.
         let patience_s = match k.election().hops() {
             0 => LEFT_OUT_S,
@@ -116,7 +120,11 @@ impl Roles {
         let mine = k.claim_key(own.position, k.me());
         let rivals = k.living_peers(now).filter(|m| m.id != leader && scope.contains(m.group));
         let rank = rivals.filter(|m| k.claim_key(m.position, m.id) < mine).count();
-        (waited_s >= k.election().wait_s() * rank as f64).then_some(scope)
+        let due = waited_s >= k.election().wait_s() * rank as f64;
+        if due {
+            self.claimed_for = plan;
+        }
+        due.then_some(scope)
     }
 
     /// The drone that is to take over from this leader. At once, if a sensor of this leader is broken and a follower is
