@@ -172,6 +172,15 @@ fn radio_too_weak(scenario: &Scenario) -> Option<String> {
     if radio.loss >= 1.0 {
         return Some("radio.loss = 1: no drone hears another one".to_owned());
     }
+    if radio.loss * (1.0 + radio.asymmetry) >= 1.0 {
+        return Some(format!(
+            "radio.loss = {} and radio.asymmetry = {}: the losses of a link differ by up to {} × in its two directions, so on some links no \
+             frame passes in one direction; lower one of them",
+            radio.loss,
+            radio.asymmetry,
+            (1.0 + radio.asymmetry).powi(2)
+        ));
+    }
     let messages = skein_agent::separation::messages(mission::drones(scenario));
     let (rate_bps, beacons_bps) = (radio.rate_bps?, scenario.beacons_bps(messages));
     (beacons_bps > rate_bps / 2.0).then(|| {
@@ -391,6 +400,8 @@ mod tests {
     #[test]
     fn a_radio_that_is_too_weak_is_warned_of() {
         assert!(warned("[radio]\nloss = 1").contains("no drone hears another one"));
+        assert!(warned("[radio]\nloss = 0.7\nasymmetry = 1").contains("no frame passes in one direction"));
+        assert_eq!(warned("[radio]\nloss = 0.7\nasymmetry = 0.4"), "");
         assert!(warned("[radio]\nrate_bps = 20_000").contains("raise radio.rate_bps"));
         assert_eq!(warned("[radio]\nrate_bps = 100_000"), "");
         assert_eq!(warned("[formation]\ndrones = 1\n[radio]\nloss = 1"), "");
