@@ -1,7 +1,7 @@
 //! Peers that are too far away to matter for a while. A drone hears all others, and looks only at those that may be near.
 
 use skein_leader::changes::Changes;
-use skein_protocol::{SimTime, Vec2};
+use skein_protocol::{SimTime, Vec2, prefetch};
 
 /// More than positions lose by rounding, m.
 const ROUNDING_M: f64 = 1e-6;
@@ -95,6 +95,20 @@ impl<T> DistantPeers<T> {
                 }
             }
         }
+    }
+
+    /// Fetches what [`Self::look`] and [`Self::visit`] read into the cache. `changes`: those of the peers.
+    pub(crate) fn warm(&self, changes: &Changes) {
+        prefetch(self.near.as_slice());
+        prefetch(self.copies.as_slice());
+        prefetch(self.blocks_m.as_slice());
+        let changed = changes.since(self.seen).into_iter().flatten();
+        changed.filter_map(|index| self.until_m.get(index)).for_each(prefetch);
+    }
+
+    /// What is kept of the peers that were within reach.
+    pub(crate) fn kept(&self) -> &[T] {
+        &self.copies
     }
 
     /// Visits the peers within reach, by index, with what is kept of them. `visit` returns how far away one is that has left it.

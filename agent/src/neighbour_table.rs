@@ -71,9 +71,18 @@ impl NeighbourTable {
         Self { params, distant: DistantPeers::default() }
     }
 
+    /// Fetches what [`Self::update`] reads into the cache: call it a short time before, when all messages are heard.
+    pub(crate) fn warm(&self, peers: &Peers) {
+        self.distant.warm(peers.changes());
+    }
+
     /// The neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
     pub(crate) fn update(&mut self, view: &NeighbourView<'_>) -> Few<Neighbour> {
         let senses = view.senses;
+        if view.places.iter().any(|place| place.set != 0) {
+            let ranged = senses.neighbours.iter().map(|sensed| sensed.drone);
+            ranged.chain(self.distant.kept().iter().map(|peer| peer.id)).for_each(|peer| view.peers.warm_queue(peer));
+        }
         let mut neighbours = Few::new();
         for sensed in senses.neighbours {
             neighbours.push(Neighbour {

@@ -10,6 +10,7 @@ use skein_leader::planned_set::PlannedSet;
 use skein_leader::routes::{Body, Routes};
 use skein_protocol::payload::{MAX_PLACES, QueuePlace};
 use skein_protocol::{DroneId, PlanStamp, Vec2};
+use std::cell::Cell;
 
 /// One set on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +52,16 @@ enum RouteState {
     Blocked,
 }
 
+/// A path through the corridor.
+#[derive(Clone, Copy, Debug)]
+struct Pulled {
+    /// Where it begins, world frame, m.
+    position: Vec2,
+    /// Abscissa up to which it is measured, m.
+    gate_x_m: f64,
+    steering: Steering,
+}
+
 /// The routes of one drone and the corridor through them.
 #[derive(Clone, Debug)]
 pub struct RouteFollower {
@@ -60,6 +71,8 @@ pub struct RouteFollower {
     squeeze: Option<f64>,
     legs: Vec<Leg>,
     corridor: Option<Corridor>,
+    /// The last path through the corridor. It is asked for several times per tick.
+    pulled: Cell<Option<Pulled>>,
     drawn_for: Option<DrawnFor>,
     /// Ordinate of the drone before it began to pass the sets ahead, m. A drone of a crowd returns to it.
     own_y_m: f64,
@@ -80,6 +93,7 @@ impl RouteFollower {
             squeeze,
             legs: Vec::new(),
             corridor: None,
+            pulled: Cell::new(None),
             drawn_for: None,
             own_y_m: course_y_m,
             detours: Vec::new(),
@@ -237,13 +251,22 @@ impl RouteFollower {
         let run_out_m = open.first().map_or(0.0, |passage| passage.routes.run_out_m());
         let end_y_m = self.squeeze.map_or(self.course_y_m, |_| self.own_y_m);
         let end = last_exit_x_m.map(|exit_x_m| Vec2::new(exit_x_m + run_out_m, end_y_m));
+        self.pulled.set(None);
         self.corridor = end.map(|end| Corridor::in_lanes(&open, &self.bodies, end));
     }
 
     /// Direction and remaining length of the path from `position` (world frame, m); `None` if nothing lies ahead.
     #[must_use]
     pub fn steering(&self, position: Vec2) -> Option<Steering> {
-        self.corridor.as_ref().map(|corridor| corridor.pull(position, self.first_gate_x_m()))
+        self.corridor.as_ref().map(|corridor| self.pull(corridor, position, self.first_gate_x_m()))
+    }
+
+    /// As [`Corridor::pull`], for this drone's corridor.
+    fn pull(&self, corridor: &Corridor, position: Vec2, gate_x_m: f64) -> Steering {
+        let known = self.pulled.get().filter(|known| (known.position, known.gate_x_m) == (position, gate_x_m));
+        let steering = known.map_or_else(|| corridor.pull(position, gate_x_m), |known| known.steering);
+        self.pulled.set(Some(Pulled { position, gate_x_m, steering }));
+        steering
     }
 
     /// Where the route ends, world frame, m; `None` if nothing lies ahead.
@@ -314,7 +337,7 @@ impl RouteFollower {
 
     fn remaining_m(&self, leg: &Leg, position: Vec2) -> f64 {
         match &self.corridor {
-            Some(corridor) if position.x < leg.gate_x_m => corridor.pull(position, leg.gate_x_m).to_gate_m,
+            Some(corridor) if position.x < leg.gate_x_m => self.pull(corridor, position, leg.gate_x_m).to_gate_m,
             _ => leg.gate_x_m - position.x,
         }
     }

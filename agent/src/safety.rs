@@ -10,7 +10,7 @@ use crate::program::{HalfPlane, Program};
 use skein_leader::geometry::nearest;
 use skein_protocol::scale::Scale;
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, Vec2};
+use skein_protocol::{DroneId, Vec2, prefetch};
 use smallvec::SmallVec;
 use std::collections::VecDeque;
 
@@ -140,6 +140,13 @@ impl Safety {
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
         Self { params, program: Program::default(), expected: VecDeque::new(), velocities: Vec::new() }
+    }
+
+    /// Fetches what [`Self::filter`] reads into the cache: call it a short time before.
+    pub(crate) fn warm(&self) {
+        prefetch(self.velocities.as_slice());
+        // The oldest one is written anew, and the next one is due.
+        self.expected.iter().take(2).for_each(|expected| prefetch(expected.as_slice()));
     }
 
     /// The present constants of the filter.

@@ -611,6 +611,8 @@ impl SwarmPilot {
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(self.params.drones, message);
         }
+        self.neighbours.warm(self.leading.peers());
+        self.safety.warm();
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
         let safety = self.params.safety;

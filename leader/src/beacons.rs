@@ -3,9 +3,8 @@
 
 use crate::shared_values::SharedValues;
 use skein_protocol::payload::{MAX_PLACES, POSE_BEFORE, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
-use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, horizontal};
+use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, horizontal, prefetch};
 use std::fmt;
-use std::hint::black_box;
 
 /// One beacon per index. Every value of every beacon is kept as it was heard.
 #[derive(Clone, Default)]
@@ -71,10 +70,24 @@ impl Beacons {
         Beacon { beacons: self, state: &self.states[index], index }
     }
 
-    /// Reads a beacon, so that it is in the cache.
+    /// Fetches a beacon into the cache.
     #[inline]
     pub(crate) fn warm(&self, index: usize) {
-        black_box((self.stamps[index], self.states[index].hears));
+        self.warm_stamp(index);
+        prefetch(&self.states[index]);
+    }
+
+    /// Fetches the time stamp of a beacon into the cache.
+    #[inline]
+    pub(crate) fn warm_stamp(&self, index: usize) {
+        prefetch(&self.stamps[index]);
+    }
+
+    /// Fetches the places in queues of a beacon into the cache.
+    #[inline]
+    pub(crate) fn warm_queue(&self, index: usize) {
+        prefetch(&self.states[index]);
+        self.queues.iter().filter_map(|queue| queue.get(index)).for_each(prefetch);
     }
 
     /// All beacons, by index.

@@ -2,7 +2,7 @@
 
 use crate::beacon_pace::BeaconPace;
 use crate::beacons::Beacon;
-use crate::gossip::Gossip;
+use crate::gossip::{Gossip, GossipRhythm};
 use crate::knowledge::Knowledge;
 use crate::news::News;
 use crate::obstacles::{Obstacles, set_array, set_ids};
@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Broadcaster {
     pace: BeaconPace,
     repeat_s: f64,
+    rhythm: GossipRhythm,
     /// Time that one assignment takes in a leader's share of the bandwidth, s.
     part_s: f64,
     /// When each known obstacle is said again.
@@ -73,10 +74,11 @@ impl Broadcaster {
         Self {
             pace: BeaconPace::new(params),
             repeat_s,
+            rhythm: GossipRhythm::steady(repeat_s, params.me),
             part_s: params.leader_frame_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
             outlines: 0,
-            passed: Gossip::new(params.start, repeat_s, params.me),
+            passed: Gossip::new(params.start),
             term: Ballot::NONE,
             next_repeat: params.start,
             announced: PlanStamp::default(),
@@ -118,6 +120,7 @@ impl Broadcaster {
             let beacon = pose(k, now, own, places);
             let heard = if relays.is_wide() { k.peers().direct_count() } else { 0 };
             if self.pace.is_due(own.tick, News::of(&beacon), heard) {
+                k.peers().warm_near();
                 let hears = k.peers().hears(k.me(), now);
                 relays.look(k, now, own, self.pace.period_s(), hears);
                 say.push(Message::Pose(Pose { hears, ..beacon }));
@@ -135,7 +138,7 @@ impl Broadcaster {
             self.next_repeat = self.next_repeat.max(now.after(paced as f64 * self.part_s));
         }
         self.say_obstacles(k, now, relays.is_wide(), say);
-        if self.passed.is_due(now) {
+        if self.passed.is_due(&self.rhythm, now) {
             say_passed(k, now, own, say);
         }
         relays.speak(k, now, say);
@@ -146,12 +149,12 @@ impl Broadcaster {
     fn say_obstacles(&mut self, k: &Knowledge, now: SimTime, wide: bool, say: &mut Vec<Message>) {
         if std::mem::replace(&mut self.outlines, k.obstacles().changes()) != k.obstacles().changes() {
             for (id, known) in k.obstacles().iter() {
-                let (me, repeat_s) = (k.me(), self.repeat_s);
+                let me = k.me();
                 let told = self.obstacles.entry(id).or_insert_with(|| {
                     if known.witness == me {
                         say.extend(obstacle(k.obstacles(), id));
                     }
-                    Retelling { gossip: Gossip::new(now, repeat_s, me), growths: known.growths }
+                    Retelling { gossip: Gossip::new(now), growths: known.growths }
                 });
                 if std::mem::replace(&mut told.growths, known.growths) != known.growths {
                     told.gossip.restart(now);
@@ -159,7 +162,7 @@ impl Broadcaster {
             }
         }
         for (&id, told) in &mut self.obstacles {
-            if told.gossip.is_due(now)
+            if told.gossip.is_due(&self.rhythm, now)
                 && (is_open(k, id) || told.is_news(k, now, id) || (wide && is_missed(k, now, id)))
             {
                 say.extend(obstacle(k.obstacles(), id));

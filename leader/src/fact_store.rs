@@ -2,9 +2,8 @@
 //! search.
 
 use crate::subject::Subject;
-use skein_protocol::{DroneId, GroupId, SimTime};
+use skein_protocol::{DroneId, GroupId, prefetch};
 use std::collections::BTreeMap;
-use std::hint::black_box;
 
 /// At most one entry per subject.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,10 +46,10 @@ impl<T> FactStore<T> {
         self.of_drones.get(drone).is_some_and(|entries| entries.iter().any(|(about, _)| about == subject))
     }
 
-    /// Reads something of what is about a drone, so that it is in the cache.
+    /// Fetches what is about a drone into the cache.
     #[inline]
-    pub(crate) fn warm(&self, drone: DroneId, read: impl Fn(&T) -> SimTime) {
-        black_box(self.of_drones.get(drone.index()).and_then(|entries| entries.first()).map(|(_, entry)| read(entry)));
+    pub(crate) fn warm(&self, drone: DroneId) {
+        self.of_drones.get(drone.index()).into_iter().for_each(|entries| prefetch(entries.as_slice()));
     }
 
     /// Adds an entry, or replaces the one of the same subject.

@@ -26,7 +26,6 @@ use crate::situation::Situation;
 use skein_protocol::payload::{Assignment, Leadership, MAX_PLACES, Presence, QueuePlace};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
-use std::hint::black_box;
 
 /// From this number of drones on, what a drone knows of the others may not be in the cache. Chosen by hand.
 const LARGE: u32 = 64;
@@ -197,8 +196,8 @@ impl Leading {
         self.ledger().united(self.first_term(), &flown)
     }
 
-    /// Reads what these messages will be compared with: a large swarm does not fit into a cache, and reads that do not depend on each
-    /// other take as long as one. Without any other effect. Call before [`Self::hear`].
+    /// Fetches what these messages will be compared with into the cache: a large swarm does not fit into it, and reads that are begun together
+    /// take as long as one. Without any other effect. Call before [`Self::hear`].
     pub fn expect<'m>(&self, heard: impl Iterator<Item = (DroneId, MessageRef<'m>)> + Clone) {
         if self.drones < LARGE {
             return;
@@ -209,7 +208,7 @@ impl Leading {
             peers.warm(source);
             match message {
                 MessageRef::Presence(presence) => presence.present().iter().for_each(|present| {
-                    black_box(stamp_of(present.drone));
+                    peers.warm_stamp(present.drone);
                 }),
                 _ => self.relays.warm_facts(source, message),
             }

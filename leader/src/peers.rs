@@ -3,11 +3,11 @@
 use crate::adaptive_timeout::AdaptiveTimeout;
 use crate::beacons::{Beacon, Beacons};
 use crate::changes::Changes;
+use crate::quiet_blocks::QuietBlocks;
 use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS, RELAYED_TIMEOUTS};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
-use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime};
-use std::hint::black_box;
+use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, prefetch};
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -85,10 +85,8 @@ pub struct Peers {
     base: Timeouts,
     /// Running mean of the beacons' delay, s.
     delay_s: f64,
-    /// None of `near` is silent for too long until then.
-    near_quiet_until: SimTime,
-    /// None of the other peers is, until then.
-    far_quiet_until: SimTime,
+    /// Until when none of them is silent for too long.
+    quiet: QuietBlocks,
     /// When peers are looked at again.
     next_look: SimTime,
     /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
@@ -117,8 +115,7 @@ impl Peers {
             drones,
             base: Timeouts { direct_s: timeout_s, relayed_s: timeout_s },
             delay_s: 0.0,
-            near_quiet_until: SimTime::MAX,
-            far_quiet_until: SimTime::MAX,
+            quiet: QuietBlocks::default(),
             next_look: SimTime::ZERO,
             ids: Vec::new(),
             all_but: None,
@@ -166,8 +163,8 @@ impl Peers {
                 }
                 let timeout = self.prior(now, direct.is_some());
                 let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
-                self.note_quiet(&peer);
                 self.ids.insert(place, source);
+                self.quiet.insert(place, peer.lives_until(self.base), self.ids.len());
                 self.all_but = None;
                 self.beacons.insert(place, &pose);
                 self.last.insert(place, peer);
@@ -184,8 +181,8 @@ impl Peers {
                 peer.timeout.hear(now, 0.0, longest_s);
                 self.beacons.replace(place, &pose);
                 self.changes.note(place);
-                let peer = *peer;
-                self.note_quiet(&peer);
+                let until = peer.lives_until(self.base);
+                self.quiet.note(place, until);
                 if direct.is_some() {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
                 }
@@ -210,43 +207,29 @@ impl Peers {
         if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.base.relayed_s) }
     }
 
-    /// Notes that a peer was heard.
-    fn note_quiet(&mut self, peer: &Peer) {
-        let until = if peer.is_relayed() { &mut self.far_quiet_until } else { &mut self.near_quiet_until };
-        *until = (*until).min(peer.lives_until(self.base));
-    }
-
-    /// Finds out anew until when no peer is silent for too long. In a wide swarm most peers are far away. They may be silent for longer, and all of
-    /// them are looked at less often.
+    /// Finds out anew until when no peer is silent for too long. In a wide swarm most peers are far away. They may be silent for longer, and
+    /// they are looked at less often.
     fn look_for_silence(&mut self, now: SimTime) {
         self.next_look = now.after(LOOK_TIMEOUTS * self.base.direct_s);
         self.look_near(now);
-        if self.far_quiet_until < self.next_look {
-            self.look_far(now);
-        }
+        let (last, base) = (&self.last, self.base);
+        self.quiet.look(self.next_look, last.len(), |place| last[place].lives_until(base));
         self.all_but = self.all_but.or_else(|| lowest_but_one(&self.ids));
         self.beacons.tidy();
     }
 
     fn look_near(&mut self, now: SimTime) {
         let mut near = std::mem::take(&mut self.near);
-        (self.near_quiet_until, self.direct_until) = (SimTime::MAX, SimTime::MAX);
+        self.direct_until = SimTime::MAX;
         near.retain(|id| {
             let Some(peer) = self.get(*id).copied() else { return false };
-            let (quiet_until, stays) = (peer.lives_until(self.base), !self.is_far(&peer, now));
-            let until = if stays { &mut self.near_quiet_until } else { &mut self.far_quiet_until };
-            *until = (*until).min(quiet_until);
+            let stays = !self.is_far(&peer, now);
             if stays {
                 self.direct_until = self.direct_until.min(self.certain_until(peer.direct));
             }
             stays
         });
         self.near = near;
-    }
-
-    fn look_far(&mut self, now: SimTime) {
-        let far = self.last.iter().filter(|peer| self.is_far(peer, now));
-        self.far_quiet_until = far.map(|peer| peer.lives_until(self.base)).min().unwrap_or(SimTime::MAX);
     }
 
     /// Whether a peer certainly does not count as heard without a relay: no silence is significant only after longer.
@@ -257,11 +240,6 @@ impl Peers {
     /// Until when a peer that is heard at this time certainly counts as heard.
     fn certain_until(&self, heard: SimTime) -> SimTime {
         heard + ((self.base.direct_s - ROUNDING_S) * 1e9) as i64
-    }
-
-    /// Whether no peer is silent for too long, which needs no look at each.
-    fn all_live(&self, now: SimTime) -> bool {
-        now <= self.near_quiet_until.min(self.far_quiet_until)
     }
 
     /// The index of a peer, or where it belongs. Once all drones have been heard, no search is needed: the index is the id,
@@ -281,13 +259,33 @@ impl Peers {
         self.place(peer).ok().map(|place| &self.last[place])
     }
 
-    /// Reads all about a peer, so that it is in the cache.
+    /// Fetches all about a peer into the cache.
     #[inline]
     pub(crate) fn warm(&self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.beacons.warm(place);
-            let Peer { timeout, direct } = &self.last[place];
-            black_box((timeout.last(), *direct));
+            prefetch(&self.last[place]);
+        }
+    }
+
+    /// Fetches a peer's places in queues into the cache.
+    #[inline]
+    pub fn warm_queue(&self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.beacons.warm_queue(place);
+        }
+    }
+
+    /// Fetches all about the peers that may count as heard without a relay into the cache.
+    pub(crate) fn warm_near(&self) {
+        self.near.iter().for_each(|peer| self.warm(*peer));
+    }
+
+    /// Fetches the time stamp of a peer's last beacon into the cache.
+    #[inline]
+    pub(crate) fn warm_stamp(&self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.beacons.warm_stamp(place);
         }
     }
 
@@ -353,6 +351,7 @@ impl Peers {
             self.all_but = None;
             self.beacons.remove(place);
             self.last.remove(place);
+            self.quiet.remove(place, self.ids.len());
             self.changes.note_moved(self.ids.len());
             self.near.retain(|near| *near != peer);
         }
@@ -399,16 +398,16 @@ impl Peers {
 
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
-        let all = self.all_live(now);
-        let living = self.known().filter(move |(_, known, _)| all || known.lives(now, self.base));
-        living.map(|(id, _, beacon)| (id, beacon))
+        let all = self.quiet.are_quiet(now);
+        let lives = move |place, peer: &Peer| all || self.quiet.is_quiet(place, now) || peer.lives(now, self.base);
+        let living = self.known().enumerate().filter(move |&(place, (_, known, _))| lives(place, known));
+        living.map(|(_, (id, _, beacon))| (id, beacon))
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
-        let some = if self.all_live(now) { 0 } else { self.ids.len() };
-        let silent = self.known().take(some).filter(move |(_, known, _)| !known.lives(now, self.base));
-        silent.map(|(id, _, beacon)| (id, beacon))
+        let suspects = self.quiet.suspects(now, self.ids.len());
+        suspects.filter(move |&place| !self.last[place].lives(now, self.base)).map(|place| self.at(place))
     }
 
     /// The time stamps of the last beacons of all peers ever heard, by id, without the beacons themselves.
@@ -448,7 +447,7 @@ impl Peers {
     /// If there is no such peer.
     #[must_use]
     pub fn is_living_at(&self, index: usize, now: SimTime) -> bool {
-        self.all_live(now) || self.last[index].lives(now, self.base)
+        self.quiet.is_quiet(index, now) || self.last[index].lives(now, self.base)
     }
 
     /// Adds how old the last beacons of living peers are, s. Of more than 64 peers it looks at 64, in turn from the one at the index `first`

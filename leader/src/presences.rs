@@ -8,10 +8,9 @@ use crate::tuning::{
 };
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::{MAX_PRESENT, Pose, Presence, Present};
-use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, PlanStamp, SimTime, prefetch};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::hint::black_box;
 
 /// What the drones of one frame have in common.
 type Kind = (PlanStamp, GroupId, Ballot);
@@ -157,10 +156,10 @@ impl Presences {
         }
     }
 
-    /// Reads what was said of a drone, so that it is in the cache.
+    /// Fetches what was said of a drone into the cache.
     #[inline]
     pub(crate) fn warm(&self, drone: DroneId) {
-        black_box(self.told.get(drone.index()).map(|told| told.left));
+        self.told.get(drone.index()).into_iter().for_each(prefetch);
     }
 
     /// Says the states that are due, if it is this drone's turn, in at most `frames`.
@@ -198,15 +197,20 @@ impl Presences {
     /// that are equally urgent. Drones close to each other begin at different ones, so that they do not all say the same at one time.
     fn due(&self, k: &Knowledge, now: SimTime, first: u32) -> BTreeMap<Kind, Vec<Due>> {
         let period_s = self.period_s * self.thinning;
-        let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();
+        let (period, overdue) = (least_span(period_s), least_span(PRESENCE_OVERDUE * period_s));
+        let mut found = Vec::new();
         for (id, stamp) in k.peers().ids().iter().copied().zip(k.peers().stamps()) {
-            let Some(told) = self.told.get(id.index()).filter(|told| told.known) else { continue };
-            let silent_s = now.since(told.covered);
-            let overdue = told.left > 0 || silent_s >= PRESENCE_OVERDUE * period_s;
+            let Some(told) = self.told.get(id.index()) else { continue };
+            // Without a branch for each condition, because this is done for all drones.
+            let is_overdue = (told.left > 0) | (now.0.saturating_sub(told.covered.0) >= overdue);
             // Few are due, and what is known of a drone is looked up for those only: it is in memory that is not in the cache.
-            if !overdue && stamp.since(told.said) < period_s {
-                continue;
+            if told.known & (is_overdue | (stamp.0.saturating_sub(told.said.0) >= period)) {
+                k.peers().warm(id);
+                found.push((id, now.since(told.covered)));
             }
+        }
+        let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();
+        for (id, silent_s) in found {
             if let Some(pose) = k.peers().last_of_living(id, now) {
                 let waits = Reverse((silent_s * WAITS_PER_PERIOD / self.period_s) as u32);
                 let turn = (id.0 + self.drones - first) % self.drones;
@@ -217,6 +221,19 @@ impl Presences {
         due.values_mut().for_each(|drones| drones.sort_unstable());
         due
     }
+}
+
+/// The least difference of two times that [`SimTime::since`] says is at least so many seconds, ns.
+fn least_span(seconds: f64) -> i64 {
+    let since = |span: i64| SimTime(span).since(SimTime::ZERO);
+    let mut span = (seconds * 1e9) as i64;
+    while span > i64::MIN && since(span) >= seconds {
+        span -= 1;
+    }
+    while span < i64::MAX && since(span) < seconds {
+        span += 1;
+    }
+    span
 }
 
 /// A state that is due, in the order of urgency.
@@ -239,5 +256,20 @@ fn present(drone: DroneId, pose: &Pose) -> Present {
         flags: pose.flags,
         position_m: pose.position_m.map(|value| value as f32),
         velocity_mps: [velocity.x as f32, velocity.y as f32],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_span_is_the_least_that_counts_as_so_many_seconds() {
+        for seconds in (0..2000).map(|step| f64::from(step) * 0.0123_f64.powi(step % 3) / 7.0) {
+            let span = least_span(seconds);
+            let since = |span| SimTime(span).since(SimTime::ZERO);
+            assert!(since(span) >= seconds && since(span - 1) < seconds, "{seconds} s: {span} ns");
+        }
+        assert_eq!(least_span(f64::INFINITY), i64::MAX);
     }
 }

@@ -4,34 +4,18 @@
 
 use crate::beacons::Beacon;
 use crate::fact_store::FactStore;
-use crate::gossip::Gossip;
+use crate::fact_values::{Fact, FactValues, Version};
+use crate::gossip::{Gossip, GossipRhythm};
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
 use crate::subject::Subject;
 use crate::tuning::{DETOUR_DOUBLINGS, PASSAGES, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
-use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, Passed, Plan};
+use skein_protocol::payload::{Assignment, Plan};
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, SimTime, Vec2};
 
-/// Of the messages whose turn has come, that many are read into the cache at once. Chosen by hand: few, because the rest may have to wait.
+/// Of the messages whose turn has come, that many are fetched into the cache at once. Chosen by hand: few, because the rest may have to wait.
 const DUE_AT_ONCE: usize = 32;
-
-/// Which of two messages about the same subject is newer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct Version {
-    ballot: Ballot,
-    epoch: u32,
-    stamp: SimTime,
-}
-
-/// What a message says. Most are assignments, so the others are elsewhere.
-#[derive(Clone, Debug, PartialEq)]
-enum Fact {
-    Plan(Box<Plan>),
-    Part(Assignment),
-    Arrivals(Box<Arrivals>),
-    Passed(Box<Passed>),
-}
 
 /// Whether some drone needs a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,26 +28,29 @@ enum Need {
 }
 
 /// A message that may be passed on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 struct Relayed {
     fact: Fact,
-    version: Version,
     /// The drone it was first heard from.
     from: DroneId,
     /// When it was last heard.
     heard: SimTime,
     gossip: Gossip,
-    /// When it is looked at next; `None` if it need not be passed on again, unless [`RelayedFacts::wake`] is called.
-    turn: Option<SimTime>,
+    /// When it is looked at next; [`NO_TURN`] if it need not be passed on again, unless [`RelayedFacts::wake`] is called.
+    turn: SimTime,
 }
 
+/// The turn of a message that need not be passed on.
+const NO_TURN: SimTime = SimTime::MAX;
+
 /// The messages that one drone may pass on. Memory is bounded by the size of the swarm.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct RelayedFacts {
-    me: DroneId,
+    rhythm: GossipRhythm,
     repeat_s: f64,
     room: usize,
     known: FactStore<Relayed>,
+    values: FactValues,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
     /// No message is forgotten earlier than [`RELAY_MEMORY_S`] after this.
@@ -76,12 +63,13 @@ pub(crate) struct RelayedFacts {
 impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
-        let (me, repeat_s, room) = (params.me, params.repeat_period_s, 8 * params.drones as usize + 64);
+        let repeat_s = params.repeat_period_s;
         Self {
-            me,
+            rhythm: GossipRhythm::varying(repeat_s, params.me),
             repeat_s,
-            room,
+            room: 8 * params.drones as usize + 64,
             known: FactStore::new(params.drones),
+            values: FactValues::default(),
             turns: Turns::default(),
             heard_since: params.start,
             passage_s: passage_s(params.drones),
@@ -91,6 +79,7 @@ impl RelayedFacts {
     /// Forgets all.
     pub(crate) fn clear(&mut self) {
         self.known.clear();
+        self.values = FactValues::default();
         self.turns.clear();
     }
 
@@ -107,6 +96,8 @@ impl RelayedFacts {
             let stays = now.since(one.heard) < memory_s;
             if stays {
                 self.heard_since = self.heard_since.min(one.heard.after(memory_s - RELAY_MEMORY_S));
+            } else {
+                self.values.release(&one.fact);
             }
             stays
         };
@@ -115,9 +106,9 @@ impl RelayedFacts {
         }
     }
 
-    /// Reads what is kept of the drones that a message of `source` is about, so that it is in the cache.
+    /// Fetches what is kept of the drones that a message of `source` is about into the cache.
     pub(crate) fn warm(&self, source: DroneId, message: MessageRef<'_>) {
-        let warm = |drone| self.known.warm(drone, |one| one.heard);
+        let warm = |drone| self.known.warm(drone);
         match message {
             MessageRef::Assignment(part) => warm(part.drone),
             MessageRef::AssignmentList(list) => list.assignments().for_each(|part| warm(part.drone)),
@@ -130,32 +121,43 @@ impl RelayedFacts {
     /// Notes a message of `source`. `near`: that drone is close to this one.
     pub(crate) fn hear(&mut self, now: SimTime, source: DroneId, message: MessageRef<'_>, near: bool) {
         let Some((subject, version)) = subject(source, message) else { return };
-        let known = self.known.get_mut(&subject);
-        if let Some(one) = known.filter(|one| one.version >= version || is_same_passage(&one.fact, message)) {
-            if one.version == version {
+        let full = self.known.len() >= self.room;
+        let mut old = self.known.get_mut(&subject);
+        if let Some(one) = &mut old {
+            let known = self.values.version(&one.fact);
+            if known == version {
                 one.heard = now;
                 if near {
                     one.gossip.hear();
                 }
             }
+            if known >= version || self.values.is_same_passage(&one.fact, message) {
+                return;
+            }
+        } else if full {
             return;
         }
-        let old = self.known.get_mut(&subject).map(|one| one.turn);
-        let Some(fact) = fact(message).filter(|_| old.is_some() || self.known.len() < self.room) else { return };
-        if let Some(turn) = old.flatten() {
-            self.turns.remove(turn, subject);
+        let Some(fact) = self.values.fact(message) else { return };
+        let gossip = Gossip::new(now);
+        let turn = gossip.next_turn(&self.rhythm);
+        let new = Relayed { fact, from: source, heard: now, gossip, turn };
+        if let Some(one) = old {
+            let one = std::mem::replace(one, new);
+            self.values.release(&one.fact);
+            if one.turn != NO_TURN {
+                self.turns.remove(one.turn, subject);
+            }
+        } else {
+            self.known.insert(subject, new);
         }
-        let gossip = Gossip::varying(now, self.repeat_s, self.me);
-        let turn = gossip.next_turn();
         self.turns.add(turn, subject);
-        self.known.insert(subject, Relayed { fact, version, from: source, heard: now, gossip, turn: Some(turn) });
     }
 
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
-        let turn = Gossip::varying(now, self.repeat_s, self.me).next_turn();
-        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn.is_none()) {
-            one.turn = Some(turn);
+        let turn = Gossip::new(now).next_turn(&self.rhythm);
+        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn == NO_TURN) {
+            one.turn = turn;
             self.turns.add(turn, Subject::Part(scope, drone));
         }
     }
@@ -165,54 +167,44 @@ impl RelayedFacts {
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
         for subject in self.turns.due(now).take(DUE_AT_ONCE).filter(|_| say.len() < last) {
             if let Subject::Part(_, drone) = subject {
-                self.known.warm(drone, |one| one.heard);
+                self.known.warm(drone);
                 k.peers().warm(drone);
             }
         }
         let first = say.len();
         while let Some(subject) = self.turns.first_due(now) {
-            let open = self.known.get_mut(&subject).and_then(|one| open_list(&say[first..], &one.fact));
+            let one = self.known.get_mut(&subject);
+            let part = one.as_ref().and_then(|one| self.values.assignment_of(&one.fact, subject));
+            let open = part.and_then(|part| open_list(&say[first..], &part));
             if open.is_none() && say.len() >= last {
                 break;
             }
             self.turns.take_due(now);
-            let Some(one) = self.known.get_mut(&subject) else { continue };
-            let need = need(k, now, subject, one);
-            if need == Need::Now && one.gossip.is_due(now) && is_on_the_way(k, position, one) {
-                match (open.and_then(|place| say.get_mut(first + place)), &one.fact) {
-                    (Some(Message::AssignmentList(list)), Fact::Part(part)) => drop(list.push(part)),
-                    _ => say.push(one.passed_on()),
+            let Some(one) = one else { continue };
+            let need = need(k, now, subject, part, one);
+            if need == Need::Now && one.gossip.is_due(&self.rhythm, now) && is_on_the_way(k, position, part, one) {
+                match (open.and_then(|place| say.get_mut(first + place)), part) {
+                    (Some(Message::AssignmentList(list)), Some(part)) => drop(list.push(&part)),
+                    _ => say.extend(self.values.passed_on(&one.fact, subject)),
                 }
             }
-            one.turn = one.next_look(now, need, self.repeat_s);
-            if let Some(turn) = one.turn {
-                self.turns.add(turn, subject);
+            one.turn = one.next_look(&self.rhythm, now, need, self.repeat_s);
+            if one.turn != NO_TURN {
+                self.turns.add(one.turn, subject);
             }
         }
     }
 }
 
 impl Relayed {
-    /// When the message is looked at again after a look at `now`.
-    fn next_look(&self, now: SimTime, need: Need, repeat_s: f64) -> Option<SimTime> {
+    /// When the message is looked at again after a look at `now`, or [`NO_TURN`].
+    fn next_look(&self, rhythm: &GossipRhythm, now: SimTime, need: Need, repeat_s: f64) -> SimTime {
         match (&self.fact, need) {
-            (Fact::Arrivals(_) | Fact::Passed(_), _) if !self.gossip.is_first() => None,
-            (_, Need::Over) => None,
-            (Fact::Plan(_), Need::Later) => Some(now.after(repeat_s)),
-            (_, Need::Later) => Some(now.after(repeat_s * UNWANTED_REPEATS)),
-            (_, Need::Now) => Some(self.gossip.next_turn().max(SimTime(now.0 + 1))),
-        }
-    }
-
-    /// The message as it is passed on.
-    fn passed_on(&self) -> Message {
-        match &self.fact {
-            Fact::Plan(plan) => Message::Plan(**plan),
-            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(part)),
-            Fact::Arrivals(row) => Message::Arrivals(**row),
-            Fact::Passed(passed) => {
-                Message::Passed(Passed { of: passed.drone(self.from).0.saturating_add(1), ..**passed })
-            }
+            (Fact::Arrivals(_) | Fact::Passed(_), _) if !self.gossip.is_first() => NO_TURN,
+            (_, Need::Over) => NO_TURN,
+            (Fact::Plan(_), Need::Later) => now.after(repeat_s),
+            (_, Need::Later) => now.after(repeat_s * UNWANTED_REPEATS),
+            (_, Need::Now) => self.gossip.next_turn(rhythm).max(SimTime(now.0 + 1)),
         }
     }
 }
@@ -223,66 +215,41 @@ fn passage_s(drones: u32) -> f64 {
 }
 
 /// The place among these messages of a list with room for this assignment.
-fn open_list(said: &[Message], fact: &Fact) -> Option<usize> {
-    let Fact::Part(part) = fact else { return None };
+fn open_list(said: &[Message], part: &Assignment) -> Option<usize> {
     said.iter().position(|message| matches!(message, Message::AssignmentList(list) if list.takes(part)))
 }
 
 /// What a message is about, and its version; `None` if it is not passed on.
 fn subject(source: DroneId, message: MessageRef<'_>) -> Option<(Subject, Version)> {
-    let at = |stamp| Version { stamp, ..Version::default() };
     Some(match message {
-        MessageRef::Plan(plan) => {
-            let version = Version { ballot: plan.id.ballot, epoch: plan.id.epoch, ..Version::default() };
-            (Subject::Plan(plan.group), version)
-        }
-        MessageRef::Assignment(part) => {
-            let version = Version { ballot: part.id.ballot, epoch: part.id.epoch, ..Version::default() };
-            (Subject::Part(part.scope, part.drone), version)
-        }
-        MessageRef::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), at(row.stamp)),
-        MessageRef::Passed(passed) => (Subject::Passed(passed.drone(source)), at(passed.stamp)),
+        MessageRef::Plan(plan) => (Subject::Plan(plan.group), Version::of(plan.id)),
+        MessageRef::Assignment(part) => (Subject::Part(part.scope, part.drone), Version::of(part.id)),
+        MessageRef::Arrivals(row) => (Subject::Arrivals(row.kind, row.drone), Version::at(row.stamp)),
+        MessageRef::Passed(passed) => (Subject::Passed(passed.drone(source)), Version::at(passed.stamp)),
         _ => return None,
     })
 }
 
-/// What a message says; `None` if it is not passed on.
-fn fact(message: MessageRef<'_>) -> Option<Fact> {
-    Some(match message {
-        MessageRef::Plan(plan) => Fact::Plan(Box::new(*plan)),
-        MessageRef::Assignment(part) => Fact::Part(*part),
-        MessageRef::Arrivals(row) => Fact::Arrivals(Box::new(*row)),
-        MessageRef::Passed(passed) => Fact::Passed(Box::new(*passed)),
-        _ => return None,
-    })
-}
-
-/// Whether both messages report that a drone has passed the same obstacles.
-fn is_same_passage(known: &Fact, heard: MessageRef<'_>) -> bool {
-    matches!((known, heard), (Fact::Passed(a), MessageRef::Passed(b)) if a.set_count == b.set_count && a.set == b.set)
-}
-
-/// Whether some drone may still need the message.
-fn need(k: &Knowledge, now: SimTime, subject: Subject, one: &Relayed) -> Need {
+/// Whether some drone may still need the message. `part`: the assignment that it brings.
+fn need(k: &Knowledge, now: SimTime, subject: Subject, part: Option<Assignment>, one: &Relayed) -> Need {
     let now_or_later = |wanted| if wanted { Need::Now } else { Need::Later };
-    match (subject, &one.fact) {
-        (Subject::Plan(scope), Fact::Plan(plan)) => now_or_later(is_plan_wanted(k, now, scope, plan)),
-        (Subject::Part(..), Fact::Part(part)) => match k.peers().last_of_living(part.drone, now) {
-            Some(pose) if is_late(&pose, part.id.ballot, part.id.epoch) => Need::Now,
-            // Unless it was said, it is said once if the drone falls silent.
-            Some(_) if one.gossip.is_first() => Need::Later,
-            Some(_) => Need::Over,
-            None => now_or_later(one.gossip.is_first()),
-        },
-        _ => now_or_later(one.gossip.is_first()),
+    if let (Subject::Plan(scope), Fact::Plan(plan)) = (subject, &one.fact) {
+        return now_or_later(is_plan_wanted(k, now, scope, plan));
+    }
+    let Some(part) = part else { return now_or_later(one.gossip.is_first()) };
+    match k.peers().last_of_living(part.drone, now) {
+        Some(pose) if is_late(&pose, part.id.ballot, part.id.epoch) => Need::Now,
+        // Unless it was said, it is said once if the drone falls silent.
+        Some(_) if one.gossip.is_first() => Need::Later,
+        Some(_) => Need::Over,
+        None => now_or_later(one.gossip.is_first()),
     }
 }
 
 /// Whether this drone, which is at `position`, is closer to the drone that a message is for than the one it heard it from. In the end
-/// the message is passed on in all directions.
-fn is_on_the_way(k: &Knowledge, position: Vec2, one: &Relayed) -> bool {
-    let Fact::Part(part) = &one.fact else { return true };
-    let Some(pose) = k.peers().last(part.drone) else { return true };
+/// the message is passed on in all directions. `part`: the assignment that it brings.
+fn is_on_the_way(k: &Knowledge, position: Vec2, part: Option<Assignment>, one: &Relayed) -> bool {
+    let Some(pose) = part.and_then(|part| k.peers().last(part.drone)) else { return true };
     let away_m = |from: Vec2| (from - pose.position()).norm();
     let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
     one.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
@@ -303,14 +270,16 @@ fn is_late(pose: &Beacon<'_>, ballot: Ballot, epoch: u32) -> bool {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use skein_protocol::payload::Passed;
 
     #[test]
     fn each_message_is_forgotten_when_it_was_not_heard_for_long() {
         let mut facts = RelayedFacts {
-            me: DroneId(8),
+            rhythm: GossipRhythm::varying(0.2, DroneId(8)),
             repeat_s: 0.2,
             room: 64,
             known: FactStore::new(8),
+            values: FactValues::default(),
             turns: Turns::default(),
             heard_since: SimTime::ZERO,
             passage_s: RELAY_MEMORY_S,
@@ -339,13 +308,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_kept_of_a_drone_is_small() {
+        // Each drone of a swarm of a thousand keeps up to three entries about each other drone.
+        assert_eq!(size_of::<(Subject, Relayed)>(), 96);
+    }
+
+    #[test]
     fn a_passage_is_passed_on_less_often_in_a_large_swarm() {
         let passed_on = |drones: u32| {
             let mut facts = RelayedFacts {
-                me: DroneId(8),
+                rhythm: GossipRhythm::varying(0.2, DroneId(8)),
                 repeat_s: 0.2,
                 room: 64,
                 known: FactStore::new(9),
+                values: FactValues::default(),
                 turns: Turns::default(),
                 heard_since: SimTime::ZERO,
                 passage_s: passage_s(drones),

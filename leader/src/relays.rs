@@ -29,14 +29,13 @@ use skein_protocol::payload::{Leadership, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, MessageRef, SimTime, Vec2};
 
 /// What one drone passes on. Memory is bounded by the size of the swarm.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Relays {
     me: DroneId,
     drones: u32,
     /// Whether it passes anything on at all.
     used: bool,
     start: SimTime,
-    repeat_s: f64,
     /// Where this drone is, world frame, m.
     position: Vec2,
     /// Distance within which it hears most beacons, m.
@@ -76,7 +75,6 @@ impl Relays {
             drones: params.drones,
             used: true,
             start: params.start,
-            repeat_s: params.repeat_period_s,
             position: Vec2::zeros(),
             reach_m: 0.0,
             distances_m: Vec::new(),
@@ -214,13 +212,13 @@ impl Relays {
         self.presences.hear_newest(now, drone, stamp);
     }
 
-    /// Reads what was said of a drone, so that it is in the cache.
+    /// Fetches what was said of a drone into the cache.
     #[inline]
     pub(crate) fn warm(&self, drone: DroneId) {
         self.presences.warm(drone);
     }
 
-    /// Reads what is kept of the subjects of a message, so that it is in the cache.
+    /// Fetches what is kept of the subjects of a message into the cache.
     #[inline]
     pub(crate) fn warm_facts(&self, source: DroneId, message: MessageRef<'_>) {
         if self.wide {

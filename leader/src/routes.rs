@@ -161,6 +161,8 @@ pub struct Routes {
     scale: Scale,
     /// The obstacles inflated by r_obs, by envelope, from right to left.
     blocks: Vec<Vec<Block>>,
+    /// The least and the greatest abscissa of a point of them, m.
+    abreast_m: (f64, f64),
 }
 
 impl Routes {
@@ -213,6 +215,7 @@ impl Routes {
                 sides_m: (0.0, 0.0),
                 scale: params.scale,
                 blocks: Vec::new(),
+                abreast_m: (f64::INFINITY, f64::NEG_INFINITY),
             };
         }
         let routes: Vec<Route> =
@@ -230,6 +233,7 @@ impl Routes {
             gate_x_m: centres.sum::<f64>() / envelopes.len() as f64,
             exit_x_m: rear_m + params.planning_distance_m,
             scale: params.scale,
+            abreast_m: range(envelopes.iter().flat_map(|envelope| &envelope.blocks).flat_map(Block::abscissas_m)),
             blocks: envelopes.iter().map(|envelope| envelope.blocks.clone()).collect(),
         }
     }
@@ -238,6 +242,10 @@ impl Routes {
     /// the route.
     #[must_use]
     pub fn is_open(&self, route: usize, position: Vec2) -> bool {
+        // In each tick, most drones are not abreast of any obstacle.
+        if !(self.abreast_m.0..=self.abreast_m.1).contains(&position.x) {
+            return true;
+        }
         let (right, left) = self.blocks.split_at(self.index(route).min(self.blocks.len()));
         let above = |block: &Block| block.extent(position.x).is_some_and(|(low, _)| position.y < low);
         let below = |block: &Block| block.extent(position.x).is_some_and(|(_, high)| position.y > high);
@@ -248,6 +256,9 @@ impl Routes {
     /// right and those on its left.
     #[must_use]
     pub fn is_barred(&self, route: usize, position: Vec2, bodies: &[Body]) -> bool {
+        if bodies.is_empty() {
+            return false;
+        }
         let mut ahead: Vec<&Body> = bodies.iter().filter(|body| body.centre_m.x > position.x).collect();
         let walls = self.route(route).walls();
         let touches = |body: &Body, side: Side| {
@@ -357,10 +368,20 @@ impl Block {
         Self { lower: lower_chain(outline), upper: upper_chain(outline) }
     }
 
+    /// The abscissas of its points, m.
+    fn abscissas_m(&self) -> impl Iterator<Item = f64> {
+        self.lower.iter().chain(&self.upper).map(|point| point.x)
+    }
+
     /// Its lowest and highest ordinate at an abscissa, m.
     fn extent(&self, x_m: f64) -> Option<(f64, f64)> {
         Some((height(&self.lower, x_m)?, height(&self.upper, x_m)?))
     }
+}
+
+/// The least and the greatest of these values.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// Ordinate of a chain at an abscissa, m. `None` beyond its ends.

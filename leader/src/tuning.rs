@@ -90,7 +90,7 @@ pub(crate) const MAX_CANDIDATES: usize = 16;
 pub(crate) const REDUNDANCY: u32 = 3;
 /// How often the shortest interval between repetitions is doubled at most. No unit. 3: with the default period that is 1.6 s.
 /// By hand; `skein sweep experiments/presets.toml`.
-pub(crate) const MAX_GOSSIP_DOUBLINGS: u32 = 3;
+pub(crate) const MAX_GOSSIP_DOUBLINGS: u8 = 3;
 
 // ---- Beacons (`beacon_pace.rs`) ----
 
@@ -104,7 +104,7 @@ pub(crate) const BEACONS_PER_S: f64 = 320.0;
 pub(crate) const NEAR_REDUNDANCY: u32 = 2;
 /// A drone that was silent in this many turns because drones close to it had said the message says it in the next one: it may be
 /// heard by drones that do not hear those. No unit. 8. By hand.
-pub(crate) const MAX_SILENT_TURNS: u32 = 8;
+pub(crate) const MAX_SILENT_TURNS: u8 = 8;
 /// The nearest of the drones whose last beacon was heard, up to this share, are within the range of a radio. No unit. 0.75. By hand: a
 /// beacon that is heard by chance from far away does not count.
 pub(crate) const REACHED: f64 = 0.75;

@@ -10,7 +10,7 @@ use skein_pilot::{Heard, Inbox, Out, Pilot, Status};
 use skein_protocol::downlink::{DownlinkView, Senses};
 use skein_protocol::radio::Radio;
 use skein_protocol::slot::{LinkStats, SLOT_DONE, SLOT_FAILED, Slot};
-use skein_protocol::{DroneId, Message, SimTime, flag};
+use skein_protocol::{DroneId, Message, SimTime, flag, prefetch};
 use std::sync::Arc;
 
 /// Memory for the work of one tick. Drones that are stepped one after the other share it. It therefore stays in the cache,
@@ -57,6 +57,11 @@ impl PilotHost {
     #[must_use]
     pub fn guarded(self, guard: ForkGuard) -> Self {
         Self { guard: Some(guard), ..self }
+    }
+
+    /// Fetches the pilot into the cache: call it a short time before [`Self::step`].
+    pub(crate) fn prefetch(&self) {
+        prefetch(&*self.pilot);
     }
 
     /// The drone.

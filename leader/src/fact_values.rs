@@ -1,0 +1,196 @@
+//! What the messages that a drone may pass on say, in little memory: a drone of a large swarm keeps thousands of them, and most have much in
+//! common.
+
+use crate::shared_values::SharedValues;
+use crate::subject::Subject;
+use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, MAX_SET, Passed, Plan};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
+
+/// Which of two messages about the same subject is newer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Version {
+    ballot: Ballot,
+    epoch: u32,
+    stamp: SimTime,
+}
+
+impl Version {
+    /// That of what belongs to a plan.
+    pub(crate) fn of(plan: PlanStamp) -> Self {
+        Self { ballot: plan.ballot, epoch: plan.epoch, ..Self::default() }
+    }
+
+    /// That of what a drone said at this time.
+    pub(crate) fn at(stamp: SimTime) -> Self {
+        Self { stamp, ..Self::default() }
+    }
+}
+
+/// What a message says. Most are assignments and passages, of which a large swarm has thousands. So what many of them have in common is in
+/// [`FactValues`], and the others are elsewhere.
+#[derive(Clone, Debug)]
+pub(crate) enum Fact {
+    Plan(Box<Plan>),
+    Part(Part),
+    Arrivals(Box<Arrivals>),
+    Passed(Passage),
+}
+
+/// What differs between the assignments of one group, without the 4 bytes by which it would be aligned to 8.
+#[repr(C, packed(4))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    slot_m: [f64; 2],
+    arrival_s: f64,
+    /// Index of the rest.
+    header: u32,
+    route: u16,
+    rank: u16,
+}
+
+/// What the assignments of one group have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PartHeader {
+    id: PlanStamp,
+    scope: GroupId,
+    group: GroupId,
+    leader: DroneId,
+}
+
+/// What differs between the passages of one set.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passage {
+    stamp: SimTime,
+    /// Index of the set.
+    set: u32,
+}
+
+/// The obstacles of a passage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct PassedSet {
+    count: u32,
+    ids: [ObstacleId; MAX_SET],
+}
+
+/// What many facts have in common, each kept once.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FactValues {
+    headers: SharedValues<PartHeader>,
+    sets: SharedValues<PassedSet>,
+}
+
+impl FactValues {
+    /// What a message says; `None` if it is not passed on.
+    pub(crate) fn fact(&mut self, message: MessageRef<'_>) -> Option<Fact> {
+        Some(match message {
+            MessageRef::Plan(plan) => Fact::Plan(Box::new(*plan)),
+            MessageRef::Assignment(part) => {
+                let &Assignment { id, scope, group, leader, slot_m, arrival_s, route, rank, .. } = part;
+                let header = self.headers.share(&PartHeader { id, scope, group, leader });
+                Fact::Part(Part { slot_m, arrival_s, header, route, rank })
+            }
+            MessageRef::Arrivals(row) => Fact::Arrivals(Box::new(*row)),
+            MessageRef::Passed(passed) => {
+                let set = self.sets.share(&PassedSet { count: passed.set_count, ids: passed.set });
+                Fact::Passed(Passage { stamp: passed.stamp, set })
+            }
+            _ => return None,
+        })
+    }
+
+    /// Notes that a fact is no longer kept.
+    pub(crate) fn release(&mut self, fact: &Fact) {
+        match fact {
+            Fact::Part(part) => self.headers.release(part.header),
+            Fact::Passed(passage) => self.sets.release(passage.set),
+            Fact::Plan(_) | Fact::Arrivals(_) => {}
+        }
+    }
+
+    /// The assignment that a fact about this subject is, if it is one.
+    pub(crate) fn assignment_of(&self, fact: &Fact, subject: Subject) -> Option<Assignment> {
+        let (&Fact::Part(Part { slot_m, arrival_s, header, route, rank }), Some(drone)) = (fact, subject.drone())
+        else {
+            return None;
+        };
+        let &PartHeader { id, scope, group, leader } = self.headers.get(header);
+        Some(Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved: 0 })
+    }
+
+    /// The message that passes a fact about this subject on.
+    pub(crate) fn passed_on(&self, fact: &Fact, subject: Subject) -> Option<Message> {
+        Some(match fact {
+            Fact::Plan(plan) => Message::Plan(**plan),
+            Fact::Part(_) => Message::AssignmentList(AssignmentList::of(&self.assignment_of(fact, subject)?)),
+            Fact::Arrivals(row) => Message::Arrivals(**row),
+            Fact::Passed(passage) => {
+                let &PassedSet { count, ids } = self.sets.get(passage.set);
+                let of = subject.drone()?.0.saturating_add(1);
+                Message::Passed(Passed { stamp: passage.stamp, set_count: count, set: ids, of })
+            }
+        })
+    }
+
+    /// The version of a fact.
+    pub(crate) fn version(&self, fact: &Fact) -> Version {
+        match fact {
+            Fact::Plan(plan) => Version::of(plan.id),
+            Fact::Part(part) => Version::of(self.headers.get(part.header).id),
+            Fact::Arrivals(row) => Version::at(row.stamp),
+            Fact::Passed(passage) => Version::at(passage.stamp),
+        }
+    }
+
+    /// Whether a fact is that a drone has passed the same obstacles as this message reports.
+    pub(crate) fn is_same_passage(&self, known: &Fact, heard: MessageRef<'_>) -> bool {
+        let (Fact::Passed(passage), MessageRef::Passed(heard)) = (known, heard) else { return false };
+        *self.sets.get(passage.set) == PassedSet { count: heard.set_count, ids: heard.set }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn part(epoch: u32, drone: u32) -> Assignment {
+        let id = PlanStamp { epoch, ..PlanStamp::default() };
+        let slot_m = [f64::from(drone), -1.5];
+        let (arrival_s, route, rank) = (2.5 * f64::from(drone), 3, 4);
+        Assignment { id, drone: DroneId(drone), slot_m, arrival_s, route, rank, ..Assignment::zeroed() }
+    }
+
+    #[test]
+    fn what_was_heard_is_passed_on_as_it_was() {
+        let mut values = FactValues::default();
+        let parts: Vec<Assignment> = (0..30).map(|number| part(number % 3, number)).collect();
+        let facts: Vec<Fact> = parts.iter().map(|part| values.fact(MessageRef::Assignment(part)).unwrap()).collect();
+        assert_eq!(values.headers.used().count(), 3);
+        for (part, fact) in parts.iter().zip(&facts) {
+            let subject = Subject::Part(part.scope, part.drone);
+            assert_eq!(values.assignment_of(fact, subject), Some(*part));
+            assert_eq!(values.passed_on(fact, subject), Some(Message::AssignmentList(AssignmentList::of(part))));
+            assert_eq!(values.version(fact), Version::of(part.id));
+        }
+        facts.iter().for_each(|fact| values.release(fact));
+        assert_eq!(values.headers.used().count(), 0);
+    }
+
+    #[test]
+    fn a_passage_is_that_of_its_drone_whichever_drone_says_it() {
+        let mut values = FactValues::default();
+        let mut heard = Passed { stamp: SimTime(5), set_count: 2, ..Passed::zeroed() };
+        heard.set[..2].copy_from_slice(&[ObstacleId(4), ObstacleId(6)]);
+        let fact = values.fact(MessageRef::Passed(&heard)).unwrap();
+        let expected = Passed { of: 8, ..heard };
+        assert_eq!(values.passed_on(&fact, Subject::Passed(DroneId(7))), Some(Message::Passed(expected)));
+        assert_eq!(values.version(&fact), Version::at(heard.stamp));
+        let later = Passed { stamp: SimTime(9), ..heard };
+        assert!(values.is_same_passage(&fact, MessageRef::Passed(&later)));
+        let mut other = later;
+        other.set[1] = ObstacleId(7);
+        assert!(!values.is_same_passage(&fact, MessageRef::Passed(&other)));
+        values.release(&fact);
+        assert_eq!(values.sets.used().count(), 0);
+    }
+}
