@@ -102,3 +102,16 @@ fn a_drone_leaves_a_route_that_has_become_much_longer_than_another_one() {
         assert_eq!(first_place(&route), place, "a wall that ends at y = {low_m} m");
     }
 }
+
+#[test]
+fn a_path_that_was_asked_for_before_is_drawn_again_with_the_route() {
+    let (mut ledger, mut route) = (ledger(), RouteFollower::new(DroneId(1), 0.0, None));
+    hear_plan(&mut ledger, 1);
+    route.update(&ledger, HERE, &[]);
+    let asked = route.steering(HERE).unwrap();
+    assert_eq!(route.steering(HERE), Some(asked));
+    ledger.redraw(ObstacleId(0), &wall(-250.0));
+    route.update(&ledger, HERE, &[]);
+    let drawn = route.steering(HERE).unwrap();
+    assert!(drawn.total_m > asked.total_m + 100.0, "{drawn:?} {asked:?}");
+}

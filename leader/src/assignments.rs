@@ -1,73 +1,30 @@
 //! The assignments of one plan, in little memory: every drone of a swarm keeps those of all others, in which all drones of a group
 //! have much in common.
 
+use crate::packed_assignment::{AssignmentHeaders, PackedAssignment};
 use crate::roster::{OfDrone, Roster};
-use crate::shared_values::SharedValues;
+use skein_protocol::DroneId;
 use skein_protocol::payload::Assignment;
-use skein_protocol::{DroneId, GroupId, PlanStamp};
 use std::fmt;
 
 /// At most one assignment per drone, by id. Every value is kept as it was heard.
 #[derive(Clone, Default)]
 pub struct Assignments {
-    entries: Roster<Entry>,
-    headers: SharedValues<Header>,
+    entries: Roster<PackedAssignment>,
+    headers: AssignmentHeaders,
 }
 
-/// What differs from drone to drone, without the 4 bytes by which it would be aligned to 8.
-#[repr(C, packed(4))]
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    slot_m: [f64; 2],
-    arrival_s: f64,
-    drone: DroneId,
-    /// Index of the rest.
-    header: u32,
-    route: u16,
-    rank: u16,
-}
-
-/// What the drones of a group have in common.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Header {
-    id: PlanStamp,
-    scope: GroupId,
-    group: GroupId,
-    leader: DroneId,
-    reserved: u32,
-}
-
-impl OfDrone for Entry {
+impl OfDrone for PackedAssignment {
     fn drone(&self) -> DroneId {
-        self.drone
-    }
-}
-
-impl From<&Assignment> for Header {
-    fn from(part: &Assignment) -> Self {
-        let &Assignment { id, scope, group, leader, reserved, .. } = part;
-        Self { id, scope, group, leader, reserved }
-    }
-}
-
-impl Entry {
-    fn new(part: &Assignment, header: u32) -> Self {
-        let &Assignment { slot_m, arrival_s, drone, route, rank, .. } = part;
-        Self { slot_m, arrival_s, drone, header, route, rank }
+        self.drone()
     }
 }
 
 impl Assignments {
-    fn whole(&self, entry: &Entry) -> Assignment {
-        let &Entry { slot_m, arrival_s, drone, header, route, rank } = entry;
-        let &Header { id, scope, group, leader, reserved } = self.headers.get(header);
-        Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved }
-    }
-
     /// The assignment of a drone.
     #[must_use]
     pub fn get(&self, drone: DroneId) -> Option<Assignment> {
-        self.entries.get(drone).map(|entry| self.whole(entry))
+        self.entries.get(drone).map(|entry| self.headers.whole(entry))
     }
 
     /// Whether a drone has an assignment.
@@ -79,8 +36,7 @@ impl Assignments {
     /// Adds an assignment, unless its drone has one already.
     pub fn add(&mut self, part: &Assignment) {
         if !self.contains(part.drone) {
-            let header = self.headers.share(&part.into());
-            self.entries.add(Entry::new(part, header));
+            self.entries.add(self.headers.pack(part));
         }
     }
 
@@ -89,7 +45,7 @@ impl Assignments {
         let Some(mut part) = self.get(drone) else { return };
         change(&mut part);
         if let Some(entry) = self.entries.get_mut(drone) {
-            *entry = Entry::new(&part, self.headers.replace(entry.header, &Header::from(&part)));
+            *entry = self.headers.repack(entry, &part);
         }
     }
 
@@ -104,7 +60,7 @@ impl Assignments {
 
     /// All assignments, by drone.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Assignment> + Clone {
-        self.entries.iter().map(|entry| self.whole(entry))
+        self.entries.iter().map(|entry| self.headers.whole(entry))
     }
 
     /// Number of assignments.
@@ -135,7 +91,8 @@ impl Assignments {
 impl FromIterator<Assignment> for Assignments {
     fn from_iter<I: IntoIterator<Item = Assignment>>(parts: I) -> Self {
         let parts = parts.into_iter();
-        let mut all = Self { entries: Roster::with_capacity(parts.size_hint().0), headers: SharedValues::default() };
+        let mut all =
+            Self { entries: Roster::with_capacity(parts.size_hint().0), headers: AssignmentHeaders::default() };
         for part in parts {
             all.add(&part);
         }
@@ -161,6 +118,7 @@ impl fmt::Debug for Assignments {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use skein_protocol::{GroupId, PlanStamp};
 
     fn part(drone: u32) -> Assignment {
         Assignment {

@@ -21,7 +21,6 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Broadcaster {
     pace: BeaconPace,
-    repeat_s: f64,
     rhythm: GossipRhythm,
     /// Time that one assignment takes in a leader's share of the bandwidth, s.
     part_s: f64,
@@ -70,11 +69,9 @@ struct Extent {
 impl Broadcaster {
     /// Nothing said yet.
     pub(crate) fn new(params: &LeadingParams) -> Self {
-        let repeat_s = params.repeat_period_s;
         Self {
             pace: BeaconPace::new(params),
-            repeat_s,
-            rhythm: GossipRhythm::steady(repeat_s, params.me),
+            rhythm: GossipRhythm::steady(params.repeat_period_s, params.me),
             part_s: params.leader_frame_s(size_of::<Assignment>()),
             obstacles: BTreeMap::new(),
             outlines: 0,
@@ -173,7 +170,7 @@ impl Broadcaster {
     fn repeat_due(&mut self, now: SimTime) -> bool {
         let due = now >= self.next_repeat;
         if due {
-            self.next_repeat = now.after(self.repeat_s);
+            self.next_repeat = now.after(self.rhythm.shortest_s());
         }
         due
     }

@@ -1,10 +1,11 @@
 //! What the messages that a drone may pass on say, in little memory: a drone of a large swarm keeps thousands of them, and most have much in
 //! common.
 
+use crate::packed_assignment::{AssignmentHeaders, PackedAssignment};
 use crate::shared_values::SharedValues;
 use crate::subject::Subject;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, MAX_SET, Passed, Plan};
-use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
+use skein_protocol::{Ballot, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
 
 /// Which of two messages about the same subject is newer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,30 +32,9 @@ impl Version {
 #[derive(Clone, Debug)]
 pub(crate) enum Fact {
     Plan(Box<Plan>),
-    Part(Part),
+    Part(PackedAssignment),
     Arrivals(Box<Arrivals>),
     Passed(Passage),
-}
-
-/// What differs between the assignments of one group, without the 4 bytes by which it would be aligned to 8.
-#[repr(C, packed(4))]
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Part {
-    slot_m: [f64; 2],
-    arrival_s: f64,
-    /// Index of the rest.
-    header: u32,
-    route: u16,
-    rank: u16,
-}
-
-/// What the assignments of one group have in common.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct PartHeader {
-    id: PlanStamp,
-    scope: GroupId,
-    group: GroupId,
-    leader: DroneId,
 }
 
 /// What differs between the passages of one set.
@@ -75,7 +55,7 @@ struct PassedSet {
 /// What many facts have in common, each kept once.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactValues {
-    headers: SharedValues<PartHeader>,
+    headers: AssignmentHeaders,
     sets: SharedValues<PassedSet>,
 }
 
@@ -84,11 +64,7 @@ impl FactValues {
     pub(crate) fn fact(&mut self, message: MessageRef<'_>) -> Option<Fact> {
         Some(match message {
             MessageRef::Plan(plan) => Fact::Plan(Box::new(*plan)),
-            MessageRef::Assignment(part) => {
-                let &Assignment { id, scope, group, leader, slot_m, arrival_s, route, rank, .. } = part;
-                let header = self.headers.share(&PartHeader { id, scope, group, leader });
-                Fact::Part(Part { slot_m, arrival_s, header, route, rank })
-            }
+            MessageRef::Assignment(part) => Fact::Part(self.headers.pack(part)),
             MessageRef::Arrivals(row) => Fact::Arrivals(Box::new(*row)),
             MessageRef::Passed(passed) => {
                 let set = self.sets.share(&PassedSet { count: passed.set_count, ids: passed.set });
@@ -101,27 +77,23 @@ impl FactValues {
     /// Notes that a fact is no longer kept.
     pub(crate) fn release(&mut self, fact: &Fact) {
         match fact {
-            Fact::Part(part) => self.headers.release(part.header),
+            Fact::Part(part) => self.headers.release(part),
             Fact::Passed(passage) => self.sets.release(passage.set),
             Fact::Plan(_) | Fact::Arrivals(_) => {}
         }
     }
 
-    /// The assignment that a fact about this subject is, if it is one.
-    pub(crate) fn assignment_of(&self, fact: &Fact, subject: Subject) -> Option<Assignment> {
-        let (&Fact::Part(Part { slot_m, arrival_s, header, route, rank }), Some(drone)) = (fact, subject.drone())
-        else {
-            return None;
-        };
-        let &PartHeader { id, scope, group, leader } = self.headers.get(header);
-        Some(Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved: 0 })
+    /// The assignment that a fact is, if it is one.
+    pub(crate) fn assignment_of(&self, fact: &Fact) -> Option<Assignment> {
+        let Fact::Part(part) = fact else { return None };
+        Some(self.headers.whole(part))
     }
 
     /// The message that passes a fact about this subject on.
     pub(crate) fn passed_on(&self, fact: &Fact, subject: Subject) -> Option<Message> {
         Some(match fact {
             Fact::Plan(plan) => Message::Plan(**plan),
-            Fact::Part(_) => Message::AssignmentList(AssignmentList::of(&self.assignment_of(fact, subject)?)),
+            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(&self.headers.whole(part))),
             Fact::Arrivals(row) => Message::Arrivals(**row),
             Fact::Passed(passage) => {
                 let &PassedSet { count, ids } = self.sets.get(passage.set);
@@ -135,7 +107,7 @@ impl FactValues {
     pub(crate) fn version(&self, fact: &Fact) -> Version {
         match fact {
             Fact::Plan(plan) => Version::of(plan.id),
-            Fact::Part(part) => Version::of(self.headers.get(part.header).id),
+            Fact::Part(part) => Version::of(self.headers.plan(part)),
             Fact::Arrivals(row) => Version::at(row.stamp),
             Fact::Passed(passage) => Version::at(passage.stamp),
         }
@@ -152,6 +124,7 @@ impl FactValues {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use skein_protocol::DroneId;
 
     fn part(epoch: u32, drone: u32) -> Assignment {
         let id = PlanStamp { epoch, ..PlanStamp::default() };
@@ -165,15 +138,15 @@ mod tests {
         let mut values = FactValues::default();
         let parts: Vec<Assignment> = (0..30).map(|number| part(number % 3, number)).collect();
         let facts: Vec<Fact> = parts.iter().map(|part| values.fact(MessageRef::Assignment(part)).unwrap()).collect();
-        assert_eq!(values.headers.used().count(), 3);
+        assert_eq!(values.headers.count(), 3);
         for (part, fact) in parts.iter().zip(&facts) {
             let subject = Subject::Part(part.scope, part.drone);
-            assert_eq!(values.assignment_of(fact, subject), Some(*part));
+            assert_eq!(values.assignment_of(fact), Some(*part));
             assert_eq!(values.passed_on(fact, subject), Some(Message::AssignmentList(AssignmentList::of(part))));
             assert_eq!(values.version(fact), Version::of(part.id));
         }
         facts.iter().for_each(|fact| values.release(fact));
-        assert_eq!(values.headers.used().count(), 0);
+        assert_eq!(values.headers.count(), 0);
     }
 
     #[test]

@@ -30,6 +30,11 @@ impl GossipRhythm {
         Self { me, shortest_s, varies: true }
     }
 
+    /// Length of the shortest interval, s.
+    pub(crate) fn shortest_s(&self) -> f64 {
+        self.shortest_s
+    }
+
     /// The point within the second half of an interval at which this drone speaks, 0 to 1. It differs between drones. `since`: when the
     /// interval began.
     fn phase(&self, since: SimTime) -> f64 {

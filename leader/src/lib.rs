@@ -72,6 +72,7 @@ mod news;
 pub mod obstacles;
 mod onward;
 pub mod own_state;
+mod packed_assignment;
 pub mod params;
 pub mod peers;
 pub mod plan_bundle;

@@ -47,7 +47,6 @@ const NO_TURN: SimTime = SimTime::MAX;
 #[derive(Clone, Debug)]
 pub(crate) struct RelayedFacts {
     rhythm: GossipRhythm,
-    repeat_s: f64,
     room: usize,
     known: FactStore<Relayed>,
     values: FactValues,
@@ -63,10 +62,8 @@ pub(crate) struct RelayedFacts {
 impl RelayedFacts {
     /// Nothing heard.
     pub(crate) fn new(params: &LeadingParams) -> Self {
-        let repeat_s = params.repeat_period_s;
         Self {
-            rhythm: GossipRhythm::varying(repeat_s, params.me),
-            repeat_s,
+            rhythm: GossipRhythm::varying(params.repeat_period_s, params.me),
             room: 8 * params.drones as usize + 64,
             known: FactStore::new(params.drones),
             values: FactValues::default(),
@@ -174,7 +171,7 @@ impl RelayedFacts {
         let first = say.len();
         while let Some(subject) = self.turns.first_due(now) {
             let one = self.known.get_mut(&subject);
-            let part = one.as_ref().and_then(|one| self.values.assignment_of(&one.fact, subject));
+            let part = one.as_ref().and_then(|one| self.values.assignment_of(&one.fact));
             let open = part.and_then(|part| open_list(&say[first..], &part));
             if open.is_none() && say.len() >= last {
                 break;
@@ -188,7 +185,7 @@ impl RelayedFacts {
                     _ => say.extend(self.values.passed_on(&one.fact, subject)),
                 }
             }
-            one.turn = one.next_look(&self.rhythm, now, need, self.repeat_s);
+            one.turn = one.next_look(&self.rhythm, now, need);
             if one.turn != NO_TURN {
                 self.turns.add(one.turn, subject);
             }
@@ -198,12 +195,12 @@ impl RelayedFacts {
 
 impl Relayed {
     /// When the message is looked at again after a look at `now`, or [`NO_TURN`].
-    fn next_look(&self, rhythm: &GossipRhythm, now: SimTime, need: Need, repeat_s: f64) -> SimTime {
+    fn next_look(&self, rhythm: &GossipRhythm, now: SimTime, need: Need) -> SimTime {
         match (&self.fact, need) {
             (Fact::Arrivals(_) | Fact::Passed(_), _) if !self.gossip.is_first() => NO_TURN,
             (_, Need::Over) => NO_TURN,
-            (Fact::Plan(_), Need::Later) => now.after(repeat_s),
-            (_, Need::Later) => now.after(repeat_s * UNWANTED_REPEATS),
+            (Fact::Plan(_), Need::Later) => now.after(rhythm.shortest_s()),
+            (_, Need::Later) => now.after(rhythm.shortest_s() * UNWANTED_REPEATS),
             (_, Need::Now) => self.gossip.next_turn(rhythm).max(SimTime(now.0 + 1)),
         }
     }
@@ -276,7 +273,6 @@ mod tests {
     fn each_message_is_forgotten_when_it_was_not_heard_for_long() {
         let mut facts = RelayedFacts {
             rhythm: GossipRhythm::varying(0.2, DroneId(8)),
-            repeat_s: 0.2,
             room: 64,
             known: FactStore::new(8),
             values: FactValues::default(),
@@ -318,7 +314,6 @@ mod tests {
         let passed_on = |drones: u32| {
             let mut facts = RelayedFacts {
                 rhythm: GossipRhythm::varying(0.2, DroneId(8)),
-                repeat_s: 0.2,
                 room: 64,
                 known: FactStore::new(9),
                 values: FactValues::default(),
