@@ -10,7 +10,7 @@ const ROUNDING_M: f64 = 1e-6;
 const BLOCK: usize = 8;
 
 /// [`DistantPeers::until_m`] of a peer that may be within reach.
-const NEAR: f64 = f64::NEG_INFINITY;
+const NEAR: f32 = f32::NEG_INFINITY;
 
 /// A peer that is out of reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +25,9 @@ pub(crate) struct Distant {
 /// that may be within reach.
 #[derive(Clone, Debug)]
 pub(crate) struct DistantPeers<T> {
-    /// Each peer is out of reach while [`Self::travelled_m`] is below this, m.
-    until_m: Vec<f64>,
+    /// Each peer is out of reach while [`Self::travelled_m`] is below this, m. A drone of a large swarm keeps a thousand of these, so they are
+    /// small.
+    until_m: Vec<f32>,
     /// The least of each [`BLOCK`] of peers, or less, without those that may be within reach, m.
     blocks_m: Vec<f64>,
     /// The least of all blocks, or less, m.
@@ -81,19 +82,16 @@ impl<T> DistantPeers<T> {
         distant: impl Fn(usize) -> Option<Distant>,
         copy: impl Fn(usize) -> T,
     ) {
-        self.suspect_changed(count, changes, &copy);
+        if !self.suspect_changed(count, changes, &copy) {
+            self.forget(count);
+            (0..count).for_each(|index| self.sort_in(index, distant(index), &copy));
+            return;
+        }
         if self.travelled_m >= self.least_m {
             self.suspect_near();
         }
         while let Some(index) = self.suspects.pop() {
-            match distant(index as usize) {
-                Some(distant) => self.note(index as usize, distant),
-                None => {
-                    let place = self.near.partition_point(|near| *near < index);
-                    self.near.insert(place, index);
-                    self.copies.insert(place, copy(index as usize));
-                }
-            }
+            self.sort_in(index as usize, distant(index as usize), &copy);
         }
     }
 
@@ -130,21 +128,25 @@ impl<T> DistantPeers<T> {
         self.copies.truncate(stay);
     }
 
-    /// The peers that have changed may be within reach. Of those that were, what is kept is replaced.
-    fn suspect_changed(&mut self, count: usize, changes: &Changes, copy: impl Fn(usize) -> T) {
+    /// The peers that have changed may be within reach. Of those that were, what is kept is replaced. Returns whether it is known which have
+    /// changed.
+    fn suspect_changed(&mut self, count: usize, changes: &Changes, copy: impl Fn(usize) -> T) -> bool {
         let changed = changes.since(self.seen).filter(|_| self.until_m.len() == count);
         self.seen = changes.count();
-        if let Some(changed) = changed {
-            for index in changed {
-                if self.suspect(index) {
-                    continue;
-                }
-                if let Ok(place) = self.near.binary_search(&(index as u32)) {
-                    self.copies[place] = copy(index);
-                }
+        let Some(changed) = changed else { return false };
+        for index in changed {
+            if self.suspect(index) {
+                continue;
             }
-            return;
+            if let Ok(place) = self.near.binary_search(&(index as u32)) {
+                self.copies[place] = copy(index);
+            }
         }
+        true
+    }
+
+    /// Nothing is known of any of `count` peers.
+    fn forget(&mut self, count: usize) {
         self.until_m.clear();
         self.until_m.resize(count, NEAR);
         self.blocks_m.clear();
@@ -152,9 +154,18 @@ impl<T> DistantPeers<T> {
         self.least_m = f64::INFINITY;
         self.suspects.clear();
         self.near.clear();
-        self.near.extend(0..count as u32);
         self.copies.clear();
-        self.copies.extend((0..count).map(copy));
+    }
+
+    /// Notes where a peer is. `distant`: by how much it is out of reach, if it is.
+    fn sort_in(&mut self, index: usize, distant: Option<Distant>, copy: impl Fn(usize) -> T) {
+        if let Some(distant) = distant {
+            self.note(index, distant);
+            return;
+        }
+        let place = self.near.partition_point(|near| (*near as usize) < index);
+        self.near.insert(place, index as u32);
+        self.copies.insert(place, copy(index));
     }
 
     /// The peers that can have come into reach may be within reach.
@@ -172,8 +183,9 @@ impl<T> DistantPeers<T> {
     fn suspect_near_of(&mut self, block: usize) -> f64 {
         let mut least_m = f64::INFINITY;
         for index in block * BLOCK..(block * BLOCK + BLOCK).min(self.until_m.len()) {
-            if self.travelled_m < self.until_m[index] {
-                least_m = least_m.min(self.until_m[index]);
+            let until_m = f64::from(self.until_m[index]);
+            if self.travelled_m < until_m {
+                least_m = least_m.min(until_m);
             } else {
                 self.suspect(index);
             }
@@ -192,12 +204,18 @@ impl<T> DistantPeers<T> {
 
     fn note(&mut self, index: usize, distant: Distant) {
         self.speed_mps = self.speed_mps.max(distant.speed_mps);
-        let until_m = self.travelled_m + distant.beyond_m - ROUNDING_M;
+        let until_m = at_most(self.travelled_m + distant.beyond_m - ROUNDING_M);
         self.until_m[index] = until_m;
         let block_m = &mut self.blocks_m[index / BLOCK];
-        *block_m = block_m.min(until_m);
-        self.least_m = self.least_m.min(until_m);
+        *block_m = block_m.min(until_m.into());
+        self.least_m = self.least_m.min(until_m.into());
     }
+}
+
+/// A number that is not greater than this one.
+fn at_most(number: f64) -> f32 {
+    let near = number as f32;
+    if f64::from(near) <= number { near } else { near.next_down() }
 }
 
 #[cfg(test)]
@@ -261,8 +279,8 @@ mod tests {
             near
         };
         changes.note_moved(9);
-        peers.look(9, &changes, |_| panic!("all are visited"), |_| ());
-        assert_eq!(near(&mut peers, 150.0).len(), 9);
+        peers.look(9, &changes, |index| distant(if index < 4 { 0.0 } else { 150.0 }, 0.0), |_| ());
+        assert_eq!(near(&mut peers, 150.0), [0, 1, 2, 3]);
         let nobody = |_| -> Option<Distant> { panic!("nothing has changed") };
         peers.look(9, &changes, nobody, |_| ());
         assert!(near(&mut peers, 0.0).is_empty());
@@ -271,9 +289,9 @@ mod tests {
         peers.look(9, &changes, |_| None, |_| ());
         assert_eq!(near(&mut peers, 0.0), [3, 8]);
         changes.note_moved(9);
-        peers.look(9, &changes, nobody, |_| ());
+        peers.look(9, &changes, |_| None, |_| ());
         assert_eq!(near(&mut peers, 0.0).len(), 9);
-        peers.look(4, &changes, nobody, |_| ());
+        peers.look(4, &changes, |_| None, |_| ());
         assert_eq!(near(&mut peers, 0.0).len(), 4);
     }
 }

@@ -48,11 +48,13 @@ struct NearPeer {
 }
 
 impl NearPeer {
+    #[inline]
     fn new((id, pose): (DroneId, Beacon<'_>)) -> Self {
         Self { id, stamp: pose.stamp(), position: pose.position(), velocity: pose.velocity() }
     }
 
     /// Where it is relative to this drone if it has kept its velocity, m.
+    #[inline]
     fn away(&self, senses: &Senses<'_>) -> Vec2 {
         self.position + self.velocity * senses.now.since(self.stamp) - senses.position()
     }
@@ -104,7 +106,10 @@ impl NeighbourTable {
         };
         let mut peers = std::mem::take(&mut self.distant);
         let near = |index| NearPeer::new(view.peers.at(index));
-        let away = |index| distant(near(index).away(senses), near(index).velocity);
+        let away = |index| {
+            let peer = near(index);
+            distant(peer.away(senses), peer.velocity)
+        };
         peers.look(view.peers.stamps().len(), view.peers.changes(), away, near);
         let mut ranged: Few<DroneId> = senses.neighbours.iter().map(|sensed| sensed.drone).collect();
         ranged.sort_unstable();

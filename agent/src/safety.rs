@@ -145,8 +145,8 @@ impl Safety {
     /// Fetches what [`Self::filter`] reads into the cache: call it a short time before.
     pub(crate) fn warm(&self) {
         prefetch(self.velocities.as_slice());
-        // The oldest one is written anew, and the next one is due.
-        self.expected.iter().take(2).for_each(|expected| prefetch(expected.as_slice()));
+        // The oldest one is due, and then written anew.
+        self.expected.front().into_iter().for_each(|expected| prefetch(expected.as_slice()));
     }
 
     /// The present constants of the filter.
@@ -176,11 +176,11 @@ impl Safety {
         let planes = obstacles.iter().map(|o| params.obstacle_plane(o, velocity, &obstacles));
         let mut planes: SmallVec<[HalfPlane; 2 * FEW]> = planes.collect();
         let lag = (params.reaction_time_s / params.dt_s).round() as usize;
-        let full = self.expected.len() > lag + 1;
-        let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
-        expectations.clear();
         let neighbours = neighbours.enumerate();
         let assessed: Few<Assessed> = neighbours.map(|(at, one)| self.assess(at, one, velocity, lag)).collect();
+        let full = self.expected.len() > lag;
+        let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
+        expectations.clear();
         let mut tiers = [planes.len(); 2];
         self.velocities.clear();
         let in_order = assessed.iter().filter(|c| c.first).chain(assessed.iter().filter(|c| !c.first));

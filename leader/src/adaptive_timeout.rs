@@ -3,7 +3,8 @@
 use crate::tuning::{GAP_WEIGHT, INITIAL_DEVIATION, MAX_TIMEOUTS, TIMEOUT_DEVIATIONS};
 use skein_protocol::SimTime;
 
-/// The gaps between the signs (messages) of one source.
+/// The gaps between the signs (messages) of one source. A drone of a large swarm keeps a thousand of these, so they are small.
+#[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct AdaptiveTimeout {
     last: SimTime,

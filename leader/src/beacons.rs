@@ -1,9 +1,11 @@
 //! The last beacons of many drones, in little memory. A drone of a swarm of a thousand keeps a thousand of them, in which most drones
-//! obey the same plan, and few wait in a queue.
+//! obey the same plan.
 
+use crate::beacon_states::{BriefState, FullStates};
+use crate::heard::Heard;
 use crate::shared_values::SharedValues;
 use skein_protocol::payload::{MAX_PLACES, POSE_BEFORE, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
-use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, horizontal, prefetch};
+use skein_protocol::{Ballot, GroupId, PlanStamp, SimTime, Vec2, prefetch};
 use std::fmt;
 
 /// One beacon per index. Every value of every beacon is kept as it was heard.
@@ -11,25 +13,21 @@ use std::fmt;
 pub(crate) struct Beacons {
     /// Their time stamps. Each tick reads all of them.
     stamps: Vec<SimTime>,
-    states: Vec<State>,
-    /// First and second entries of [`Pose::queue`]. A list is empty while all its entries are unused.
-    queues: [Vec<QueuePlace>; MAX_PLACES],
+    lines: Vec<Line>,
+    full: FullStates,
     allegiances: SharedValues<Allegiance>,
     /// Number of the drones that say which part of the swarm they hear: [`Pose::hears`].
     hearing_parts: usize,
 }
 
-/// What differs from drone to drone. It fills one line of the cache: the states of a large swarm do not fit into it.
+/// What is kept of a drone, in one line of the cache: a large swarm does not fit into it.
 #[repr(align(64))]
 #[derive(Clone, Copy, Debug)]
-struct State {
-    position_m: [f64; 3],
-    velocity_mps: [f64; 3],
+struct Line {
+    heard: Heard,
     /// Index of the drone's [`Allegiance`].
     allegiance: u32,
-    hears: u32,
-    /// Whether the drone has a place in a queue.
-    queued: bool,
+    state: BriefState,
 }
 
 /// What most drones have in common.
@@ -50,14 +48,6 @@ impl From<&Pose> for Allegiance {
     }
 }
 
-impl State {
-    #[inline]
-    fn new(pose: &Pose, allegiance: u32) -> Self {
-        let &Pose { position_m, velocity_mps, hears, queue, .. } = pose;
-        Self { position_m, velocity_mps, allegiance, hears, queued: queue != [QueuePlace::default(); MAX_PLACES] }
-    }
-}
-
 impl Beacons {
     /// The time stamps, by index.
     pub(crate) fn stamps(&self) -> &[SimTime] {
@@ -67,14 +57,34 @@ impl Beacons {
     /// The beacon at an index.
     #[inline]
     pub(crate) fn get(&self, index: usize) -> Beacon<'_> {
-        Beacon { beacons: self, state: &self.states[index], index }
+        Beacon { beacons: self, index }
     }
 
-    /// Fetches a beacon into the cache.
+    /// When the drone at an index was heard.
+    #[inline]
+    pub(crate) fn heard(&self, index: usize) -> &Heard {
+        &self.lines[index].heard
+    }
+
+    /// Fetches a beacon into the cache, but for what [`Self::warm_full`] does.
     #[inline]
     pub(crate) fn warm(&self, index: usize) {
         self.warm_stamp(index);
-        prefetch(&self.states[index]);
+        prefetch(&self.lines[index]);
+    }
+
+    /// Fetches what a beacon says more than one that is passed on into the cache.
+    #[inline]
+    pub(crate) fn warm_full(&self, index: usize) {
+        self.full.warm(&self.lines[index].state);
+    }
+
+    /// Fetches what all beacons say more than those that are passed on into the cache, if they are few.
+    #[inline]
+    pub(crate) fn warm_few(&self) {
+        if 2 * self.full.len() < self.lines.len() {
+            self.full.warm_all();
+        }
     }
 
     /// Fetches the time stamp of a beacon into the cache.
@@ -86,61 +96,41 @@ impl Beacons {
     /// Fetches the places in queues of a beacon into the cache.
     #[inline]
     pub(crate) fn warm_queue(&self, index: usize) {
-        prefetch(&self.states[index]);
-        self.queues.iter().filter_map(|queue| queue.get(index)).for_each(prefetch);
+        self.full.warm_queue(&self.lines[index].state);
     }
 
     /// All beacons, by index.
     pub(crate) fn iter(&self) -> impl Iterator<Item = Beacon<'_>> + Clone {
-        self.states.iter().enumerate().map(|(index, state)| Beacon { beacons: self, state, index })
+        (0..self.lines.len()).map(|index| self.get(index))
     }
 
-    /// Inserts a beacon. The index of those from there on rises by one.
-    pub(crate) fn insert(&mut self, index: usize, pose: &Pose) {
-        let allegiance = self.allegiances.share(&pose.into());
+    /// Inserts a beacon. The index of those from there on rises by one. `relayed`: it was passed on.
+    pub(crate) fn insert(&mut self, index: usize, pose: &Pose, heard: Heard, relayed: bool) {
+        let (allegiance, state) = (self.allegiances.share(&pose.into()), self.full.keep(None, pose, relayed));
         self.stamps.insert(index, pose.stamp);
-        self.states.insert(index, State::new(pose, allegiance));
+        self.lines.insert(index, Line { heard, allegiance, state });
         self.hearing_parts += usize::from(pose.hears != 0);
-        for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
-            queue.insert(index, QueuePlace::default());
-        }
-        self.set_queue(index, pose);
     }
 
-    /// Takes a later beacon of the same drone.
+    /// Takes a later beacon of the same drone. `relayed`: it was passed on. Returns when the drone was heard, to be changed.
     #[inline]
-    pub(crate) fn replace(&mut self, index: usize, pose: &Pose) {
-        let state = &mut self.states[index];
-        let was_queued = state.queued;
-        self.hearing_parts = self.hearing_parts + usize::from(pose.hears != 0) - usize::from(state.hears != 0);
-        *state = State::new(pose, self.allegiances.replace(state.allegiance, &pose.into()));
+    pub(crate) fn replace(&mut self, index: usize, pose: &Pose, relayed: bool) -> &mut Heard {
+        let line = &mut self.lines[index];
+        let heard_part = self.full.hears(&line.state) != 0;
+        self.hearing_parts = self.hearing_parts + usize::from(pose.hears != 0) - usize::from(heard_part);
+        line.allegiance = self.allegiances.replace(line.allegiance, &pose.into());
+        line.state = self.full.keep(Some(&line.state), pose, relayed);
         self.stamps[index] = pose.stamp;
-        if was_queued || state.queued {
-            self.set_queue(index, pose);
-        }
-    }
-
-    #[inline]
-    fn set_queue(&mut self, index: usize, pose: &Pose) {
-        for (queue, place) in self.queues.iter_mut().zip(pose.queue) {
-            if let Some(kept) = queue.get_mut(index) {
-                *kept = place;
-            } else if place != QueuePlace::default() {
-                queue.resize(self.states.len(), QueuePlace::default());
-                queue[index] = place;
-            }
-        }
+        &mut line.heard
     }
 
     /// Removes a beacon. The index of those behind it falls by one.
     pub(crate) fn remove(&mut self, index: usize) {
+        let line = self.lines.remove(index);
         self.stamps.remove(index);
-        let State { allegiance, hears, .. } = self.states.remove(index);
-        self.allegiances.release(allegiance);
-        self.hearing_parts -= usize::from(hears != 0);
-        for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
-            queue.remove(index);
-        }
+        self.allegiances.release(line.allegiance);
+        self.hearing_parts -= usize::from(self.full.hears(&line.state) != 0);
+        self.full.release(&line.state);
     }
 
     /// Whether some drone says which part of the swarm it hears.
@@ -155,11 +145,7 @@ impl Beacons {
 
     /// Gives back the memory of queues in which no drone waits any more.
     pub(crate) fn tidy(&mut self) {
-        for queue in &mut self.queues {
-            if queue.iter().all(|place| *place == QueuePlace::default()) {
-                *queue = Vec::new();
-            }
-        }
+        self.full.tidy();
     }
 
     /// Makes all drones members of one group that obeys this plan.
@@ -170,25 +156,35 @@ impl Beacons {
     }
 }
 
-/// The beacons themselves: how they are kept depends on what was heard before.
+/// The beacons themselves, and when they were heard: how they are kept depends on what was heard before.
 impl fmt::Debug for Beacons {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_list().entries(self.iter().map(|beacon| beacon.pose())).finish()
+        f.debug_list().entries(self.iter().map(|beacon| (beacon.line().heard, beacon.pose()))).finish()
     }
 }
 
 /// The last beacon of a drone. Its values have the meaning that they have in [`Pose`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Beacon<'a> {
     beacons: &'a Beacons,
-    state: &'a State,
     index: usize,
+}
+
+impl fmt::Debug for Beacon<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.pose().fmt(f)
+    }
 }
 
 impl Beacon<'_> {
     #[inline]
+    fn line(&self) -> &Line {
+        &self.beacons.lines[self.index]
+    }
+
+    #[inline]
     fn allegiance(&self) -> &Allegiance {
-        self.beacons.allegiances.get(self.state.allegiance)
+        self.beacons.allegiances.get(self.line().allegiance)
     }
 
     /// Time of the state.
@@ -202,28 +198,20 @@ impl Beacon<'_> {
     #[inline]
     #[must_use]
     pub fn position(&self) -> Vec2 {
-        horizontal(self.state.position_m)
+        self.beacons.full.position(&self.line().state)
     }
 
     /// The horizontal part of the velocity, world frame, m/s.
     #[inline]
     #[must_use]
     pub fn velocity(&self) -> Vec2 {
-        horizontal(self.state.velocity_mps)
+        self.beacons.full.velocity(&self.line().state)
     }
 
     /// The drone's places in queues, nearest set first.
     #[inline]
     pub fn queue(&self) -> impl Iterator<Item = QueuePlace> + Clone {
-        (0..MAX_PLACES).map(|number| self.place(number))
-    }
-
-    #[inline]
-    fn place(&self, number: usize) -> QueuePlace {
-        if !self.state.queued {
-            return QueuePlace::default();
-        }
-        self.beacons.queues[number].get(self.index).copied().unwrap_or_default()
+        (0..MAX_PLACES).map(|number| self.beacons.full.queue_place(&self.line().state, number))
     }
 
     /// The plan that the drone obeys.
@@ -285,7 +273,7 @@ impl Beacon<'_> {
     #[inline]
     #[must_use]
     pub fn hears(&self) -> u32 {
-        self.state.hears
+        self.beacons.full.hears(&self.line().state)
     }
 
     /// Where the drone is at `now` if it has kept the velocity of this beacon, world frame, m.
@@ -305,9 +293,10 @@ impl Beacon<'_> {
     /// All of it.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        let &State { position_m, velocity_mps, hears, .. } = self.state;
+        let (position_m, velocity_mps) = self.beacons.full.motion(&self.line().state);
         let &Allegiance { obeyed, group, term, incarnation, flags } = self.allegiance();
-        let (stamp, queue) = (self.stamp(), std::array::from_fn(|number| self.place(number)));
+        let (stamp, hears) = (self.stamp(), self.hears());
+        let queue = std::array::from_fn(|number| self.beacons.full.queue_place(&self.line().state, number));
         Pose { stamp, position_m, velocity_mps, queue, obeyed, group, term, incarnation, flags, hears }
     }
 }
@@ -315,6 +304,7 @@ impl Beacon<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::heard::Timeouts;
 
     const TERM: Ballot = Ballot { round: 3, ..Ballot::NONE };
 
@@ -323,7 +313,7 @@ mod tests {
         Pose {
             stamp: SimTime(number.into()),
             position_m: [f64::from(number), 2.0, 3.0],
-            velocity_mps: [f64::from(number) / 3.0, 5.0, -6.0],
+            velocity_mps: [f64::from(number) / 3.0, 5.0, f64::from(number % 4 / 2)],
             queue: match number % 5 {
                 0 => [place(0), place(1)],
                 1 => [place(2), QueuePlace::default()],
@@ -333,20 +323,27 @@ mod tests {
             group: GroupId::ALL.child((number % 2) as u8 + 1),
             incarnation: 1 + number % 7 / 6,
             flags: number % 4,
-            hears: number % 3 * 77,
+            hears: number % 7 / 4 * 77,
             term: Ballot { round: number / 400, ..Ballot::NONE },
         }
     }
 
     #[test]
+    fn what_is_kept_of_a_drone_is_one_line_of_the_cache() {
+        assert_eq!(size_of::<Line>(), 64);
+    }
+
+    #[test]
     fn every_beacon_is_kept_as_it_was_heard() {
         let (mut beacons, mut expected) = (Beacons::default(), Vec::new());
+        let heard = Heard::first(SimTime::ZERO, true, Timeouts { direct_s: 1.0, relayed_s: 1.0 });
         for step in 0..2000u32 {
             let (at, pose) = (step.wrapping_mul(0x9e37_79b9) as usize, pose(step));
+            let relayed = step > 500 && at & 0x400 != 0;
             match step % 9 {
                 0..3 => {
                     let at = at % (expected.len() + 1);
-                    beacons.insert(at, &pose);
+                    beacons.insert(at, &pose, heard, relayed);
                     expected.insert(at, pose);
                 }
                 3 if expected.len() > 20 => {
@@ -356,7 +353,7 @@ mod tests {
                 4 => beacons.tidy(),
                 _ => {
                     let at = at % expected.len();
-                    beacons.replace(at, &pose);
+                    beacons.replace(at, &pose, relayed);
                     expected[at] = pose;
                 }
             }
@@ -365,17 +362,5 @@ mod tests {
             let lags = |pose: &Pose| pose.term < TERM && GroupId::ALL.contains(pose.group);
             assert_eq!(beacons.some_lag(TERM, GroupId::ALL), expected.iter().any(lags));
         }
-    }
-
-    #[test]
-    fn queues_take_memory_only_while_a_drone_waits() {
-        let mut beacons = Beacons::default();
-        (0..4).for_each(|index| beacons.insert(index, &pose(5)));
-        (0..4).for_each(|index| beacons.replace(index, &pose(6)));
-        beacons.tidy();
-        assert_eq!(beacons.queues.each_ref().map(Vec::len), [4, 0]);
-        (0..4).for_each(|index| beacons.replace(index, &pose(7)));
-        beacons.tidy();
-        assert_eq!(beacons.queues.each_ref().map(Vec::capacity), [0, 0]);
     }
 }

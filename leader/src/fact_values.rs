@@ -5,7 +5,7 @@ use crate::packed_assignment::{AssignmentHeaders, PackedAssignment};
 use crate::shared_values::SharedValues;
 use crate::subject::Subject;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, MAX_SET, Passed, Plan};
-use skein_protocol::{Ballot, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
+use skein_protocol::{Ballot, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
 
 /// Which of two messages about the same subject is newer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,16 +28,17 @@ impl Version {
 }
 
 /// What a message says. Most are assignments and passages, of which a large swarm has thousands. So what many of them have in common is in
-/// [`FactValues`], and the others are elsewhere.
-#[derive(Clone, Debug)]
-pub(crate) enum Fact {
-    Plan(Box<Plan>),
+/// [`FactValues`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Fact<'a> {
+    Plan(&'a Plan),
     Part(PackedAssignment),
-    Arrivals(Box<Arrivals>),
+    Arrivals(&'a Arrivals),
     Passed(Passage),
 }
 
 /// What differs between the passages of one set.
+#[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Passage {
     stamp: SimTime,
@@ -60,41 +61,44 @@ pub(crate) struct FactValues {
 }
 
 impl FactValues {
-    /// What a message says; `None` if it is not passed on.
-    pub(crate) fn fact(&mut self, message: MessageRef<'_>) -> Option<Fact> {
-        Some(match message {
-            MessageRef::Plan(plan) => Fact::Plan(Box::new(*plan)),
-            MessageRef::Assignment(part) => Fact::Part(self.headers.pack(part)),
-            MessageRef::Arrivals(row) => Fact::Arrivals(Box::new(*row)),
-            MessageRef::Passed(passed) => {
-                let set = self.sets.share(&PassedSet { count: passed.set_count, ids: passed.set });
-                Fact::Passed(Passage { stamp: passed.stamp, set })
-            }
-            _ => return None,
-        })
+    /// Keeps an assignment.
+    pub(crate) fn keep_part(&mut self, part: &Assignment) -> PackedAssignment {
+        self.headers.pack(part)
     }
 
-    /// Notes that a fact is no longer kept.
-    pub(crate) fn release(&mut self, fact: &Fact) {
-        match fact {
-            Fact::Part(part) => self.headers.release(part),
-            Fact::Passed(passage) => self.sets.release(passage.set),
-            Fact::Plan(_) | Fact::Arrivals(_) => {}
-        }
+    /// Keeps a passage.
+    pub(crate) fn keep_passage(&mut self, passed: &Passed) -> Passage {
+        let set = self.sets.share(&PassedSet { count: passed.set_count, ids: passed.set });
+        Passage { stamp: passed.stamp, set }
+    }
+
+    /// Notes that an assignment is no longer kept.
+    pub(crate) fn release_part(&mut self, part: &PackedAssignment) {
+        self.headers.release(part);
+    }
+
+    /// Notes that a passage is no longer kept.
+    pub(crate) fn release_passage(&mut self, passage: &Passage) {
+        self.sets.release(passage.set);
+    }
+
+    /// The group that the plan of an assignment is for.
+    pub(crate) fn scope(&self, part: &PackedAssignment) -> GroupId {
+        self.headers.scope(part)
     }
 
     /// The assignment that a fact is, if it is one.
-    pub(crate) fn assignment_of(&self, fact: &Fact) -> Option<Assignment> {
+    pub(crate) fn assignment_of(&self, fact: Fact<'_>) -> Option<Assignment> {
         let Fact::Part(part) = fact else { return None };
-        Some(self.headers.whole(part))
+        Some(self.headers.whole(&part))
     }
 
     /// The message that passes a fact about this subject on.
-    pub(crate) fn passed_on(&self, fact: &Fact, subject: Subject) -> Option<Message> {
+    pub(crate) fn passed_on(&self, fact: Fact<'_>, subject: Subject) -> Option<Message> {
         Some(match fact {
-            Fact::Plan(plan) => Message::Plan(**plan),
-            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(&self.headers.whole(part))),
-            Fact::Arrivals(row) => Message::Arrivals(**row),
+            Fact::Plan(plan) => Message::Plan(*plan),
+            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(&self.headers.whole(&part))),
+            Fact::Arrivals(row) => Message::Arrivals(*row),
             Fact::Passed(passage) => {
                 let &PassedSet { count, ids } = self.sets.get(passage.set);
                 let of = subject.drone()?.0.saturating_add(1);
@@ -104,17 +108,17 @@ impl FactValues {
     }
 
     /// The version of a fact.
-    pub(crate) fn version(&self, fact: &Fact) -> Version {
+    pub(crate) fn version(&self, fact: Fact<'_>) -> Version {
         match fact {
             Fact::Plan(plan) => Version::of(plan.id),
-            Fact::Part(part) => Version::of(self.headers.plan(part)),
+            Fact::Part(part) => Version::of(self.headers.plan(&part)),
             Fact::Arrivals(row) => Version::at(row.stamp),
             Fact::Passed(passage) => Version::at(passage.stamp),
         }
     }
 
     /// Whether a fact is that a drone has passed the same obstacles as this message reports.
-    pub(crate) fn is_same_passage(&self, known: &Fact, heard: MessageRef<'_>) -> bool {
+    pub(crate) fn is_same_passage(&self, known: Fact<'_>, heard: MessageRef<'_>) -> bool {
         let (Fact::Passed(passage), MessageRef::Passed(heard)) = (known, heard) else { return false };
         *self.sets.get(passage.set) == PassedSet { count: heard.set_count, ids: heard.set }
     }
@@ -137,15 +141,15 @@ mod tests {
     fn what_was_heard_is_passed_on_as_it_was() {
         let mut values = FactValues::default();
         let parts: Vec<Assignment> = (0..30).map(|number| part(number % 3, number)).collect();
-        let facts: Vec<Fact> = parts.iter().map(|part| values.fact(MessageRef::Assignment(part)).unwrap()).collect();
+        let kept: Vec<PackedAssignment> = parts.iter().map(|part| values.keep_part(part)).collect();
         assert_eq!(values.headers.count(), 3);
-        for (part, fact) in parts.iter().zip(&facts) {
-            let subject = Subject::Part(part.scope, part.drone);
-            assert_eq!(values.assignment_of(fact), Some(*part));
+        for (part, kept) in parts.iter().zip(&kept) {
+            let (subject, fact) = (Subject::Part(part.scope, part.drone), Fact::Part(*kept));
+            assert_eq!((values.assignment_of(fact), values.scope(kept)), (Some(*part), part.scope));
             assert_eq!(values.passed_on(fact, subject), Some(Message::AssignmentList(AssignmentList::of(part))));
             assert_eq!(values.version(fact), Version::of(part.id));
         }
-        facts.iter().for_each(|fact| values.release(fact));
+        kept.iter().for_each(|part| values.release_part(part));
         assert_eq!(values.headers.count(), 0);
     }
 
@@ -154,16 +158,17 @@ mod tests {
         let mut values = FactValues::default();
         let mut heard = Passed { stamp: SimTime(5), set_count: 2, ..Passed::zeroed() };
         heard.set[..2].copy_from_slice(&[ObstacleId(4), ObstacleId(6)]);
-        let fact = values.fact(MessageRef::Passed(&heard)).unwrap();
+        let passage = values.keep_passage(&heard);
+        let fact = Fact::Passed(passage);
         let expected = Passed { of: 8, ..heard };
-        assert_eq!(values.passed_on(&fact, Subject::Passed(DroneId(7))), Some(Message::Passed(expected)));
-        assert_eq!(values.version(&fact), Version::at(heard.stamp));
+        assert_eq!(values.passed_on(fact, Subject::Passed(DroneId(7))), Some(Message::Passed(expected)));
+        assert_eq!(values.version(fact), Version::at(heard.stamp));
         let later = Passed { stamp: SimTime(9), ..heard };
-        assert!(values.is_same_passage(&fact, MessageRef::Passed(&later)));
+        assert!(values.is_same_passage(fact, MessageRef::Passed(&later)));
         let mut other = later;
         other.set[1] = ObstacleId(7);
-        assert!(!values.is_same_passage(&fact, MessageRef::Passed(&other)));
-        values.release(&fact);
+        assert!(!values.is_same_passage(fact, MessageRef::Passed(&other)));
+        values.release_passage(&passage);
         assert_eq!(values.sets.used().count(), 0);
     }
 }

@@ -52,12 +52,13 @@ impl GossipRhythm {
 }
 
 /// The repetitions of one fact by one drone. A drone of a large swarm keeps thousands of them, so they are small.
+#[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gossip {
     /// Start of the present interval.
     since: SimTime,
-    /// How often the fact was heard in the present interval.
-    heard: u16,
+    /// How often the fact was heard in the present interval, up to 255.
+    heard: u8,
     /// How often the shortest interval has been doubled.
     doublings: u8,
     /// Number of turns, one after the other, in which it was silent because others had said the fact. Only if the rhythm varies.

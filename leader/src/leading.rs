@@ -214,7 +214,10 @@ impl Leading {
             }
         }
         for (source, message) in heard {
-            let MessageRef::Presence(presence) = message else { continue };
+            let MessageRef::Presence(presence) = message else {
+                peers.warm_full(source);
+                continue;
+            };
             let near = self.relays.is_near(&self.knowledge, source);
             for present in presence.present() {
                 let is_new = stamp_of(present.drone) < Some(present.stamp);

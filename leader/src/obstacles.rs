@@ -29,7 +29,8 @@ pub struct Known {
 /// The known obstacles, and which drones have passed them. Memory is bounded.
 #[derive(Clone, Debug, Default)]
 pub struct Obstacles {
-    known: BTreeMap<ObstacleId, Known>,
+    /// Each is apart, because a map has room for many, and most swarms meet few.
+    known: BTreeMap<ObstacleId, Box<Known>>,
     passed: BTreeMap<ObstacleId, DroneSet>,
     drones: u32,
     reach_m: f64,
@@ -63,7 +64,7 @@ impl Obstacles {
             let Some(grown) = grown(&known.shape, &shape, growth_m) else { return false };
             (known.shape, known.growths) = (grown, known.growths + 1);
         } else if self.known.len() < MAX_KNOWN {
-            self.known.insert(id, Known { shape, witness, since: now, growths: 0 });
+            self.known.insert(id, Box::new(Known { shape, witness, since: now, growths: 0 }));
         } else {
             return false;
         }
@@ -117,7 +118,7 @@ impl Obstacles {
     /// One obstacle.
     #[must_use]
     pub fn get(&self, id: ObstacleId) -> Option<&Known> {
-        self.known.get(&id)
+        self.known.get(&id).map(Box::as_ref)
     }
 
     /// Number of known obstacles.
@@ -128,7 +129,7 @@ impl Obstacles {
 
     /// All known obstacles, by id.
     pub fn iter(&self) -> impl Iterator<Item = (ObstacleId, &Known)> + Clone {
-        self.known.iter().map(|(&id, known)| (id, known))
+        self.known.iter().map(|(&id, known)| (id, known.as_ref()))
     }
 
     /// The outlines of these obstacles; `None` if one of them is not known.

@@ -73,6 +73,11 @@ impl AssignmentHeaders {
         Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved }
     }
 
+    /// The group that the plan is for.
+    pub(crate) fn scope(&self, packed: &PackedAssignment) -> GroupId {
+        self.0.get(packed.header).scope
+    }
+
     /// The plan that the assignment belongs to.
     pub(crate) fn plan(&self, packed: &PackedAssignment) -> PlanStamp {
         self.0.get(packed.header).id

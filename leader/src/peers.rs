@@ -1,13 +1,13 @@
 //! Which drones are there: the last beacon of each peer, and how old it is. Memory is bounded by the size of the swarm.
 
-use crate::adaptive_timeout::AdaptiveTimeout;
 use crate::beacons::{Beacon, Beacons};
 use crate::changes::Changes;
+use crate::heard::{Heard, Timeouts};
 use crate::quiet_blocks::QuietBlocks;
-use crate::tuning::{DELAY_WEIGHT, DIRECT_S, MAX_TIMEOUTS, RELAYED_TIMEOUTS};
+use crate::tuning::{DELAY_WEIGHT, DIRECT_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
-use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime, prefetch};
+use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime};
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -17,66 +17,6 @@ const LOOK_TIMEOUTS: f64 = 0.25;
 
 /// Of so many peers the age is told at a time. By hand.
 const AGES: usize = 64;
-
-/// Before every time of a mission.
-const NEVER: SimTime = SimTime(i64::MIN / 2);
-
-/// More than times in nanoseconds lose by rounding, s.
-const ROUNDING_S: f64 = 1e-6;
-
-/// When one peer was heard.
-#[derive(Clone, Copy, Debug)]
-struct Peer {
-    /// Of its beacons, by their times of arrival.
-    timeout: AdaptiveTimeout,
-    /// When it was last heard without a relay; [`NEVER`] if it never was.
-    direct: SimTime,
-}
-
-impl Peer {
-    /// The longest silence that is not yet significant, s: never more than [`MAX_TIMEOUTS`], however rarely it was heard, because a dead
-    /// drone must not count for long. `base_s`: time-out of a regular source. It is not kept, because a drone has a thousand peers.
-    fn silence_s(&self, base_s: f64) -> f64 {
-        self.timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
-    }
-
-    /// The longest time without word of it after which it still counts as living, s. Where others pass its state on, it comes once per
-    /// some time-outs at best, and at times not at all.
-    fn absence_s(&self, base: Timeouts) -> f64 {
-        if self.is_relayed() {
-            self.silence_s(base.relayed_s).max(RELAYED_TIMEOUTS * base.relayed_s)
-        } else {
-            self.silence_s(base.direct_s)
-        }
-    }
-
-    /// Whether the last word of it was passed on.
-    fn is_relayed(&self) -> bool {
-        self.timeout.last() > self.direct
-    }
-
-    fn lives(&self, now: SimTime, base: Timeouts) -> bool {
-        now.since(self.timeout.last()) <= self.absence_s(base)
-    }
-
-    fn is_direct(&self, now: SimTime, base: Timeouts) -> bool {
-        now.since(self.direct) <= self.silence_s(base.direct_s)
-    }
-
-    /// A moment until which it certainly lives.
-    fn lives_until(&self, base: Timeouts) -> SimTime {
-        self.timeout.last() + ((self.absence_s(base) - ROUNDING_S) * 1e9) as i64
-    }
-}
-
-/// Time-outs of regular sources, s.
-#[derive(Clone, Copy, Debug)]
-struct Timeouts {
-    /// Of a drone that is heard itself.
-    direct_s: f64,
-    /// Of one whose state is passed on.
-    relayed_s: f64,
-}
 
 /// The last beacon heard of each peer.
 #[derive(Clone, Debug)]
@@ -89,16 +29,14 @@ pub struct Peers {
     quiet: QuietBlocks,
     /// When peers are looked at again.
     next_look: SimTime,
-    /// The peers heard, ascending. Apart from `last`, so that a search touches little memory.
+    /// The peers heard, ascending. Apart from their beacons, so that a search touches little memory.
     ids: Vec<DroneId>,
     /// If the peers heard are the lowest ids but this one, as of the last look at all peers: then no search is needed.
     all_but: Option<DroneId>,
-    /// The last beacon of each of them, in the same order.
+    /// The last beacon of each of them, in the same order, and when each was heard.
     beacons: Beacons,
     /// Of their time stamps.
     changes: Changes,
-    /// When each of them was heard, in the same order.
-    last: Vec<Peer>,
     /// Those that were heard without a relay, ascending: all that may still count as heard so, and some that no longer do. In a wide
     /// swarm they are few.
     near: Vec<DroneId>,
@@ -121,7 +59,6 @@ impl Peers {
             all_but: None,
             beacons: Beacons::default(),
             changes: Changes::default(),
-            last: Vec::new(),
             near: Vec::new(),
             direct_until: SimTime::MAX,
         }
@@ -136,54 +73,45 @@ impl Peers {
     /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
     /// Age is by simulated time alone, which goes on when a process is restarted.
     pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
-        self.take(now, source, pose, Some(now));
+        self.take(now, source, pose, true);
     }
 
     /// Takes a beacon that another drone passed on. It is ignored if the peer itself is heard.
     pub fn hear_of(&mut self, now: SimTime, peer: DroneId, pose: Pose) {
         if !self.is_heard_now(peer, now) {
-            self.take(now, peer, pose, None);
+            self.take(now, peer, pose, false);
         }
     }
 
-    fn take(&mut self, now: SimTime, source: DroneId, pose: Pose, direct: Option<SimTime>) {
+    fn take(&mut self, now: SimTime, source: DroneId, pose: Pose, direct: bool) {
         let delay_s = now.since(pose.stamp);
         if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
             return;
         }
         let place = self.place(source);
-        let before = place.ok().map(|place| self.last[place].direct);
-        if let Some(heard) = before.filter(|heard| direct.is_some() && now.since(*heard) > self.base.direct_s) {
+        let before = place.ok().map(|place| self.beacons.heard(place).direct());
+        if let Some(heard) = before.filter(|heard| direct && now.since(*heard) > self.base.direct_s) {
             self.note_near(heard, source);
         }
         match place {
             Err(place) => {
-                if direct.is_some() {
+                if direct {
                     self.note_near(now, source);
                 }
-                let timeout = self.prior(now, direct.is_some());
-                let peer = Peer { timeout, direct: direct.unwrap_or(NEVER) };
+                let heard = Heard::first(now, direct, self.base);
                 self.ids.insert(place, source);
-                self.quiet.insert(place, peer.lives_until(self.base), self.ids.len());
+                self.quiet.insert(place, heard.lives_until(self.base), self.ids.len());
                 self.all_but = None;
-                self.beacons.insert(place, &pose);
-                self.last.insert(place, peer);
+                self.beacons.insert(place, &pose, heard, !direct);
                 self.changes.note_moved(self.ids.len());
             }
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
-                let prior = self.prior(now, false);
-                let peer = &mut self.last[place];
-                let longest_s = peer.absence_s(self.base);
-                if direct.is_none() && peer.timeout.last() <= peer.direct {
-                    peer.timeout = prior;
-                }
-                peer.direct = direct.unwrap_or(peer.direct);
-                peer.timeout.hear(now, 0.0, longest_s);
-                self.beacons.replace(place, &pose);
+                let heard = self.beacons.replace(place, &pose, !direct);
+                heard.again(now, direct, self.base);
+                let until = heard.lives_until(self.base);
                 self.changes.note(place);
-                let until = peer.lives_until(self.base);
                 self.quiet.note(place, until);
-                if direct.is_some() {
+                if direct {
                     self.delay_s += DELAY_WEIGHT * (delay_s - self.delay_s);
                 }
             }
@@ -196,15 +124,10 @@ impl Peers {
 
     /// Adds a peer to those heard without a relay. It was last heard so at this time, or later.
     fn note_near(&mut self, heard: SimTime, peer: DroneId) {
-        self.direct_until = self.direct_until.min(self.certain_until(heard));
+        self.direct_until = self.direct_until.min(self.base.certain_until(heard));
         if let Err(place) = self.near.binary_search(&peer) {
             self.near.insert(place, peer);
         }
-    }
-
-    /// What is assumed of the gaps between the beacons of a peer. Those that are passed on come rarely.
-    fn prior(&self, now: SimTime, direct: bool) -> AdaptiveTimeout {
-        if direct { AdaptiveTimeout::new(now) } else { AdaptiveTimeout::expecting(now, self.base.relayed_s) }
     }
 
     /// Finds out anew until when no peer is silent for too long. In a wide swarm most peers are far away. They may be silent for longer, and
@@ -212,8 +135,8 @@ impl Peers {
     fn look_for_silence(&mut self, now: SimTime) {
         self.next_look = now.after(LOOK_TIMEOUTS * self.base.direct_s);
         self.look_near(now);
-        let (last, base) = (&self.last, self.base);
-        self.quiet.look(self.next_look, last.len(), |place| last[place].lives_until(base));
+        let (beacons, base) = (&self.beacons, self.base);
+        self.quiet.look(self.next_look, self.ids.len(), |place| beacons.heard(place).lives_until(base));
         self.all_but = self.all_but.or_else(|| lowest_but_one(&self.ids));
         self.beacons.tidy();
     }
@@ -223,23 +146,13 @@ impl Peers {
         self.direct_until = SimTime::MAX;
         near.retain(|id| {
             let Some(peer) = self.get(*id).copied() else { return false };
-            let stays = !self.is_far(&peer, now);
+            let stays = !peer.is_far(now, self.base);
             if stays {
-                self.direct_until = self.direct_until.min(self.certain_until(peer.direct));
+                self.direct_until = self.direct_until.min(self.base.certain_until(peer.direct()));
             }
             stays
         });
         self.near = near;
-    }
-
-    /// Whether a peer certainly does not count as heard without a relay: no silence is significant only after longer.
-    fn is_far(&self, peer: &Peer, now: SimTime) -> bool {
-        now.since(peer.direct) > MAX_TIMEOUTS * self.base.direct_s
-    }
-
-    /// Until when a peer that is heard at this time certainly counts as heard.
-    fn certain_until(&self, heard: SimTime) -> SimTime {
-        heard + ((self.base.direct_s - ROUNDING_S) * 1e9) as i64
     }
 
     /// The index of a peer, or where it belongs. Once all drones have been heard, no search is needed: the index is the id,
@@ -255,16 +168,23 @@ impl Peers {
         found.map_or_else(|| self.ids.binary_search(&peer), Ok)
     }
 
-    fn get(&self, peer: DroneId) -> Option<&Peer> {
-        self.place(peer).ok().map(|place| &self.last[place])
+    fn get(&self, peer: DroneId) -> Option<&Heard> {
+        self.place(peer).ok().map(|place| self.beacons.heard(place))
     }
 
-    /// Fetches all about a peer into the cache.
+    /// Fetches all about a peer into the cache, but for what [`Self::warm_full`] does.
     #[inline]
     pub(crate) fn warm(&self, peer: DroneId) {
         if let Ok(place) = self.place(peer) {
             self.beacons.warm(place);
-            prefetch(&self.last[place]);
+        }
+    }
+
+    /// Fetches what a peer says more than what is passed on into the cache. It reads what [`Self::warm`] fetches.
+    #[inline]
+    pub(crate) fn warm_full(&self, peer: DroneId) {
+        if let Ok(place) = self.place(peer) {
+            self.beacons.warm_full(place);
         }
     }
 
@@ -279,6 +199,7 @@ impl Peers {
     /// Fetches all about the peers that may count as heard without a relay into the cache.
     pub(crate) fn warm_near(&self) {
         self.near.iter().for_each(|peer| self.warm(*peer));
+        self.beacons.warm_few();
     }
 
     /// Fetches the time stamp of a peer's last beacon into the cache.
@@ -291,7 +212,7 @@ impl Peers {
 
     /// Whether a peer's own beacon was heard just now.
     pub(crate) fn is_heard_now(&self, peer: DroneId, now: SimTime) -> bool {
-        self.get(peer).is_some_and(|known| now.since(known.direct) <= DIRECT_S)
+        self.get(peer).is_some_and(|known| now.since(known.direct()) <= DIRECT_S)
     }
 
     /// Whether a peer is heard without a relay.
@@ -302,7 +223,7 @@ impl Peers {
     /// The peers that are heard without a relay, by id.
     pub(crate) fn direct(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let all = now <= self.direct_until;
-        self.near(move |place| all || self.last[place].is_direct(now, self.base))
+        self.near(move |place| all || self.beacons.heard(place).is_direct(now, self.base))
     }
 
     /// Number of peers that may count as heard without a relay.
@@ -312,7 +233,7 @@ impl Peers {
 
     /// The peers whose own beacon was heard within the last `within_s`, by id.
     pub(crate) fn heard_within(&self, now: SimTime, within_s: f64) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
-        self.near(move |place| now.since(self.last[place].direct) <= within_s)
+        self.near(move |place| now.since(self.beacons.heard(place).direct()) <= within_s)
     }
 
     /// Those of the peers that may count as heard without a relay which do, by id. `counts`: whether the peer at an index does.
@@ -350,7 +271,6 @@ impl Peers {
             self.ids.remove(place);
             self.all_but = None;
             self.beacons.remove(place);
-            self.last.remove(place);
             self.quiet.remove(place, self.ids.len());
             self.changes.note_moved(self.ids.len());
             self.near.retain(|near| *near != peer);
@@ -399,15 +319,14 @@ impl Peers {
     /// Peers that are not silent for too long, by id.
     pub fn living(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
         let all = self.quiet.are_quiet(now);
-        let lives = move |place, peer: &Peer| all || self.quiet.is_quiet(place, now) || peer.lives(now, self.base);
-        let living = self.known().enumerate().filter(move |&(place, (_, known, _))| lives(place, known));
-        living.map(|(_, (id, _, beacon))| (id, beacon))
+        let living = self.all().enumerate().filter(move |&(place, _)| all || self.is_living_at(place, now));
+        living.map(|(_, peer)| peer)
     }
 
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
         let suspects = self.quiet.suspects(now, self.ids.len());
-        suspects.filter(move |&place| !self.last[place].lives(now, self.base)).map(|place| self.at(place))
+        suspects.filter(move |&place| !self.beacons.heard(place).lives(now, self.base)).map(|place| self.at(place))
     }
 
     /// The time stamps of the last beacons of all peers ever heard, by id, without the beacons themselves.
@@ -428,8 +347,8 @@ impl Peers {
     }
 
     /// All peers ever heard, by id, with their last beacons.
-    pub fn all(&self) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
-        self.known().map(|(id, _, beacon)| (id, beacon))
+    pub fn all(&self) -> impl Iterator<Item = (DroneId, Beacon<'_>)> + Clone {
+        self.ids.iter().copied().zip(self.beacons.iter())
     }
 
     /// The id and the last beacon of the peer at this index of [`Self::stamps`].
@@ -447,7 +366,7 @@ impl Peers {
     /// If there is no such peer.
     #[must_use]
     pub fn is_living_at(&self, index: usize, now: SimTime) -> bool {
-        self.quiet.is_quiet(index, now) || self.last[index].lives(now, self.base)
+        self.quiet.is_quiet(index, now) || self.beacons.heard(index).lives(now, self.base)
     }
 
     /// Adds how old the last beacons of living peers are, s. Of more than 64 peers it looks at 64, in turn from the one at the index `first`
@@ -458,11 +377,6 @@ impl Peers {
         let places = (first..count).chain(0..first).take(AGES);
         let living = places.filter(|&place| self.is_living_at(place, now));
         ages.extend(living.map(|place| now.since(self.stamps()[place])));
-    }
-
-    fn known(&self) -> impl Iterator<Item = (DroneId, &Peer, Beacon<'_>)> + Clone {
-        let known = self.ids.iter().zip(&self.last).zip(self.beacons.iter());
-        known.map(|((&id, peer), beacon)| (id, peer, beacon))
     }
 }
 
@@ -587,7 +501,7 @@ mod tests {
             }
             let silent: Vec<u32> = peers.silent(now).map(|(id, _)| id.0).collect();
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
-            let lives = |id: &u32| peers.known().any(|(known, peer, _)| known.0 == *id && peer.lives(now, peers.base));
+            let lives = |id: &u32| peers.get(DroneId(*id)).is_some_and(|heard| heard.lives(now, peers.base));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
             was_silent.extend(silent.iter().copied());
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 type Kind = (PlanStamp, GroupId, Ballot);
 
 /// What was said of one drone. Each drone keeps this for all drones of the swarm, so it is small.
+#[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
     /// Time stamp of the newest state of it that the neighbourhood heard, as far as this drone knows.
@@ -23,7 +24,7 @@ struct Told {
     /// When the neighbourhood last heard of it, as far as this drone knows.
     covered: SimTime,
     /// How often the news is said at once.
-    left: u32,
+    left: u8,
     /// Whether this drone has heard of it.
     known: bool,
 }

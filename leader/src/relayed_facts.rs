@@ -3,11 +3,12 @@
 //! A large swarm has a thousand assignments, so a drone looks at those only whose turn has come.
 
 use crate::beacons::Beacon;
-use crate::fact_store::FactStore;
-use crate::fact_values::{Fact, FactValues, Version};
+use crate::fact_store::{FactStore, Known};
+use crate::fact_values::{Fact, Version};
 use crate::gossip::{Gossip, GossipRhythm};
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
+use crate::pool::Pool;
 use crate::subject::Subject;
 use crate::tuning::{DETOUR_DOUBLINGS, PASSAGES, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
@@ -27,18 +28,29 @@ enum Need {
     Over,
 }
 
-/// A message that may be passed on.
-#[derive(Clone, Debug)]
+/// What is kept with each message. A drone of a large swarm keeps thousands of them, so it is small.
+#[repr(C, packed(4))]
+#[derive(Clone, Copy, Debug)]
 struct Relayed {
-    fact: Fact,
-    /// The drone it was first heard from.
-    from: DroneId,
     /// When it was last heard.
     heard: SimTime,
-    gossip: Gossip,
+    /// The place of what tells when it is passed on; [`DONE`] if it never is again.
+    passing: u32,
+}
+
+/// When a message is passed on.
+#[repr(C, packed(4))]
+#[derive(Clone, Copy, Debug)]
+struct Passing {
     /// When it is looked at next; [`NO_TURN`] if it need not be passed on again, unless [`RelayedFacts::wake`] is called.
     turn: SimTime,
+    gossip: Gossip,
+    /// The drone it was first heard from.
+    from: DroneId,
 }
+
+/// [`Relayed::passing`] of a message that is never passed on again.
+const DONE: u32 = u32::MAX;
 
 /// The turn of a message that need not be passed on.
 const NO_TURN: SimTime = SimTime::MAX;
@@ -48,8 +60,9 @@ const NO_TURN: SimTime = SimTime::MAX;
 pub(crate) struct RelayedFacts {
     rhythm: GossipRhythm,
     room: usize,
+    drones: u32,
     known: FactStore<Relayed>,
-    values: FactValues,
+    passing: Pool<Passing>,
     /// The messages that will be looked at, by their turns.
     turns: Turns<Subject>,
     /// No message is forgotten earlier than [`RELAY_MEMORY_S`] after this.
@@ -65,8 +78,9 @@ impl RelayedFacts {
         Self {
             rhythm: GossipRhythm::varying(params.repeat_period_s, params.me),
             room: 8 * params.drones as usize + 64,
+            drones: params.drones,
             known: FactStore::new(params.drones),
-            values: FactValues::default(),
+            passing: Pool::default(),
             turns: Turns::default(),
             heard_since: params.start,
             passage_s: passage_s(params.drones),
@@ -76,7 +90,7 @@ impl RelayedFacts {
     /// Forgets all.
     pub(crate) fn clear(&mut self) {
         self.known.clear();
-        self.values = FactValues::default();
+        self.passing = Pool::default();
         self.turns.clear();
     }
 
@@ -88,13 +102,14 @@ impl RelayedFacts {
         }
         self.heard_since = now;
         let passage_s = self.passage_s;
-        let stays = |one: &Relayed| {
-            let memory_s = if matches!(one.fact, Fact::Passed(_)) { passage_s } else { RELAY_MEMORY_S };
+        let stays = |fact: Fact<'_>, one: &Relayed| {
+            let memory_s = if matches!(fact, Fact::Passed(_)) { passage_s } else { RELAY_MEMORY_S };
             let stays = now.since(one.heard) < memory_s;
             if stays {
-                self.heard_since = self.heard_since.min(one.heard.after(memory_s - RELAY_MEMORY_S));
-            } else {
-                self.values.release(&one.fact);
+                let heard = one.heard;
+                self.heard_since = self.heard_since.min(heard.after(memory_s - RELAY_MEMORY_S));
+            } else if one.passing != DONE {
+                self.passing.remove(one.passing);
             }
             stays
         };
@@ -105,58 +120,61 @@ impl RelayedFacts {
 
     /// Fetches what is kept of the drones that a message of `source` is about into the cache.
     pub(crate) fn warm(&self, source: DroneId, message: MessageRef<'_>) {
-        let warm = |drone| self.known.warm(drone);
         match message {
-            MessageRef::Assignment(part) => warm(part.drone),
-            MessageRef::AssignmentList(list) => list.assignments().for_each(|part| warm(part.drone)),
-            MessageRef::Arrivals(row) => warm(row.drone),
-            MessageRef::Passed(passed) => warm(passed.drone(source)),
-            _ => {}
+            MessageRef::AssignmentList(list) => {
+                list.assignments().for_each(|part| self.known.warm(&Subject::Part(part.scope, part.drone)));
+            }
+            message => subject(source, message).iter().for_each(|(subject, _)| self.known.warm(subject)),
         }
     }
 
     /// Notes a message of `source`. `near`: that drone is close to this one.
     pub(crate) fn hear(&mut self, now: SimTime, source: DroneId, message: MessageRef<'_>, near: bool) {
         let Some((subject, version)) = subject(source, message) else { return };
+        if subject.drone().is_some_and(|drone| drone.0 >= self.drones) {
+            return;
+        }
         let full = self.known.len() >= self.room;
-        let mut old = self.known.get_mut(&subject);
-        if let Some(one) = &mut old {
-            let known = self.values.version(&one.fact);
-            if known == version {
-                one.heard = now;
-                if near {
-                    one.gossip.hear();
+        if let Some(known) = self.known.get_mut(&subject) {
+            if known.version() == version {
+                known.with.heard = now;
+                if near && let Some(passing) = self.passing.get_mut(known.with.passing) {
+                    passing.gossip.hear();
                 }
             }
-            if known >= version || self.values.is_same_passage(&one.fact, message) {
+            if known.version() >= version || known.is_same_passage(message) {
                 return;
             }
         } else if full {
             return;
         }
-        let Some(fact) = self.values.fact(message) else { return };
         let gossip = Gossip::new(now);
         let turn = gossip.next_turn(&self.rhythm);
-        let new = Relayed { fact, from: source, heard: now, gossip, turn };
-        if let Some(one) = old {
-            let one = std::mem::replace(one, new);
-            self.values.release(&one.fact);
-            if one.turn != NO_TURN {
-                self.turns.remove(one.turn, subject);
-            }
-        } else {
-            self.known.insert(subject, new);
+        let passing = self.passing.add(Passing { turn, gossip, from: source });
+        if let Some(old) = self.known.keep(subject, message, Relayed { heard: now, passing }) {
+            self.stop(subject, old.passing);
         }
         self.turns.add(turn, subject);
+    }
+
+    /// What is at this place does not tell any more when a message about this subject is passed on.
+    fn stop(&mut self, subject: Subject, passing: u32) {
+        let Some(old) = self.passing.get(passing) else { return };
+        if old.has_turn() {
+            self.turns.remove(old.turn, subject);
+        }
+        self.passing.remove(passing);
     }
 
     /// Notes that what a drone obeys has changed: it may need its assignments again.
     pub(crate) fn wake(&mut self, now: SimTime, drone: DroneId) {
         let turn = Gossip::new(now).next_turn(&self.rhythm);
-        for (scope, one) in self.known.parts_of(drone).filter(|(_, one)| one.turn == NO_TURN) {
-            one.turn = turn;
-            self.turns.add(turn, Subject::Part(scope, drone));
-        }
+        self.known.change_parts_of(drone, |scope, one| {
+            if let Some(passing) = self.passing.get_mut(one.passing).filter(|passing| !passing.has_turn()) {
+                passing.turn = turn;
+                self.turns.add(turn, Subject::Part(scope, drone));
+            }
+        });
     }
 
     /// Says what is due, until `last` messages are said. Assignments of one group share messages. This drone is at `position`,
@@ -164,39 +182,51 @@ impl RelayedFacts {
     pub(crate) fn speak(&mut self, k: &Knowledge, now: SimTime, position: Vec2, last: usize, say: &mut Vec<Message>) {
         for subject in self.turns.due(now).take(DUE_AT_ONCE).filter(|_| say.len() < last) {
             if let Subject::Part(_, drone) = subject {
-                self.known.warm(drone);
+                self.known.warm(&subject);
                 k.peers().warm(drone);
             }
         }
         let first = say.len();
         while let Some(subject) = self.turns.first_due(now) {
-            let one = self.known.get_mut(&subject);
-            let part = one.as_ref().and_then(|one| self.values.assignment_of(&one.fact));
+            let known = self.known.get_mut(&subject);
+            let part = known.as_ref().and_then(Known::assignment);
             let open = part.and_then(|part| open_list(&say[first..], &part));
             if open.is_none() && say.len() >= last {
                 break;
             }
             self.turns.take_due(now);
-            let Some(one) = one else { continue };
-            let need = need(k, now, subject, part, one);
-            if need == Need::Now && one.gossip.is_due(&self.rhythm, now) && is_on_the_way(k, position, part, one) {
+            let Some(known) = known else { continue };
+            let Some(passing) = self.passing.get_mut(known.with.passing) else { continue };
+            let need = need(k, now, subject, part, (known.fact(), passing));
+            let is_due = need == Need::Now && passing.gossip.is_due(&self.rhythm, now);
+            if is_due && is_on_the_way(k, position, part, passing) {
                 match (open.and_then(|place| say.get_mut(first + place)), part) {
                     (Some(Message::AssignmentList(list)), Some(part)) => drop(list.push(&part)),
-                    _ => say.extend(self.values.passed_on(&one.fact, subject)),
+                    _ => say.extend(known.passed_on(subject)),
                 }
             }
-            one.turn = one.next_look(&self.rhythm, now, need);
-            if one.turn != NO_TURN {
-                self.turns.add(one.turn, subject);
+            passing.turn = passing.next_look(&self.rhythm, now, known.fact(), need);
+            if passing.has_turn() {
+                self.turns.add(passing.turn, subject);
+            } else if part.is_none() {
+                // Only assignments are needed again.
+                self.passing.remove(known.with.passing);
+                known.with.passing = DONE;
             }
         }
     }
 }
 
-impl Relayed {
+impl Passing {
+    /// Whether the message is looked at again.
+    fn has_turn(&self) -> bool {
+        let turn = self.turn;
+        turn != NO_TURN
+    }
+
     /// When the message is looked at again after a look at `now`, or [`NO_TURN`].
-    fn next_look(&self, rhythm: &GossipRhythm, now: SimTime, need: Need) -> SimTime {
-        match (&self.fact, need) {
+    fn next_look(&self, rhythm: &GossipRhythm, now: SimTime, fact: Fact<'_>, need: Need) -> SimTime {
+        match (fact, need) {
             (Fact::Arrivals(_) | Fact::Passed(_), _) if !self.gossip.is_first() => NO_TURN,
             (_, Need::Over) => NO_TURN,
             (Fact::Plan(_), Need::Later) => now.after(rhythm.shortest_s()),
@@ -228,28 +258,35 @@ fn subject(source: DroneId, message: MessageRef<'_>) -> Option<(Subject, Version
 }
 
 /// Whether some drone may still need the message. `part`: the assignment that it brings.
-fn need(k: &Knowledge, now: SimTime, subject: Subject, part: Option<Assignment>, one: &Relayed) -> Need {
+fn need(
+    k: &Knowledge,
+    now: SimTime,
+    subject: Subject,
+    part: Option<Assignment>,
+    (fact, passing): (Fact<'_>, &Passing),
+) -> Need {
     let now_or_later = |wanted| if wanted { Need::Now } else { Need::Later };
-    if let (Subject::Plan(scope), Fact::Plan(plan)) = (subject, &one.fact) {
+    if let (Subject::Plan(scope), Fact::Plan(plan)) = (subject, fact) {
         return now_or_later(is_plan_wanted(k, now, scope, plan));
     }
-    let Some(part) = part else { return now_or_later(one.gossip.is_first()) };
+    let is_first = passing.gossip.is_first();
+    let Some(part) = part else { return now_or_later(is_first) };
     match k.peers().last_of_living(part.drone, now) {
         Some(pose) if is_late(&pose, part.id.ballot, part.id.epoch) => Need::Now,
         // Unless it was said, it is said once if the drone falls silent.
-        Some(_) if one.gossip.is_first() => Need::Later,
+        Some(_) if is_first => Need::Later,
         Some(_) => Need::Over,
-        None => now_or_later(one.gossip.is_first()),
+        None => now_or_later(is_first),
     }
 }
 
 /// Whether this drone, which is at `position`, is closer to the drone that a message is for than the one it heard it from. In the end
 /// the message is passed on in all directions. `part`: the assignment that it brings.
-fn is_on_the_way(k: &Knowledge, position: Vec2, part: Option<Assignment>, one: &Relayed) -> bool {
+fn is_on_the_way(k: &Knowledge, position: Vec2, part: Option<Assignment>, passing: &Passing) -> bool {
     let Some(pose) = part.and_then(|part| k.peers().last(part.drone)) else { return true };
     let away_m = |from: Vec2| (from - pose.position()).norm();
-    let closer = || k.peers().last(one.from).is_none_or(|from| away_m(position) < away_m(from.position()));
-    one.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
+    let closer = || k.peers().last(passing.from).is_none_or(|from| away_m(position) < away_m(from.position()));
+    passing.gossip.doublings() >= DETOUR_DOUBLINGS || closer()
 }
 
 /// Whether a neighbour of the plan's group does not obey it yet.
@@ -274,8 +311,9 @@ mod tests {
         let mut facts = RelayedFacts {
             rhythm: GossipRhythm::varying(0.2, DroneId(8)),
             room: 64,
+            drones: 8,
             known: FactStore::new(8),
-            values: FactValues::default(),
+            passing: Pool::default(),
             turns: Turns::default(),
             heard_since: SimTime::ZERO,
             passage_s: RELAY_MEMORY_S,
@@ -304,9 +342,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_of_a_drone_is_small() {
-        // Each drone of a swarm of a thousand keeps up to three entries about each other drone.
-        assert_eq!(size_of::<(Subject, Relayed)>(), 96);
+    fn what_is_kept_with_a_message_takes_little_memory() {
+        assert_eq!((size_of::<Relayed>(), size_of::<Passing>()), (12, 24));
     }
 
     #[test]
@@ -315,8 +352,9 @@ mod tests {
             let mut facts = RelayedFacts {
                 rhythm: GossipRhythm::varying(0.2, DroneId(8)),
                 room: 64,
+                drones: 9,
                 known: FactStore::new(9),
-                values: FactValues::default(),
+                passing: Pool::default(),
                 turns: Turns::default(),
                 heard_since: SimTime::ZERO,
                 passage_s: passage_s(drones),

@@ -158,7 +158,7 @@ pub(crate) const UNPACED: usize = 32;
 /// An assignment is passed on by drones in all directions from this interval on. No unit. 2. By hand.
 pub(crate) const DETOUR_DOUBLINGS: u32 = 2;
 /// A drone's news is passed on this many times at once. 2. By hand.
-pub(crate) const NEWS_TIMES: u32 = 2;
+pub(crate) const NEWS_TIMES: u8 = 2;
 /// Drones without news are passed on once per this many repeat periods. No unit. 8: with the default period every 1.6 s. By
 /// hand.
 pub(crate) const PRESENCE_REPEATS: f64 = 8.0;

@@ -225,6 +225,9 @@ fn carry_out(command: ProcessCommand, drones: &mut [InlineDrone], factory: &Dron
     }
 }
 
+/// Number of frames for which a drone keeps memory. By hand: most ticks have one or none.
+const FEW_FRAMES: usize = 4;
+
 /// One drone and its answer to the current tick.
 struct InlineDrone {
     /// `None` once it was killed.
@@ -257,6 +260,8 @@ impl InlineDrone {
         let said = pilot_host.step(down, scratch, &mut self.slot, stats);
         drop(in_pilot);
         self.frames.clear();
+        // In a few ticks a drone says much.
+        self.frames.shrink_to(FEW_FRAMES);
         self.frames.extend(said.frames());
     }
 }
