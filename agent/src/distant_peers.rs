@@ -82,16 +82,16 @@ impl<T> DistantPeers<T> {
         distant: impl Fn(usize) -> Option<Distant>,
         copy: impl Fn(usize) -> T,
     ) {
+        let mut all = 0..0;
         if !self.suspect_changed(count, changes, &copy) {
             self.forget(count);
-            (0..count).for_each(|index| self.sort_in(index, distant(index), &copy));
-            return;
-        }
-        if self.travelled_m >= self.least_m {
+            all = 0..count;
+        } else if self.travelled_m >= self.least_m {
             self.suspect_near();
         }
-        while let Some(index) = self.suspects.pop() {
-            self.sort_in(index as usize, distant(index as usize), &copy);
+        // One call of `distant` for both cases, because it is a part of this loop then.
+        while let Some(index) = all.next().or_else(|| Some(self.suspects.pop()? as usize)) {
+            self.sort_in(index, distant(index), &copy);
         }
     }
 
@@ -158,6 +158,7 @@ impl<T> DistantPeers<T> {
     }
 
     /// Notes where a peer is. `distant`: by how much it is out of reach, if it is.
+    #[inline]
     fn sort_in(&mut self, index: usize, distant: Option<Distant>, copy: impl Fn(usize) -> T) {
         if let Some(distant) = distant {
             self.note(index, distant);
@@ -202,6 +203,7 @@ impl<T> DistantPeers<T> {
         was_distant
     }
 
+    #[inline]
     fn note(&mut self, index: usize, distant: Distant) {
         self.speed_mps = self.speed_mps.max(distant.speed_mps);
         let until_m = at_most(self.travelled_m + distant.beyond_m - ROUNDING_M);

@@ -50,7 +50,8 @@ struct NearPeer {
 impl NearPeer {
     #[inline]
     fn new((id, pose): (DroneId, Beacon<'_>)) -> Self {
-        Self { id, stamp: pose.stamp(), position: pose.position(), velocity: pose.velocity() }
+        let (position, velocity) = pose.flight();
+        Self { id, stamp: pose.stamp(), position, velocity }
     }
 
     /// Where it is relative to this drone if it has kept its velocity, m.

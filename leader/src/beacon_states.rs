@@ -1,7 +1,6 @@
 //! Where the drones of many beacons are, in little memory. What is passed on about a drone is less than what the drone says itself, and in a
 //! large swarm most is passed on.
 
-use crate::pool::Pool;
 use skein_protocol::payload::{MAX_PLACES, Pose, QueuePlace};
 use skein_protocol::{Vec2, horizontal, prefetch};
 
@@ -20,7 +19,9 @@ pub(crate) struct BriefState {
 /// The states that say more than what is passed on. Every value is kept as it was heard.
 #[derive(Clone, Default)]
 pub(crate) struct FullStates {
-    states: Pool<FullState>,
+    states: Vec<FullState>,
+    /// The places that are free.
+    free: Vec<u32>,
     /// First and second entries of [`Pose::queue`]. A list is empty while all its entries are unused.
     queues: [Vec<QueuePlace>; MAX_PLACES],
 }
@@ -57,8 +58,9 @@ impl BriefState {
     }
 
     /// A state in full at this place.
-    fn at(place: u32) -> Self {
-        Self { position_m: [0.0; 3], velocity_mps: [0.0; 2], place }
+    #[inline]
+    pub(crate) fn at(place: usize) -> Self {
+        Self { position_m: [0.0; 3], velocity_mps: [0.0; 2], place: place as u32 }
     }
 }
 
@@ -72,12 +74,12 @@ fn brief(number: f64) -> Option<f32> {
 impl FullStates {
     /// Number of states and of free places.
     pub(crate) fn len(&self) -> usize {
-        self.states.places().len()
+        self.states.len()
     }
 
     #[inline]
     fn full(&self, state: &BriefState) -> Option<&FullState> {
-        self.states.get(state.place)
+        self.states.get(state.place as usize)
     }
 
     /// The horizontal part of the position, world frame, m.
@@ -95,6 +97,15 @@ impl FullStates {
         match self.full(state) {
             Some(full) => horizontal(full.velocity_mps),
             None => Vec2::new(state.velocity_mps[0].into(), state.velocity_mps[1].into()),
+        }
+    }
+
+    /// The horizontal parts of position and velocity, world frame, m and m/s.
+    #[inline]
+    pub(crate) fn flight(&self, state: &BriefState) -> (Vec2, Vec2) {
+        match self.full(state) {
+            Some(full) => (horizontal(full.position_m), horizontal(full.velocity_mps)),
+            None => (self.position(state), self.velocity(state)),
         }
     }
 
@@ -129,36 +140,57 @@ impl FullStates {
             return brief;
         }
         if let Some(old) = old
-            && let Some(full) = self.states.get_mut(old.place)
+            && let Some(full) = self.states.get_mut(old.place as usize)
         {
             let was_queued = std::mem::replace(full, pose.into()).queued;
             if was_queued || full.queued {
-                self.set_queue(old.place, pose);
+                self.set_queue(old.place as usize, pose);
             }
             return *old;
         }
-        let place = self.states.add(pose.into());
+        let place = self.free.pop().map_or(self.states.len(), |place| place as usize);
+        match self.states.get_mut(place) {
+            Some(free) => *free = pose.into(),
+            None => self.states.push(pose.into()),
+        }
         self.set_queue(place, pose);
         BriefState::at(place)
+    }
+
+    /// Keeps a state at this place, while none is free. The places of those from there on rise by one.
+    pub(crate) fn insert(&mut self, place: usize, pose: &Pose) {
+        self.states.insert(place, pose.into());
+        for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
+            queue.insert(place, QueuePlace::default());
+        }
+        self.set_queue(place, pose);
+    }
+
+    /// Removes the state at this place, while none is free. The places of those behind it fall by one.
+    pub(crate) fn remove(&mut self, place: usize) {
+        self.states.remove(place);
+        for queue in self.queues.iter_mut().filter(|queue| !queue.is_empty()) {
+            queue.remove(place);
+        }
     }
 
     /// Forgets a state.
     pub(crate) fn release(&mut self, state: &BriefState) {
         if self.full(state).is_some() {
-            self.states.remove(state.place);
+            self.free.push(state.place);
             let places = self.queues.iter_mut().filter_map(|queue| queue.get_mut(state.place as usize));
             places.for_each(|place| *place = QueuePlace::default());
         }
     }
 
     #[inline]
-    fn set_queue(&mut self, place: u32, pose: &Pose) {
+    fn set_queue(&mut self, place: usize, pose: &Pose) {
         for (queue, heard) in self.queues.iter_mut().zip(pose.queue) {
-            if let Some(kept) = queue.get_mut(place as usize) {
+            if let Some(kept) = queue.get_mut(place) {
                 *kept = heard;
             } else if heard != QueuePlace::default() {
-                queue.resize(self.states.places().len(), QueuePlace::default());
-                queue[place as usize] = heard;
+                queue.resize(self.states.len(), QueuePlace::default());
+                queue[place] = heard;
             }
         }
     }
@@ -181,7 +213,7 @@ impl FullStates {
     /// Fetches all of them into the cache.
     #[inline]
     pub(crate) fn warm_all(&self) {
-        prefetch(self.states.places());
+        prefetch(self.states.as_slice());
     }
 
     /// Fetches the places in queues of a state into the cache.

@@ -14,7 +14,10 @@ pub(crate) struct Beacons {
     /// Their time stamps. Each tick reads all of them.
     stamps: Vec<SimTime>,
     lines: Vec<Line>,
+    /// By index, until the first beacon comes that was passed on.
     full: FullStates,
+    /// Whether one has come.
+    divided: bool,
     allegiances: SharedValues<Allegiance>,
     /// Number of the drones that say which part of the swarm they hear: [`Pose::hears`].
     hearing_parts: usize,
@@ -27,6 +30,7 @@ struct Line {
     heard: Heard,
     /// Index of the drone's [`Allegiance`].
     allegiance: u32,
+    /// Not used before the first beacon comes that was passed on.
     state: BriefState,
 }
 
@@ -60,6 +64,18 @@ impl Beacons {
         Beacon { beacons: self, index }
     }
 
+    /// The state at an index.
+    #[inline]
+    fn state(&self, index: usize) -> BriefState {
+        if self.divided { self.lines[index].state } else { BriefState::at(index) }
+    }
+
+    /// From now on, states are not by index.
+    fn divide(&mut self) {
+        self.divided = true;
+        self.lines.iter_mut().enumerate().for_each(|(index, line)| line.state = BriefState::at(index));
+    }
+
     /// When the drone at an index was heard.
     #[inline]
     pub(crate) fn heard(&self, index: usize) -> &Heard {
@@ -71,18 +87,23 @@ impl Beacons {
     pub(crate) fn warm(&self, index: usize) {
         self.warm_stamp(index);
         prefetch(&self.lines[index]);
+        if !self.divided {
+            self.full.warm(&BriefState::at(index));
+        }
     }
 
     /// Fetches what a beacon says more than one that is passed on into the cache.
     #[inline]
     pub(crate) fn warm_full(&self, index: usize) {
-        self.full.warm(&self.lines[index].state);
+        if self.divided {
+            self.full.warm(&self.lines[index].state);
+        }
     }
 
     /// Fetches what all beacons say more than those that are passed on into the cache, if they are few.
     #[inline]
     pub(crate) fn warm_few(&self) {
-        if 2 * self.full.len() < self.lines.len() {
+        if self.divided && 2 * self.full.len() < self.lines.len() {
             self.full.warm_all();
         }
     }
@@ -96,7 +117,7 @@ impl Beacons {
     /// Fetches the places in queues of a beacon into the cache.
     #[inline]
     pub(crate) fn warm_queue(&self, index: usize) {
-        self.full.warm_queue(&self.lines[index].state);
+        self.full.warm_queue(&self.state(index));
     }
 
     /// All beacons, by index.
@@ -106,7 +127,16 @@ impl Beacons {
 
     /// Inserts a beacon. The index of those from there on rises by one. `relayed`: it was passed on.
     pub(crate) fn insert(&mut self, index: usize, pose: &Pose, heard: Heard, relayed: bool) {
-        let (allegiance, state) = (self.allegiances.share(&pose.into()), self.full.keep(None, pose, relayed));
+        if relayed && !self.divided {
+            self.divide();
+        }
+        let allegiance = self.allegiances.share(&pose.into());
+        let state = if self.divided {
+            self.full.keep(None, pose, relayed)
+        } else {
+            self.full.insert(index, pose);
+            BriefState::at(index)
+        };
         self.stamps.insert(index, pose.stamp);
         self.lines.insert(index, Line { heard, allegiance, state });
         self.hearing_parts += usize::from(pose.hears != 0);
@@ -115,22 +145,30 @@ impl Beacons {
     /// Takes a later beacon of the same drone. `relayed`: it was passed on. Returns when the drone was heard, to be changed.
     #[inline]
     pub(crate) fn replace(&mut self, index: usize, pose: &Pose, relayed: bool) -> &mut Heard {
-        let line = &mut self.lines[index];
-        let heard_part = self.full.hears(&line.state) != 0;
+        if relayed && !self.divided {
+            self.divide();
+        }
+        let old = self.state(index);
+        let heard_part = self.full.hears(&old) != 0;
         self.hearing_parts = self.hearing_parts + usize::from(pose.hears != 0) - usize::from(heard_part);
+        let line = &mut self.lines[index];
         line.allegiance = self.allegiances.replace(line.allegiance, &pose.into());
-        line.state = self.full.keep(Some(&line.state), pose, relayed);
+        line.state = self.full.keep(Some(&old), pose, relayed);
         self.stamps[index] = pose.stamp;
         &mut line.heard
     }
 
     /// Removes a beacon. The index of those behind it falls by one.
     pub(crate) fn remove(&mut self, index: usize) {
-        let line = self.lines.remove(index);
+        let state = self.state(index);
+        self.hearing_parts -= usize::from(self.full.hears(&state) != 0);
+        if self.divided {
+            self.full.release(&state);
+        } else {
+            self.full.remove(index);
+        }
         self.stamps.remove(index);
-        self.allegiances.release(line.allegiance);
-        self.hearing_parts -= usize::from(self.full.hears(&line.state) != 0);
-        self.full.release(&line.state);
+        self.allegiances.release(self.lines.remove(index).allegiance);
     }
 
     /// Whether some drone says which part of the swarm it hears.
@@ -183,6 +221,11 @@ impl Beacon<'_> {
     }
 
     #[inline]
+    fn state(&self) -> BriefState {
+        self.beacons.state(self.index)
+    }
+
+    #[inline]
     fn allegiance(&self) -> &Allegiance {
         self.beacons.allegiances.get(self.line().allegiance)
     }
@@ -198,20 +241,27 @@ impl Beacon<'_> {
     #[inline]
     #[must_use]
     pub fn position(&self) -> Vec2 {
-        self.beacons.full.position(&self.line().state)
+        self.beacons.full.position(&self.state())
     }
 
     /// The horizontal part of the velocity, world frame, m/s.
     #[inline]
     #[must_use]
     pub fn velocity(&self) -> Vec2 {
-        self.beacons.full.velocity(&self.line().state)
+        self.beacons.full.velocity(&self.state())
+    }
+
+    /// The horizontal parts of position and velocity, world frame, m and m/s.
+    #[inline]
+    #[must_use]
+    pub fn flight(&self) -> (Vec2, Vec2) {
+        self.beacons.full.flight(&self.state())
     }
 
     /// The drone's places in queues, nearest set first.
     #[inline]
     pub fn queue(&self) -> impl Iterator<Item = QueuePlace> + Clone {
-        (0..MAX_PLACES).map(|number| self.beacons.full.queue_place(&self.line().state, number))
+        (0..MAX_PLACES).map(|number| self.beacons.full.queue_place(&self.state(), number))
     }
 
     /// The plan that the drone obeys.
@@ -273,30 +323,31 @@ impl Beacon<'_> {
     #[inline]
     #[must_use]
     pub fn hears(&self) -> u32 {
-        self.beacons.full.hears(&self.line().state)
+        self.beacons.full.hears(&self.state())
     }
 
     /// Where the drone is at `now` if it has kept the velocity of this beacon, world frame, m.
     #[inline]
     #[must_use]
     pub fn extrapolated(&self, now: SimTime) -> Vec2 {
-        self.position() + self.velocity() * now.since(self.stamp())
+        let (position, velocity) = self.flight();
+        position + velocity * now.since(self.stamp())
     }
 
     /// Where the drone is at rest if it has braked at `braking_mps2` since this beacon, world frame, m.
     #[must_use]
     pub fn stopped(&self, braking_mps2: f64) -> Vec2 {
-        let velocity = self.velocity();
-        self.position() + velocity * (velocity.norm() / (2.0 * braking_mps2))
+        let (position, velocity) = self.flight();
+        position + velocity * (velocity.norm() / (2.0 * braking_mps2))
     }
 
     /// All of it.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        let (position_m, velocity_mps) = self.beacons.full.motion(&self.line().state);
+        let (position_m, velocity_mps) = self.beacons.full.motion(&self.state());
         let &Allegiance { obeyed, group, term, incarnation, flags } = self.allegiance();
         let (stamp, hears) = (self.stamp(), self.hears());
-        let queue = std::array::from_fn(|number| self.beacons.full.queue_place(&self.line().state, number));
+        let queue = std::array::from_fn(|number| self.beacons.full.queue_place(&self.state(), number));
         Pose { stamp, position_m, velocity_mps, queue, obeyed, group, term, incarnation, flags, hears }
     }
 }

@@ -48,6 +48,7 @@ impl Heard {
     }
 
     /// Notes that it is heard again. `direct`: without a relay.
+    #[inline]
     pub(crate) fn again(&mut self, now: SimTime, direct: bool, base: Timeouts) {
         let longest_s = self.absence_s(base);
         if direct {
@@ -59,18 +60,21 @@ impl Heard {
     }
 
     /// When it was last heard without a relay; before every time of a mission if it never was.
+    #[inline]
     pub(crate) fn direct(&self) -> SimTime {
         self.direct
     }
 
     /// The longest silence that is not yet significant, s: never more than [`MAX_TIMEOUTS`], however rarely it was heard, because a dead
     /// drone must not count for long. `base_s`: time-out of a regular source. It is not kept, because a drone has a thousand peers.
+    #[inline]
     fn silence_s(&self, base_s: f64) -> f64 {
         self.timeout.timeout_s(base_s).min(MAX_TIMEOUTS * base_s)
     }
 
     /// The longest time without word of it after which it still counts as living, s. Where others pass its state on, it comes once per
     /// some time-outs at best, and at times not at all.
+    #[inline]
     fn absence_s(&self, base: Timeouts) -> f64 {
         if self.is_relayed() {
             self.silence_s(base.relayed_s).max(RELAYED_TIMEOUTS * base.relayed_s)
@@ -80,6 +84,7 @@ impl Heard {
     }
 
     /// Whether the last word of it was passed on.
+    #[inline]
     fn is_relayed(&self) -> bool {
         self.timeout.last() > self.direct()
     }
@@ -100,6 +105,7 @@ impl Heard {
     }
 
     /// A moment until which it certainly lives.
+    #[inline]
     pub(crate) fn lives_until(&self, base: Timeouts) -> SimTime {
         self.timeout.last() + ((self.absence_s(base) - ROUNDING_S) * 1e9) as i64
     }
