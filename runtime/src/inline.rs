@@ -260,7 +260,7 @@ impl InlineDrone {
         let said = pilot_host.step(down, scratch, &mut self.slot, stats);
         drop(in_pilot);
         self.frames.clear();
-        // In a few ticks a drone says much.
+        // Few ticks have many frames, and their memory is given back.
         self.frames.shrink_to(FEW_FRAMES);
         self.frames.extend(said.frames());
     }
