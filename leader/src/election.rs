@@ -311,7 +311,9 @@ impl Election {
                 root => self.adaptive_timeout = AdaptiveTimeout::expecting(now, root * self.heartbeat_period_s),
             }
         }
-        if let Some(stamp) = stamp.filter(|&stamp| ballot == self.obeyed && stamp > self.newest) {
+        // A term is for one group. If messages name two, one of them is forged: the leader may be that of another group.
+        let lives = ballot == self.obeyed && scope == self.scope;
+        if let Some(stamp) = stamp.filter(|&stamp| lives && stamp > self.newest) {
             (self.newest, self.lag_ns, self.hops) = (stamp, now - stamp, hops);
         }
         // Its group was split without it. A leader of a part will take it in, and its own term ends. A leader of an older
@@ -320,11 +322,11 @@ impl Election {
         if parted {
             self.leads = false;
         }
-        if ballot == self.obeyed {
+        if lives {
             self.parted = None;
             self.adaptive_timeout.hear(now, SAME_BEAT * self.heartbeat_period_s, self.silence_s());
         }
-        if ballot == self.obeyed || (parted && self.may_be_taken_in(now, hops)) {
+        if lives || (parted && self.may_be_taken_in(now, hops)) {
             self.heard = now;
             self.pre_voted = None;
         }

@@ -236,21 +236,29 @@ impl Knowledge {
     pub(crate) fn hear_pose(&mut self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
         self.peers.hear(now, source, *pose);
         self.ledger.hear_place(source, pose);
-        let ballot = self.election.obeyed();
-        if pose.leads() && pose.term == ballot && ballot.claimant == source {
-            let scope = self.election.scope();
+        let (ballot, scope) = (self.election.obeyed(), self.election.scope());
+        if pose.leads() && pose.term == ballot && ballot.claimant == source && scope.contains(pose.group) {
             self.election.handle(now, 0, Input::Sign { ballot, scope, named: false, stamp: Some(pose.stamp) });
         }
-        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
-        self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
+        self.is_plan_conflict(source, pose)
     }
 
     /// Hears a beacon of `drone` that another drone passed on. Returns the same as [`Self::hear_pose`].
     pub(crate) fn hear_of(&mut self, now: SimTime, drone: DroneId, pose: Pose) -> bool {
         self.peers.hear_of(now, drone, pose);
-        let ballot = self.election.obeyed();
-        let made = Some(self.ledger.stamp()).filter(|stamp| stamp.ballot == ballot).map_or(0, |stamp| stamp.epoch);
-        self.election.leads() && pose.obeyed.ballot == ballot && pose.obeyed.epoch > made
+        self.is_plan_conflict(drone, &pose)
+    }
+
+    /// Whether a beacon of `drone` shows a plan of this leader's term that this leader never made: one that came later, or the same one with
+    /// the drone in another group.
+    fn is_plan_conflict(&self, drone: DroneId, pose: &Pose) -> bool {
+        let (ballot, stamp, obeyed) = (self.election.obeyed(), self.ledger.stamp(), pose.obeyed);
+        if !self.election.leads() || obeyed.ballot != ballot {
+            return false;
+        }
+        let made = if stamp.ballot == ballot { stamp.epoch } else { 0 };
+        let part = self.ledger.obeyed().filter(|_| obeyed == stamp).and_then(|bundle| bundle.parts.get(drone));
+        obeyed.epoch > made || part.is_some_and(|part| part.group != pose.group)
     }
 
     /// Learns of an obstacle. Returns whether it is new.

@@ -224,6 +224,40 @@ fn plan_conflict_seen(swarm: &Swarm) -> Option<String> {
     liar.map(|(id, drone)| format!("{id} obeys {:?}", drone.stamp()))
 }
 
+#[test]
+fn a_leader_claims_anew_if_a_drone_obeys_its_plan_in_another_group() {
+    let mut swarm = swarm(1, 0);
+    swarm.scenery.clear();
+    let planned = |swarm: &Swarm| {
+        let drones = swarm.side(0);
+        let leader = drones.iter().find(|(_, drone)| drone.is_leader() && drone.term() == drone.stamp().ballot);
+        leader.map(|(id, drone)| (id.index(), drone.stamp()))
+    };
+    let (leader, stamp) = loop {
+        assert!(swarm.now().secs() < 20.0, "a leader plans");
+        swarm.step().unwrap();
+        if let Some(found) = planned(&swarm) {
+            break found;
+        }
+    };
+    let led = swarm.term(leader).unwrap();
+    let follower = DroneId((leader == 0).into());
+    let plan = swarm.drones[leader].as_ref().unwrap().obeyed().unwrap();
+    let group = plan.parts.get(follower).unwrap().group;
+    let pose = Pose { stamp: swarm.now(), obeyed: stamp, group, term: led, incarnation: 1, ..Pose::zeroed() };
+    let hear = |swarm: &mut Swarm, pose: Pose| {
+        let now = swarm.now();
+        let listener = swarm.drones[leader].as_mut().unwrap();
+        listener.hear(now, follower, &Message::Pose(pose), &mut Vec::new());
+        swarm.step().unwrap();
+        swarm.term(leader).unwrap()
+    };
+    assert_eq!(hear(&mut swarm, pose), led, "the group is as planned");
+    let pose = Pose { stamp: swarm.now(), group: GroupId::ALL.child(3), ..pose };
+    let new = hear(&mut swarm, pose);
+    assert!(new > led && new.claimant == led.claimant, "{new:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: ProptestConfig::default().cases.max(300), failure_persistence: None, ..ProptestConfig::default()

@@ -12,7 +12,7 @@ use skein_leader::silent::Silent;
 use skein_protocol::formation::Shape;
 use skein_protocol::payload::{Passed, Pose};
 use skein_protocol::shape::ConvexShape;
-use skein_protocol::{DroneId, Message, ObstacleId, Phase, SimTime, Vec2};
+use skein_protocol::{DroneId, GroupId, Message, ObstacleId, Phase, SimTime, Vec2};
 use swarm::{DEFAULT, params};
 
 /// Drone 0 of four, in a column with a spacing of 40 m that stops at x = 400 m. It leads. All have passed a wall that ends at x = 205 m.
@@ -59,7 +59,9 @@ impl Leader {
 
     fn hear(&mut self, stamp: SimTime, drone: u32, x_m: f64) {
         let (term, obeyed) = (self.leading.term(), self.leading.stamp());
-        let pose = Pose { stamp, position_m: [x_m, 0.0, 50.0], term, obeyed, incarnation: 1, ..Pose::zeroed() };
+        let part = self.leading.obeyed().and_then(|bundle| bundle.parts.get(DroneId(drone)));
+        let (position_m, group) = ([x_m, 0.0, 50.0], part.map_or(GroupId::ALL, |part| part.group));
+        let pose = Pose { stamp, position_m, group, term, obeyed, incarnation: 1, ..Pose::zeroed() };
         let (set, set_count) = set_array(&[ObstacleId(0)]);
         let passed = Passed { stamp, set_count, set, of: 0 };
         let heard = (x_m > 230.0).then_some(Message::Passed(passed));

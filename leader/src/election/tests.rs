@@ -263,3 +263,17 @@ fn a_pre_vote_is_rejected_by_what_is_newer_and_not_by_what_was_heard_later() {
     let alone_s = 2.1 + near.silence_s();
     assert!(near.has_leader(at(alone_s - 0.001)) && !near.has_leader(at(alone_s + 0.001)));
 }
+
+#[test]
+fn a_term_that_a_message_gives_to_another_group_is_no_sign_of_life() {
+    let (mut drone, one) = (machine(3), N.child(1));
+    drone.handle(at(0.0), 0, Input::Joined(one));
+    // A forged message binds the drone to a term that its claimant has for another group.
+    sign(&mut drone, 0.0, ballot(7, 0), one, true);
+    let silent = drone.clone();
+    (1..10).for_each(|step| sign(&mut drone, 0.1 * f64::from(step), ballot(7, 0), N.child(2), false));
+    assert_eq!(drone, silent);
+    assert!(!drone.has_leader(at(0.1 + PARAMS.leader_timeout_s)));
+    sign(&mut drone, 1.2, ballot(7, 0), one, false);
+    assert!(drone.has_leader(at(1.2)));
+}
