@@ -684,14 +684,14 @@ impl RolloutPilot for SwarmPilot {
 
     fn part_past(&self, set: u32) -> Option<Assignment> {
         let planned = self.leading.planned_sets().iter().find(|planned| planned.tag == set)?;
-        let &SetPlace { drone, leader, group, route, rank } = planned.parts.get(self.params.me)?;
+        let &SetPlace { drone, group, route, rank } = planned.parts.get(self.params.me)?;
         let slot_m = self.leading.part().map_or([0.0; 2], |part| part.slot_m);
         Some(Assignment {
             id: planned.stamp,
             scope: planned.scope,
             group,
             drone,
-            leader,
+            leader: DroneId::NONE,
             slot_m,
             route,
             rank,

@@ -16,7 +16,7 @@ pub struct Assignments {
 
 impl OfDrone for PackedAssignment {
     fn drone(&self) -> DroneId {
-        self.drone()
+        self.drone
     }
 }
 
@@ -24,7 +24,7 @@ impl Assignments {
     /// The assignment of a drone.
     #[must_use]
     pub fn get(&self, drone: DroneId) -> Option<Assignment> {
-        self.entries.get(drone).map(|entry| self.headers.whole(entry))
+        self.entries.get(drone).map(|entry| self.headers.whole(drone, &entry.place))
     }
 
     /// Whether a drone has an assignment.
@@ -36,7 +36,7 @@ impl Assignments {
     /// Adds an assignment, unless its drone has one already.
     pub fn add(&mut self, part: &Assignment) {
         if !self.contains(part.drone) {
-            self.entries.add(self.headers.pack(part));
+            self.entries.add(PackedAssignment { drone: part.drone, place: self.headers.pack(part) });
         }
     }
 
@@ -45,7 +45,7 @@ impl Assignments {
         let Some(mut part) = self.get(drone) else { return };
         change(&mut part);
         if let Some(entry) = self.entries.get_mut(drone) {
-            *entry = self.headers.repack(entry, &part);
+            entry.place = self.headers.repack(&entry.place, &part);
         }
     }
 
@@ -60,7 +60,7 @@ impl Assignments {
 
     /// All assignments, by drone.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Assignment> + Clone {
-        self.entries.iter().map(|entry| self.headers.whole(entry))
+        self.entries.iter().map(|entry| self.headers.whole(entry.drone, &entry.place))
     }
 
     /// Number of assignments.

@@ -2,6 +2,7 @@
 //! obey the same plan.
 
 use crate::beacon_states::{BriefState, FullStates};
+use crate::growth::make_room;
 use crate::heard::Heard;
 use crate::shared_values::SharedValues;
 use skein_protocol::payload::{MAX_PLACES, POSE_BEFORE, POSE_IMPAIRED, POSE_LEADS, Pose, QueuePlace};
@@ -137,6 +138,8 @@ impl Beacons {
             self.full.insert(index, pose);
             BriefState::at(index)
         };
+        make_room(&mut self.stamps);
+        make_room(&mut self.lines);
         self.stamps.insert(index, pose.stamp);
         self.lines.insert(index, Line { heard, allegiance, state });
         self.hearing_parts += usize::from(pose.hears != 0);

@@ -1,10 +1,7 @@
 //! A few entries about each drone, in one block of memory. A drone of a swarm of a thousand keeps thousands of them.
 
-use crate::pool::Pool;
+use crate::pool::{Linked, NONE, Pool};
 use skein_protocol::{DroneId, prefetch};
-
-/// No entry.
-const NONE: u32 = u32::MAX;
 
 /// Any number of entries about each drone. Those of a drone are found by a look at each of them.
 #[derive(Clone, Debug)]
@@ -22,6 +19,16 @@ pub(crate) struct DroneEntries<T> {
 struct Chained<T> {
     entry: T,
     next: u32,
+}
+
+impl<T> Linked for Chained<T> {
+    fn link(&self) -> u32 {
+        self.next
+    }
+
+    fn set_link(&mut self, place: u32) {
+        self.next = place;
+    }
 }
 
 impl<T> DroneEntries<T> {
@@ -81,12 +88,12 @@ impl<T> DroneEntries<T> {
     }
 
     /// Removes all other entries.
-    pub(crate) fn retain(&mut self, mut stays: impl FnMut(&T) -> bool) {
-        for newest in &mut self.newest {
+    pub(crate) fn retain(&mut self, mut stays: impl FnMut(DroneId, &T) -> bool) {
+        for (drone, newest) in (0..).map(DroneId).zip(&mut self.newest) {
             let (mut kept, mut place) = (NONE, std::mem::replace(newest, NONE));
             while let Some(chained) = self.entries.get_mut(place) {
                 let next = std::mem::replace(&mut chained.next, NONE);
-                if !stays(&chained.entry) {
+                if !stays(drone, &chained.entry) {
                     self.entries.remove(place);
                     self.len -= 1;
                 } else {
@@ -130,7 +137,7 @@ mod tests {
             match draw % 7 {
                 0 => {
                     let stays = |entry: &u32| !(entry + draw).is_multiple_of(3);
-                    all.retain(stays);
+                    all.retain(|_, entry| stays(entry));
                     expected.iter_mut().for_each(|entries| entries.retain(stays));
                 }
                 1 => {
@@ -164,7 +171,7 @@ mod tests {
         assert!(most > 20 && places <= most, "what was removed is used again: {places} of {most}");
         all.put(DroneId(10), |_| true, 0);
         assert_eq!(all.of(DroneId(10)).count(), 0, "no drone of the swarm");
-        all.retain(|_| false);
+        all.retain(|_, _| false);
         assert_eq!((all.len(), all.entries.places(), all.newest.capacity()), (0, 0, 0));
     }
 }

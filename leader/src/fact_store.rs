@@ -3,7 +3,7 @@
 
 use crate::drone_entries::DroneEntries;
 use crate::fact_values::{Fact, FactValues, Passage, Version};
-use crate::packed_assignment::PackedAssignment;
+use crate::packed_assignment::PackedPlace;
 use crate::subject::Subject;
 use skein_protocol::payload::{Arrivals, Assignment, Plan};
 use skein_protocol::{DroneId, GroupId, Message, MessageRef};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug)]
 pub(crate) struct FactStore<T> {
     values: FactValues,
-    parts: DroneEntries<Kept<PackedAssignment, T>>,
+    parts: DroneEntries<Kept<PackedPlace, T>>,
     passages: DroneEntries<Kept<Passage, T>>,
     plans: BTreeMap<GroupId, Kept<Plan, T>>,
     arrivals: BTreeMap<Subject, Kept<Arrivals, T>>,
@@ -89,7 +89,7 @@ impl<T: Copy> FactStore<T> {
             }
             Subject::Part(scope, drone) => {
                 let kept = self.parts.find_mut(drone, |kept| values.scope(&kept.fact) == scope)?;
-                (Fact::Part(kept.fact), &mut kept.with)
+                (Fact::Part(drone, kept.fact), &mut kept.with)
             }
             Subject::Arrivals(..) => {
                 let kept = self.arrivals.get_mut(subject)?;
@@ -162,14 +162,14 @@ impl<T: Copy> FactStore<T> {
         let values = &mut self.values;
         self.plans.retain(|_, kept| stays(Fact::Plan(&kept.fact), &kept.with));
         self.arrivals.retain(|_, kept| stays(Fact::Arrivals(&kept.fact), &kept.with));
-        self.parts.retain(|kept| {
-            let stays = stays(Fact::Part(kept.fact), &kept.with);
+        self.parts.retain(|drone, kept| {
+            let stays = stays(Fact::Part(drone, kept.fact), &kept.with);
             if !stays {
                 values.release_part(&kept.fact);
             }
             stays
         });
-        self.passages.retain(|kept| {
+        self.passages.retain(|_, kept| {
             let stays = stays(Fact::Passed(kept.fact), &kept.with);
             if !stays {
                 values.release_passage(&kept.fact);
@@ -226,7 +226,7 @@ mod tests {
         store.change_parts_of(DroneId(9), |scope, with| found.push((scope, *with)));
         assert_eq!(found, [(all, 2), (first, 1)]);
         assert!(!store.retain(|_, _| true));
-        assert!(store.retain(|fact, with| matches!(fact, Fact::Part(_)) && with % 2 == 0));
+        assert!(store.retain(|fact, with| matches!(fact, Fact::Part(..)) && with % 2 == 0));
         assert_eq!(subjects.map(|subject| store.contains(&subject)), [false, true, true, false, false, false]);
         store.clear();
         assert_eq!((store.len(), store.contains(&subjects[1])), (0, false));

@@ -1,11 +1,11 @@
 //! What the messages that a drone may pass on say, in little memory: a drone of a large swarm keeps thousands of them, and most have much in
 //! common.
 
-use crate::packed_assignment::{AssignmentHeaders, PackedAssignment};
+use crate::packed_assignment::{AssignmentHeaders, PackedPlace};
 use crate::shared_values::SharedValues;
 use crate::subject::Subject;
 use skein_protocol::payload::{Arrivals, Assignment, AssignmentList, MAX_SET, Passed, Plan};
-use skein_protocol::{Ballot, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
+use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime};
 
 /// Which of two messages about the same subject is newer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,7 +32,8 @@ impl Version {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Fact<'a> {
     Plan(&'a Plan),
-    Part(PackedAssignment),
+    /// The assignment of this drone.
+    Part(DroneId, PackedPlace),
     Arrivals(&'a Arrivals),
     Passed(Passage),
 }
@@ -62,7 +63,7 @@ pub(crate) struct FactValues {
 
 impl FactValues {
     /// Keeps an assignment.
-    pub(crate) fn keep_part(&mut self, part: &Assignment) -> PackedAssignment {
+    pub(crate) fn keep_part(&mut self, part: &Assignment) -> PackedPlace {
         self.headers.pack(part)
     }
 
@@ -73,7 +74,7 @@ impl FactValues {
     }
 
     /// Notes that an assignment is no longer kept.
-    pub(crate) fn release_part(&mut self, part: &PackedAssignment) {
+    pub(crate) fn release_part(&mut self, part: &PackedPlace) {
         self.headers.release(part);
     }
 
@@ -83,21 +84,21 @@ impl FactValues {
     }
 
     /// The group that the plan of an assignment is for.
-    pub(crate) fn scope(&self, part: &PackedAssignment) -> GroupId {
+    pub(crate) fn scope(&self, part: &PackedPlace) -> GroupId {
         self.headers.scope(part)
     }
 
     /// The assignment that a fact is, if it is one.
     pub(crate) fn assignment_of(&self, fact: Fact<'_>) -> Option<Assignment> {
-        let Fact::Part(part) = fact else { return None };
-        Some(self.headers.whole(&part))
+        let Fact::Part(drone, part) = fact else { return None };
+        Some(self.headers.whole(drone, &part))
     }
 
     /// The message that passes a fact about this subject on.
     pub(crate) fn passed_on(&self, fact: Fact<'_>, subject: Subject) -> Option<Message> {
         Some(match fact {
             Fact::Plan(plan) => Message::Plan(*plan),
-            Fact::Part(part) => Message::AssignmentList(AssignmentList::of(&self.headers.whole(&part))),
+            Fact::Part(drone, part) => Message::AssignmentList(AssignmentList::of(&self.headers.whole(drone, &part))),
             Fact::Arrivals(row) => Message::Arrivals(*row),
             Fact::Passed(passage) => {
                 let &PassedSet { count, ids } = self.sets.get(passage.set);
@@ -111,7 +112,7 @@ impl FactValues {
     pub(crate) fn version(&self, fact: Fact<'_>) -> Version {
         match fact {
             Fact::Plan(plan) => Version::of(plan.id),
-            Fact::Part(part) => Version::of(self.headers.plan(&part)),
+            Fact::Part(_, part) => Version::of(self.headers.plan(&part)),
             Fact::Arrivals(row) => Version::at(row.stamp),
             Fact::Passed(passage) => Version::at(passage.stamp),
         }
@@ -128,7 +129,6 @@ impl FactValues {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
-    use skein_protocol::DroneId;
 
     fn part(epoch: u32, drone: u32) -> Assignment {
         let id = PlanStamp { epoch, ..PlanStamp::default() };
@@ -141,10 +141,10 @@ mod tests {
     fn what_was_heard_is_passed_on_as_it_was() {
         let mut values = FactValues::default();
         let parts: Vec<Assignment> = (0..30).map(|number| part(number % 3, number)).collect();
-        let kept: Vec<PackedAssignment> = parts.iter().map(|part| values.keep_part(part)).collect();
+        let kept: Vec<PackedPlace> = parts.iter().map(|part| values.keep_part(part)).collect();
         assert_eq!(values.headers.count(), 3);
         for (part, kept) in parts.iter().zip(&kept) {
-            let (subject, fact) = (Subject::Part(part.scope, part.drone), Fact::Part(*kept));
+            let (subject, fact) = (Subject::Part(part.scope, part.drone), Fact::Part(part.drone, *kept));
             assert_eq!((values.assignment_of(fact), values.scope(kept)), (Some(*part), part.scope));
             assert_eq!(values.passed_on(fact, subject), Some(Message::AssignmentList(AssignmentList::of(part))));
             assert_eq!(values.version(fact), Version::of(part.id));

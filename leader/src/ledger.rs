@@ -78,7 +78,7 @@ impl Ledger {
         for set in &mut all.sets {
             (set.stamp.ballot, set.scope) = (ballot, GroupId::ALL);
             for &(drone, place) in places.iter().filter(|(id, place)| place.set == set.tag && !given(*id)) {
-                let new = SetPlace { drone, leader: DroneId(0), group: GroupId::ALL, route: 0, rank: 0 };
+                let new = SetPlace { drone, group: GroupId::ALL, route: 0, rank: 0 };
                 let part = set.parts.add(new);
                 (part.route, part.rank) = (place.route, place.rank);
             }
@@ -211,7 +211,7 @@ impl Ledger {
             let (route, rank) = (place.route, place.rank);
             let waits = |set: &&mut PlannedSet| set.tag == place.set && pose.obeyed >= set.stamp;
             for set in self.sets.iter_mut().filter(waits).filter(|set| !set.parts.contains(drone)) {
-                set.parts.add(SetPlace { drone, leader: DroneId::NONE, group: pose.group, route, rank });
+                set.parts.add(SetPlace { drone, group: pose.group, route, rank });
             }
         }
     }

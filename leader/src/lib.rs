@@ -61,6 +61,7 @@ pub mod funnel;
 pub mod geometry;
 mod gossip;
 mod grouping;
+mod growth;
 mod heard;
 mod joint_planner;
 mod knowledge;

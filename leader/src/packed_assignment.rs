@@ -4,17 +4,23 @@ use crate::shared_values::SharedValues;
 use skein_protocol::payload::Assignment;
 use skein_protocol::{DroneId, GroupId, PlanStamp};
 
-/// What differs from drone to drone, without the 4 bytes by which it would be aligned to 8.
+/// What an assignment says of its drone alone, without the 4 bytes by which it would be aligned to 8.
 #[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PackedAssignment {
+pub(crate) struct PackedPlace {
     slot_m: [f64; 2],
     arrival_s: f64,
-    drone: DroneId,
     /// Index of the rest.
     header: u32,
     route: u16,
     rank: u16,
+}
+
+/// The same, and the drone that it is for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PackedAssignment {
+    pub(crate) drone: DroneId,
+    pub(crate) place: PackedPlace,
 }
 
 /// What the drones of a group have in common.
@@ -34,15 +40,10 @@ impl From<&Assignment> for Header {
     }
 }
 
-impl PackedAssignment {
+impl PackedPlace {
     fn new(part: &Assignment, header: u32) -> Self {
-        let &Assignment { slot_m, arrival_s, drone, route, rank, .. } = part;
-        Self { slot_m, arrival_s, drone, header, route, rank }
-    }
-
-    /// The drone that it is for.
-    pub(crate) fn drone(&self) -> DroneId {
-        self.drone
+        let &Assignment { slot_m, arrival_s, route, rank, .. } = part;
+        Self { slot_m, arrival_s, header, route, rank }
     }
 }
 
@@ -52,35 +53,35 @@ pub(crate) struct AssignmentHeaders(SharedValues<Header>);
 
 impl AssignmentHeaders {
     /// Packs a further assignment.
-    pub(crate) fn pack(&mut self, part: &Assignment) -> PackedAssignment {
-        PackedAssignment::new(part, self.0.share(&part.into()))
+    pub(crate) fn pack(&mut self, part: &Assignment) -> PackedPlace {
+        PackedPlace::new(part, self.0.share(&part.into()))
     }
 
     /// Packs an assignment that replaces `old`.
-    pub(crate) fn repack(&mut self, old: &PackedAssignment, part: &Assignment) -> PackedAssignment {
-        PackedAssignment::new(part, self.0.replace(old.header, &part.into()))
+    pub(crate) fn repack(&mut self, old: &PackedPlace, part: &Assignment) -> PackedPlace {
+        PackedPlace::new(part, self.0.replace(old.header, &part.into()))
     }
 
     /// Notes that a packed assignment is no longer kept.
-    pub(crate) fn release(&mut self, packed: &PackedAssignment) {
-        self.0.release(packed.header);
+    pub(crate) fn release(&mut self, place: &PackedPlace) {
+        self.0.release(place.header);
     }
 
-    /// The assignment, every value as it was packed.
-    pub(crate) fn whole(&self, packed: &PackedAssignment) -> Assignment {
-        let &PackedAssignment { slot_m, arrival_s, drone, header, route, rank } = packed;
+    /// The assignment of a drone, every value as it was packed.
+    pub(crate) fn whole(&self, drone: DroneId, place: &PackedPlace) -> Assignment {
+        let &PackedPlace { slot_m, arrival_s, header, route, rank } = place;
         let &Header { id, scope, group, leader, reserved } = self.0.get(header);
         Assignment { id, scope, group, drone, leader, slot_m, arrival_s, route, rank, reserved }
     }
 
     /// The group that the plan is for.
-    pub(crate) fn scope(&self, packed: &PackedAssignment) -> GroupId {
-        self.0.get(packed.header).scope
+    pub(crate) fn scope(&self, place: &PackedPlace) -> GroupId {
+        self.0.get(place.header).scope
     }
 
     /// The plan that the assignment belongs to.
-    pub(crate) fn plan(&self, packed: &PackedAssignment) -> PlanStamp {
-        self.0.get(packed.header).id
+    pub(crate) fn plan(&self, place: &PackedPlace) -> PlanStamp {
+        self.0.get(place.header).id
     }
 
     /// Forgets all.

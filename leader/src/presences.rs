@@ -16,32 +16,45 @@ use std::collections::BTreeMap;
 type Kind = (PlanStamp, GroupId, Ballot);
 
 /// What was said of one drone. Each drone keeps this for all drones of the swarm, so it is small.
-#[repr(C, packed(4))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Told {
     /// Time stamp of the newest state of it that the neighbourhood heard, as far as this drone knows.
     said: SimTime,
-    /// When the neighbourhood last heard of it, as far as this drone knows.
-    covered: SimTime,
-    /// How often the news is said at once.
-    left: u8,
-    /// Whether this drone has heard of it.
-    known: bool,
+    /// When the neighbourhood last heard of it, as far as this drone knows, in ns; times 8, because the last three bits are used otherwise:
+    /// the first of them tells whether this drone has heard of it, the other two how often the news is said at once.
+    covered: i64,
 }
 
 impl Told {
     /// Nothing heard.
-    const NOTHING: Self = Self { said: SimTime::ZERO, covered: SimTime::ZERO, left: 0, known: false };
+    const NOTHING: Self = Self { said: SimTime::ZERO, covered: 0 };
     /// News that was not said yet.
-    const NEWS: Self = Self { said: SimTime::ZERO, covered: SimTime::ZERO, left: NEWS_TIMES, known: true };
+    const NEWS: Self = Self { said: SimTime::ZERO, covered: (NEWS_TIMES as i64) << 1 | 1 };
+
+    /// Whether this drone has heard of it.
+    fn is_known(&self) -> bool {
+        self.covered & 1 != 0
+    }
+
+    /// How often the news is said at once.
+    fn left(&self) -> i64 {
+        (self.covered >> 1) & 3
+    }
+
+    /// When the neighbourhood last heard of it, as far as this drone knows.
+    fn covered(&self) -> SimTime {
+        SimTime(self.covered >> 3)
+    }
 
     /// Notes that the state with this time stamp was said `now`.
     fn cover(&mut self, now: SimTime, stamp: SimTime) {
         self.said = self.said.max(stamp);
-        self.covered = now;
-        self.left = self.left.saturating_sub(1);
+        self.covered = now.0 << 3 | (self.left() - 1).max(0) << 1 | (self.covered & 1);
     }
 }
+
+/// Two bits have room for it.
+const _: () = assert!(NEWS_TIMES <= 3);
 
 /// The states that one drone passes on.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +131,7 @@ impl Presences {
         }
         let Some(newest) = k.peers().last(drone) else { return };
         let Some(told) = self.told.get_mut(drone.index()) else { return };
-        if has_news || !told.known {
+        if has_news || !told.is_known() {
             *told = Told::NEWS;
         }
         // The message that brings a state covers nobody: this drone may be the only way on.
@@ -152,7 +165,7 @@ impl Presences {
 
     /// Notes that a drone close to this one said the newest state of `drone`, which has this time stamp and which this drone knows.
     pub(crate) fn hear_newest(&mut self, now: SimTime, drone: DroneId, stamp: SimTime) {
-        if let Some(told) = self.told.get_mut(drone.index()).filter(|told| told.known) {
+        if let Some(told) = self.told.get_mut(drone.index()).filter(|told| told.is_known()) {
             told.cover(now, stamp);
         }
     }
@@ -203,11 +216,11 @@ impl Presences {
         for (id, stamp) in k.peers().ids().iter().copied().zip(k.peers().stamps()) {
             let Some(told) = self.told.get(id.index()) else { continue };
             // Without a branch for each condition, because this is done for all drones.
-            let is_overdue = (told.left > 0) | (now.0.saturating_sub(told.covered.0) >= overdue);
+            let is_overdue = (told.left() > 0) | (now.0.saturating_sub(told.covered().0) >= overdue);
             // Few are due, and what is known of a drone is looked up for those only: it is in memory that is not in the cache.
-            if told.known & (is_overdue | (stamp.0.saturating_sub(told.said.0) >= period)) {
+            if told.is_known() & (is_overdue | (stamp.0.saturating_sub(told.said.0) >= period)) {
                 k.peers().warm(id);
-                found.push((id, now.since(told.covered)));
+                found.push((id, now.since(told.covered())));
             }
         }
         let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();

@@ -8,7 +8,7 @@ use crate::fact_values::{Fact, Version};
 use crate::gossip::{Gossip, GossipRhythm};
 use crate::knowledge::Knowledge;
 use crate::params::LeadingParams;
-use crate::pool::Pool;
+use crate::pool::{Linked, Pool};
 use crate::subject::Subject;
 use crate::tuning::{DETOUR_DOUBLINGS, PASSAGES, RELAY_MEMORY_S, UNWANTED_REPEATS};
 use crate::turns::Turns;
@@ -214,6 +214,16 @@ impl RelayedFacts {
                 known.with.passing = DONE;
             }
         }
+    }
+}
+
+impl Linked for Passing {
+    fn link(&self) -> u32 {
+        self.from.0
+    }
+
+    fn set_link(&mut self, place: u32) {
+        self.from = DroneId(place);
     }
 }
 

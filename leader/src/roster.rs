@@ -2,6 +2,7 @@
 //! added to, and additions mostly come in the order of ids.
 
 use crate::drone_set::DroneSet;
+use crate::growth::make_room;
 use skein_protocol::DroneId;
 
 /// An entry that belongs to one drone.
@@ -63,6 +64,7 @@ impl<T: OfDrone> Roster<T> {
     pub fn add(&mut self, part: T) -> &mut T {
         let place = self.place(part.drone()).unwrap_or_else(|place| {
             self.drones.insert(part.drone());
+            make_room(&mut self.entries);
             self.entries.insert(place, part);
             place
         });

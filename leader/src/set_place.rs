@@ -10,8 +10,6 @@ use skein_protocol::{DroneId, GroupId};
 pub struct SetPlace {
     /// The drone that the place is for.
     pub drone: DroneId,
-    /// Leader of the drone's group under the plan for the set; [`DroneId::NONE`] if only the place in the queue is known.
-    pub leader: DroneId,
     /// The drone's group under this plan.
     pub group: GroupId,
     /// Route past the set, 0 = rightmost.
@@ -28,6 +26,6 @@ impl OfDrone for SetPlace {
 
 impl From<&Assignment> for SetPlace {
     fn from(part: &Assignment) -> Self {
-        Self { drone: part.drone, leader: part.leader, group: part.group, route: part.route, rank: part.rank }
+        Self { drone: part.drone, group: part.group, route: part.route, rank: part.rank }
     }
 }

@@ -1,18 +1,21 @@
 //! What is to be looked at, in the order of its turns.
 
+use crate::growth::make_room;
 use skein_protocol::SimTime;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
-/// Subjects by their turns. The first turn is kept apart, so that a look in vain touches little memory.
+/// Subjects by their turns. Most subjects share a turn with others, so they are kept in one block of memory per turn. The first turn is kept
+/// apart, so that a look in vain touches little memory.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Turns<S> {
     first: SimTime,
-    turns: BTreeSet<(SimTime, S)>,
+    /// By turn: its subjects, the last one first.
+    turns: BTreeMap<SimTime, Vec<S>>,
 }
 
-impl<S: Ord + Copy> Default for Turns<S> {
+impl<S> Default for Turns<S> {
     fn default() -> Self {
-        Self { first: SimTime::MAX, turns: BTreeSet::new() }
+        Self { first: SimTime::MAX, turns: BTreeMap::new() }
     }
 }
 
@@ -20,13 +23,23 @@ impl<S: Ord + Copy> Turns<S> {
     /// Adds a turn of a subject.
     pub(crate) fn add(&mut self, turn: SimTime, subject: S) {
         self.first = self.first.min(turn);
-        self.turns.insert((turn, subject));
+        let subjects = self.turns.entry(turn).or_default();
+        if let Err(place) = place(subjects, &subject) {
+            make_room(subjects);
+            subjects.insert(place, subject);
+        }
     }
 
     /// Removes a turn of a subject.
     pub(crate) fn remove(&mut self, turn: SimTime, subject: S) {
-        self.turns.remove(&(turn, subject));
-        self.find_first();
+        let Some(subjects) = self.turns.get_mut(&turn) else { return };
+        if let Ok(place) = place(subjects, &subject) {
+            subjects.remove(place);
+        }
+        if subjects.is_empty() {
+            self.turns.remove(&turn);
+            self.find_first();
+        }
     }
 
     /// Removes and returns the subject whose turn comes first, if it has come.
@@ -34,9 +47,13 @@ impl<S: Ord + Copy> Turns<S> {
         if now < self.first {
             return None;
         }
-        let due = self.turns.pop_first();
-        self.find_first();
-        due.map(|(_, subject)| subject)
+        let mut next = self.turns.first_entry()?;
+        let due = next.get_mut().pop();
+        if next.get().is_empty() {
+            next.remove();
+            self.find_first();
+        }
+        due
     }
 
     /// The subject whose turn comes first, if it has come.
@@ -47,12 +64,16 @@ impl<S: Ord + Copy> Turns<S> {
     /// The subjects whose turn has come, the first ones first.
     pub(crate) fn due(&self, now: SimTime) -> impl Iterator<Item = S> {
         let some = if now < self.first { 0 } else { self.turns.len() };
-        self.turns.iter().take(some).take_while(move |(turn, _)| *turn <= now).map(|(_, subject)| *subject)
+        let due = self.turns.iter().take(some).take_while(move |(turn, _)| **turn <= now);
+        due.flat_map(|(_, subjects)| subjects.iter().rev().copied())
     }
 
     /// Removes the turns of all other subjects.
     pub(crate) fn retain(&mut self, stays: impl Fn(&S) -> bool) {
-        self.turns.retain(|(_, subject)| stays(subject));
+        self.turns.retain(|_, subjects| {
+            subjects.retain(&stays);
+            !subjects.is_empty()
+        });
         self.find_first();
     }
 
@@ -62,8 +83,13 @@ impl<S: Ord + Copy> Turns<S> {
     }
 
     fn find_first(&mut self) {
-        self.first = self.turns.first().map_or(SimTime::MAX, |(turn, _)| *turn);
+        self.first = self.turns.first_key_value().map_or(SimTime::MAX, |(turn, _)| *turn);
     }
+}
+
+/// The index of a subject among these, the last one first, or where it belongs.
+fn place<S: Ord>(subjects: &[S], subject: &S) -> Result<usize, usize> {
+    subjects.binary_search_by(|other| subject.cmp(other))
 }
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! The events of a tick as JSON lines, in reused memory.
 
+use crate::burst::give_back;
 use skein_protocol::record::{EventKind, RunEvent, ViolationKind};
 use skein_protocol::{DroneId, SimTime};
+
+/// Memory for four times this many bytes is kept in any case. By hand: about 80 events.
+const LEAST_KEPT: usize = 2048;
 
 /// Two buffers: the events of the current tick, and those of the tick that ended last.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +31,7 @@ impl EventLog {
     pub(crate) fn end_tick(&mut self) {
         std::mem::swap(&mut self.current, &mut self.ended);
         self.current.clear();
+        give_back(&mut self.current, self.ended.len(), LEAST_KEPT);
     }
 
     /// The events of the tick that ended last, one JSON line per event.

@@ -76,6 +76,7 @@
 #![warn(unreachable_pub)]
 
 mod body;
+mod burst;
 mod counters;
 mod decision_log;
 mod drones;

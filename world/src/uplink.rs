@@ -1,8 +1,12 @@
 //! The frames that drones send in a tick, on their way to the next tick's downlink.
 
+use crate::burst::give_back;
 use skein_protocol::SimTime;
 use skein_protocol::frame::AirFrame;
 use skein_protocol::radio::{ChannelQueue, SharedChannel};
+
+/// Memory for four times this many frames is kept in any case. By hand: a swarm of 16 drones needs no more.
+const LEAST_KEPT: usize = 64;
 
 /// The frames of the current tick, and the queue of the shared channel if its bit rate is limited.
 #[derive(Clone)]
@@ -41,9 +45,11 @@ impl Uplink {
         &self.frames
     }
 
-    /// Hands the frames over to the downlink and begins an empty tick. Reuses the downlink's memory.
+    /// Hands the frames over to the downlink and begins an empty tick. Reuses the downlink's memory; what a tick with many frames needed is
+    /// given back.
     pub(crate) fn hand_over(&mut self, downlink: &mut Vec<AirFrame>) {
         std::mem::swap(downlink, &mut self.frames);
         self.frames.clear();
+        give_back(&mut self.frames, downlink.len(), LEAST_KEPT);
     }
 }

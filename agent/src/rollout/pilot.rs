@@ -22,7 +22,7 @@ pub trait RolloutPilot: Pilot + Clone {
     /// The plan that it obeys.
     fn plan(&self) -> Option<&Plan>;
 
-    /// Its assignment past the obstacle set with this tag; `None` if it has none.
+    /// Its assignment past the obstacle set with this tag, without the leader of its group; `None` if it has none.
     fn part_past(&self, set: u32) -> Option<Assignment>;
 
     /// Its assignment in a plan past an obstacle set that gives it none, being at `position` (world frame, m): the one that it
