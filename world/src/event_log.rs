@@ -61,4 +61,14 @@ pub(crate) mod tests {
         assert_eq!(events.len(), 2);
         assert_eq!(read(&mut log), []);
     }
+
+    #[test]
+    fn the_memory_of_many_events_is_given_back() {
+        let mut log = EventLog::default();
+        (0..1000).for_each(|_| log.push(SimTime::ZERO, EventKind::Passed { stage: 0 }));
+        log.end_tick();
+        assert!(log.ended().len() > 4 * LEAST_KEPT);
+        log.end_tick();
+        assert_eq!([log.current.capacity(), log.ended.capacity()], [0, 0]);
+    }
 }
