@@ -62,8 +62,8 @@ pub enum Input {
     Sign {
         /// The term.
         ballot: Ballot,
-        /// The group that the term is for.
-        scope: GroupId,
+        /// The group that the term is for, if the message says so.
+        scope: Option<GroupId>,
         /// Whether the message names this drone: then the term is for this drone, whatever its group is.
         named: bool,
         /// When the leader sent it, by the leader's clock, if the message says so.
@@ -90,7 +90,8 @@ pub enum Input {
 #[derive(Clone, Copy, Debug)]
 struct Sign {
     ballot: Ballot,
-    scope: GroupId,
+    /// The group that the term is for, if it says so.
+    scope: Option<GroupId>,
     /// Whether it names this drone.
     named: bool,
     /// When the leader sent it, by the leader's clock, if it says so.
@@ -122,6 +123,8 @@ pub struct Election {
     hops: u16,
     /// Of the leaders' signs that this drone heard itself.
     adaptive_timeout: AdaptiveTimeout,
+    /// Whether the last message that named the group of the term it obeys named another one than the first: one of them is forged.
+    disputed: bool,
     /// Since when it has heard only leaders of parts of its group.
     parted: Option<SimTime>,
     next_heartbeat: SimTime,
@@ -149,6 +152,7 @@ impl Election {
             lag_ns: 0,
             hops: 0,
             adaptive_timeout: AdaptiveTimeout::expecting(now, params.heartbeat_period_s),
+            disputed: false,
             parted: None,
             next_heartbeat: now,
             pre_voted: None,
@@ -277,7 +281,7 @@ impl Election {
             LeadershipKind::Claim | LeadershipKind::Heartbeat | LeadershipKind::LeadershipTransfer => {
                 let is_echo = message.hops > 0 && ballot == self.obeyed && message.stamp <= self.newest;
                 if !is_echo {
-                    let (scope, stamp) = (message.group, Some(message.stamp));
+                    let (scope, stamp) = (Some(message.group), Some(message.stamp));
                     self.sign(now, Sign { ballot, scope, named: false, stamp, hops: message.hops });
                 }
                 None
@@ -300,25 +304,21 @@ impl Election {
             return;
         }
         self.highest_round = self.highest_round.max(ballot.round);
-        if ballot > self.obeyed && (named || scope.contains(self.group)) {
-            self.obeyed = ballot;
-            self.scope = scope;
-            self.leads = false;
-            (self.newest, self.lag_ns) = (SimTime::ZERO, 0);
-            // Far away, gaps are longer: they grow with the square root of the distance if frames get lost.
-            match f64::from(hops).sqrt() {
-                0.0 => self.adaptive_timeout.restart(now),
-                root => self.adaptive_timeout = AdaptiveTimeout::expecting(now, root * self.heartbeat_period_s),
-            }
+        if let Some(scope) = scope.filter(|scope| ballot > self.obeyed && (named || scope.contains(self.group))) {
+            self.follow(now, ballot, scope, hops);
         }
         // A term is for one group. If messages name two, one of them is forged: the leader may be that of another group.
-        let lives = ballot == self.obeyed && scope == self.scope;
+        if ballot == self.obeyed {
+            self.disputed = scope.map_or(self.disputed, |scope| scope != self.scope);
+        }
+        let lives = ballot == self.obeyed && !self.disputed;
         if let Some(stamp) = stamp.filter(|&stamp| lives && stamp > self.newest) {
             (self.newest, self.lag_ns, self.hops) = (stamp, now - stamp, hops);
         }
         // Its group was split without it. A leader of a part will take it in, and its own term ends. A leader of an older
         // term cannot do that.
-        let parted = ballot > self.obeyed && scope != self.group && self.group.contains(scope);
+        let is_part = |scope: GroupId| scope != self.group && self.group.contains(scope);
+        let parted = ballot > self.obeyed && scope.is_some_and(is_part);
         if parted {
             self.leads = false;
         }
@@ -329,6 +329,18 @@ impl Election {
         if lives || (parted && self.may_be_taken_in(now, hops)) {
             self.heard = now;
             self.pre_voted = None;
+        }
+    }
+
+    /// Obeys a higher term from now on. `hops`: how often its message was passed on.
+    fn follow(&mut self, now: SimTime, ballot: Ballot, scope: GroupId, hops: u16) {
+        (self.obeyed, self.scope) = (ballot, scope);
+        self.leads = false;
+        (self.newest, self.lag_ns) = (SimTime::ZERO, 0);
+        // Far away, gaps are longer: they grow with the square root of the distance if frames get lost.
+        match f64::from(hops).sqrt() {
+            0.0 => self.adaptive_timeout.restart(now),
+            root => self.adaptive_timeout = AdaptiveTimeout::expecting(now, root * self.heartbeat_period_s),
         }
     }
 
@@ -362,7 +374,7 @@ impl Election {
         self.obeyed = Ballot { round, incarnation: self.incarnation, claimant: self.me };
         self.scope = scope;
         self.leads = true;
-        self.parted = None;
+        (self.disputed, self.parted) = (false, None);
         (self.heard, self.newest, self.lag_ns) = (now, now, 0);
         self.pre_voted = None;
         self.next_heartbeat = now.after(self.heartbeat_period_s);

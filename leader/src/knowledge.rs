@@ -9,7 +9,7 @@ use crate::own_state::OwnState;
 use crate::params::{Destination, LeadingParams, PlannerParams};
 use crate::peers::Peers;
 use crate::plan_bundle::PlanBundle;
-use crate::tuning::{MAX_REJECTIONS, OLD_S};
+use crate::tuning::{LEFT_OUT_S, MAX_REJECTIONS, OLD_S};
 use skein_protocol::formation::HOLD_SPEED_MPS;
 use skein_protocol::payload::{Assignment, Leadership, Passed, Plan, Pose};
 use skein_protocol::shape::ConvexShape;
@@ -33,6 +33,8 @@ pub(crate) struct Knowledge {
     formed: PlanStamp,
     /// The obstacles that its drones have passed, of those that were planned for.
     ended: Vec<ObstacleId>,
+    /// Since when the leader itself has said only plans that are older than the newest one of its term that this drone heard of.
+    older_said: Option<SimTime>,
 }
 
 impl Knowledge {
@@ -53,6 +55,7 @@ impl Knowledge {
             election: Election::new(params.me, params.incarnation, params.election, params.start),
             formed: PlanStamp::default(),
             ended: Vec::new(),
+            older_said: None,
         }
     }
 
@@ -69,7 +72,7 @@ impl Knowledge {
         other.ledger = ledger;
         let (ballot, scope) = (self.first_term(), GroupId::ALL);
         let leads = Input::Claim(scope);
-        let follows = Input::Sign { ballot, scope, named: true, stamp: Some(now) };
+        let follows = Input::Sign { ballot, scope: Some(scope), named: true, stamp: Some(now) };
         other.election.handle(now, 0, if params.me == self.me { leads } else { follows });
         other.join(now);
         other
@@ -238,7 +241,7 @@ impl Knowledge {
         self.ledger.hear_place(source, pose);
         let (ballot, scope) = (self.election.obeyed(), self.election.scope());
         if pose.leads() && pose.term == ballot && ballot.claimant == source && scope.contains(pose.group) {
-            self.election.handle(now, 0, Input::Sign { ballot, scope, named: false, stamp: Some(pose.stamp) });
+            self.election.handle(now, 0, Input::Sign { ballot, scope: None, named: false, stamp: Some(pose.stamp) });
         }
         self.is_plan_conflict(source, pose)
     }
@@ -300,8 +303,23 @@ impl Knowledge {
     pub(crate) fn hear_plan(&mut self, now: SimTime, source: DroneId, plan: &Plan) {
         let (ballot, scope) = (plan.id.ballot, plan.group);
         if self.obeys(now, Term { ballot, scope, named: false, goes_on: ballot.claimant == source }, source) {
+            if ballot.claimant == source {
+                self.hear_leaders_plan(now, plan.id);
+            }
             self.ledger.hear_plan(plan, &self.obstacles);
             self.join(now);
+        }
+    }
+
+    /// Notes which plan the leader itself says. It repeats its newest one. If it says only older ones than this drone heard of, for as long as
+    /// no delay explains, the newer one was invented, and this drone forgets it.
+    fn hear_leaders_plan(&mut self, now: SimTime, said: PlanStamp) {
+        let newest = self.ledger.newest();
+        let is_older = said < newest && said.ballot == newest.ballot && newest > self.ledger.stamp();
+        self.older_said = is_older.then(|| self.older_said.unwrap_or(now));
+        let patience_s = LEFT_OUT_S + 2.0 * self.peers.delay_s();
+        if self.older_said.take_if(|since| now.since(*since) >= patience_s).is_some() {
+            self.ledger.withdraw(said);
         }
     }
 
@@ -331,7 +349,7 @@ impl Knowledge {
         // by a drone that leads another term by now does not show that this term goes on.
         let over = ballot == self.election.obeyed() && self.term_of(source) > ballot;
         if goes_on && !over {
-            self.election.handle(now, 0, Input::Sign { ballot, scope, named, stamp: None });
+            self.election.handle(now, 0, Input::Sign { ballot, scope: Some(scope), named, stamp: None });
         }
         ballot == self.election.obeyed() && !self.election.leads()
     }

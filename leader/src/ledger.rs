@@ -225,6 +225,13 @@ impl Ledger {
         }
     }
 
+    /// Forgets the newest plan, which this drone does not obey, in favour of the one with this stamp.
+    pub(crate) fn withdraw(&mut self, said: PlanStamp) {
+        self.stamp = said.max(self.stamp());
+        self.plan = None;
+        self.parts.clear();
+    }
+
     /// Starts over if the stamp is newer than the newest one. Returns false if it is older.
     fn open(&mut self, stamp: PlanStamp) -> bool {
         if stamp > self.stamp {

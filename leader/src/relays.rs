@@ -266,8 +266,22 @@ impl Relays {
 
     /// Notes a message of `source` that may have to be passed on.
     pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, source: DroneId, message: MessageRef<'_>) {
+        if self.is_of_no_own_term(k, message) {
+            return;
+        }
         let near = self.is_near(k, source);
         self.facts.hear(now, source, message, near);
+    }
+
+    /// Whether a message names this drone as the leader of a term that it has not led in this life. The message is from its last life, or
+    /// it is invented. If this drone passed it on, other drones would take it for the word of a living leader.
+    fn is_of_no_own_term(&self, k: &Knowledge, message: MessageRef<'_>) -> bool {
+        let ballot = match message {
+            MessageRef::Plan(plan) => plan.id.ballot,
+            MessageRef::Assignment(part) => part.id.ballot,
+            _ => return false,
+        };
+        ballot.claimant == self.me && ballot > k.election().obeyed()
     }
 
     /// Says what is due to be passed on.

@@ -49,7 +49,7 @@ pub(crate) const BEHIND_S: f64 = 3.0;
 /// obstacle ahead. 20. By hand: longer than groups come one after another.
 pub(crate) const ARRIVED_S: f64 = 20.0;
 /// A drone that has had no assignment in its leader's newest plan for this long concludes that the leader does not hear
-/// it, s. 4. By hand.
+/// it, s. If its leader says only older plans for this long, the newest one was invented. 4. By hand.
 pub(crate) const LEFT_OUT_S: f64 = 4.0;
 
 // ---- Rate of plans (`plan_pace.rs`) ----

@@ -1,4 +1,5 @@
-//! A drone without an assignment in its leader's newest plan claims to lead, once for each plan.
+//! A drone without an assignment in its leader's newest plan claims to lead, once for each plan. A plan that its leader never says does not
+//! count.
 #![allow(clippy::unwrap_used, reason = "test helpers")]
 
 mod swarm;
@@ -6,7 +7,7 @@ mod swarm;
 use bytemuck::Zeroable;
 use skein_leader::leading::Leading;
 use skein_leader::own_state::OwnState;
-use skein_protocol::payload::{Leadership, Plan, Pose};
+use skein_protocol::payload::{Assignment, Leadership, Plan, Pose};
 use skein_protocol::{Ballot, DroneId, GroupId, LeadershipKind, Message, Phase, PlanStamp, SimTime, Vec2};
 use swarm::{DEFAULT, params};
 
@@ -38,6 +39,13 @@ impl LeftOut {
     fn hear_plan(&mut self, epoch: u32) {
         let (stamp, id, phase) = (self.now(), PlanStamp { ballot: self.term, epoch }, Phase::Cruise as u32);
         self.hear(1, Message::Plan(Plan { stamp, id, group: GroupId::ALL, phase, members: 2, ..Plan::zeroed() }));
+    }
+
+    /// Hears from `source` this drone's assignment in a plan of the leader's present term.
+    fn hear_assignment(&mut self, source: u32, epoch: u32) {
+        let (id, group) = (PlanStamp { ballot: self.term, epoch }, GroupId::ALL);
+        let (scope, drone, leader) = (group, DroneId(2), DroneId(1));
+        self.hear(source, Message::Assignment(Assignment { id, scope, group, drone, leader, ..Assignment::zeroed() }));
     }
 
     /// Flies for this long. Returns how often it has claimed to lead.
@@ -76,4 +84,38 @@ fn a_drone_without_an_assignment_claims_once_for_each_plan() {
         assert_eq!(drone.claims(2.0), 0, "the assignment may still come");
         assert_eq!(drone.claims(58.0), 1, "plan {epoch}");
     }
+}
+
+#[test]
+fn a_plan_that_the_leader_never_says_keeps_no_drone_from_obeying_the_leaders_plan() {
+    let mut drone = LeftOut::new();
+    drone.claims(1.0);
+    drone.hear_assignment(0, 900);
+    assert_eq!(drone.leading.newest_stamp().epoch, 900);
+    let obeys_after_s = (1..100).map(|tenths| 0.1 * f64::from(tenths)).find(|_| {
+        drone.hear_plan(1);
+        drone.hear_assignment(1, 1);
+        assert_eq!(drone.claims(0.1), 0, "the leader has an assignment for it");
+        drone.leading.stamp().epoch == 1
+    });
+    assert!(obeys_after_s.is_some_and(|s| (3.9..4.3).contains(&s)), "{obeys_after_s:?}");
+}
+
+#[test]
+fn a_plan_that_arrives_before_an_older_one_is_not_forgotten() {
+    let mut drone = LeftOut::new();
+    drone.claims(1.0);
+    drone.hear_assignment(1, 3);
+    for _ in 0..60 {
+        drone.hear_plan(2);
+        drone.claims(0.1);
+        drone.hear_plan(3);
+    }
+    assert_eq!(drone.leading.stamp().epoch, 3);
+    drone.hear_assignment(1, 4);
+    for _ in 0..20 {
+        drone.hear_plan(3);
+        drone.claims(0.1);
+    }
+    assert_eq!(drone.leading.newest_stamp().epoch, 4, "2 s are no proof");
 }

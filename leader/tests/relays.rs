@@ -65,11 +65,15 @@ impl Middle {
 
     /// Hears an assignment of each drone.
     fn hear_assignments(&mut self) {
+        self.hear_assignments_of(0, PLAN);
+    }
+
+    /// Hears from `source` an assignment of each drone in this plan.
+    fn hear_assignments_of(&mut self, source: u32, id: PlanStamp) {
         for drone in 2..DRONES {
             let (scope, group) = (GroupId::ALL, GroupId::ALL);
-            let part =
-                Assignment { id: PLAN, scope, group, drone: DroneId(drone), leader: DroneId(0), ..Zeroable::zeroed() };
-            self.hear(0, Message::Assignment(part));
+            let part = Assignment { id, scope, group, drone: DroneId(drone), leader: DroneId(0), ..Zeroable::zeroed() };
+            self.hear(source, Message::Assignment(part));
         }
     }
 
@@ -178,6 +182,21 @@ fn an_assignment_that_was_never_said_is_said_once_if_its_drone_falls_silent() {
     middle.hear_assignments();
     assert_eq!(seconds(&mut middle, 5, 0..0), []);
     assert_eq!(seconds(&mut middle, 24, 40..43), [40, 41, 42]);
+}
+
+/// Other drones would take it for a sign that this drone leads that term. The term is from its last life, or it is invented.
+#[test]
+fn a_drone_passes_nothing_on_of_a_term_that_it_would_lead_but_never_claimed() {
+    let passed_on_of = |claimant: u32| {
+        let mut middle = Middle::new();
+        (0..60).for_each(|_| drop(middle.step()));
+        middle.hear_of(3..DRONES, PlanStamp::default());
+        let ballot = Ballot { round: 7, incarnation: 1, claimant: DroneId(claimant) };
+        middle.hear_assignments_of(2, PlanStamp { ballot, epoch: 1 });
+        middle.passes_on(300).len()
+    };
+    assert!(passed_on_of(5) > 0);
+    assert_eq!(passed_on_of(1), 0);
 }
 
 /// Drone 1, which heard from drone 2 that `claimant` leads the first part of a split, and then learnt that it is in that part.
