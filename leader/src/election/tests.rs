@@ -282,24 +282,24 @@ fn a_term_that_a_message_gives_to_another_group_is_no_sign_of_life() {
 fn a_beacon_of_a_leader_is_no_sign_of_life_while_the_leader_names_another_group() {
     let (mut drone, one) = (machine(3), N.child(1));
     drone.handle(at(0.0), 0, Input::Joined(one));
+    let (leader, two) = (ballot(7, 0), N.child(2));
     let beacon = |drone: &mut Election, now_s: f64| {
-        drone.handle(
-            at(now_s),
-            0,
-            Input::Sign { ballot: ballot(7, 0), scope: None, named: false, stamp: Some(at(now_s)) },
-        )
+        let stamp = Some(at(now_s));
+        drone.handle(at(now_s), 0, Input::Sign { ballot: leader, scope: None, named: false, stamp });
     };
     beacon(&mut drone, 0.0);
     assert!(!drone.obeyed().is_some(), "a beacon does not say which group its term is for");
     // A forged message gives the term to this drone's group, the leader's own one to another group.
-    sign(&mut drone, 0.1, ballot(7, 0), one, false);
+    sign(&mut drone, 0.1, leader, one, false);
     beacon(&mut drone, 0.2);
     assert!(drone.has_leader(at(0.2 + PARAMS.leader_timeout_s)));
-    sign(&mut drone, 0.3, ballot(7, 0), N.child(2), false);
-    (3..15).for_each(|step| drop(beacon(&mut drone, 0.1 * f64::from(step))));
+    sign(&mut drone, 0.3, leader, two, false);
+    for step in 3..15 {
+        beacon(&mut drone, 0.1 * f64::from(step));
+    }
     assert!(!drone.has_leader(at(0.21 + PARAMS.leader_timeout_s)));
     // The leader's own word that it leads this drone's group settles it.
-    sign(&mut drone, 1.5, ballot(7, 0), one, false);
+    sign(&mut drone, 1.5, leader, one, false);
     beacon(&mut drone, 1.6);
     assert!(drone.has_leader(at(1.6 + PARAMS.leader_timeout_s)));
 }
