@@ -11,7 +11,7 @@ use crate::situation::Situation;
 use crate::slots::{self, Reformation, TooFewSlots};
 use crate::tuning::{ANCHOR_STEP_M, DEAD_S, FRONT_LOST_S, MAX_WAYS_DRONES, OPEN_RANKS, OPENINGS, STALLED_S};
 use crate::visibility::VisibilityMap;
-use skein_protocol::formation::{HOLD_SPEED_MPS, SLOT_BERTH};
+use skein_protocol::formation::{GoalGround, HOLD_SPEED_MPS, SLOT_BERTH};
 use skein_protocol::payload::{Assignment, MAX_SET, NO_ROUTE, Plan};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{GroupId, ObstacleId, Phase, SimTime, Vec2};
@@ -223,7 +223,11 @@ impl FormationPlanner {
             None => slots::assign_by(method, positions, places),
         })?;
         let passed = if phase == Phase::Reform { newest_passed(s) } else { Vec::new() };
-        let plan = draft(s, phase, &passed, anchor);
+        let mut plan = draft(s, phase, &passed, anchor);
+        if phase == Phase::Reform && anchor.x < plan.anchor_stop_x_m {
+            let stop = Vec2::new(plan.anchor_stop_x_m, anchor.y);
+            plan.anchor_stop_x_m = clear_anchor(s, &shape, stop, &occupied).x;
+        }
         let split: Vec<&Member> = s.members.iter().filter(|m| m.group != GroupId::ALL).collect();
         let groups: Vec<GroupId> = s.members.iter().map(|m| group_of(m, &split)).collect();
         let leaders = group_leaders(s.members, &groups, &s.params.destination);
@@ -254,14 +258,18 @@ fn newest_passed(s: &Situation<'_>) -> Vec<ObstacleId> {
     ids
 }
 
-/// The slots of the members, relative to the front slot, m. At the goal, slots beside which a dead drone hangs are left free. A drone that
-/// hears no other flies to the front slot, unless that one has been `taken` for long: if the others live, they leave it to that drone.
+/// The slots of the members, relative to the front slot, m. At the goal, slots beside which a dead drone hangs are left free, and no slot is added
+/// beside an obstacle. A drone that hears no other flies to the front slot, unless that one has been `taken` for long: if the others live, they
+/// leave it to that drone.
 fn slots_of(s: &Situation<'_>, phase: Phase, taken: bool) -> Vec<Vec2> {
     let (shape, spacing_m) = (&s.params.shape, s.params.spacing_m);
     let count = s.members.len() + if phase == Phase::Reform { missing(s) } else { 0 };
     match s.params.destination {
         Destination::Goal { front_m } if phase == Phase::Reform && (s.members.len() > 1 || taken) => {
-            shape.free_slots(count, spacing_m, front_m, &dead(s), s.params.safe_distance_m)
+            let (dead, obstacles) = (dead(s), s.obstacles.iter().map(|(_, known)| known.shape).collect::<Vec<_>>());
+            let (safe_distance_m, clearance_m) = (s.params.safe_distance_m, s.params.routes.clearance_m);
+            let ground = GoalGround { dead: &dead, obstacles: &obstacles, safe_distance_m, clearance_m };
+            shape.free_slots(count, spacing_m, &ground, |slot| front_m + slot)
         }
         Destination::Goal { .. } => shape.slots(s.members.len(), spacing_m),
         Destination::Hold { .. } => shape.slots(count, spacing_m),

@@ -3,6 +3,7 @@
 //! Slots are in metres, relative to the front slot (the anchor): x along the flight direction, y to its left.
 
 use crate::Vec2;
+use crate::shape::ConvexShape;
 use serde::{Deserialize, Serialize};
 
 /// Maximum speed of a drone relative to its formation while the formation counts as held, m/s.
@@ -14,6 +15,45 @@ pub const SLOT_BERTH: f64 = 1.05;
 
 /// A drone that hangs dead is within [`SLOT_BERTH`] of at most as many slots: they are at least a safe distance apart.
 pub const MOST_BLOCKED: usize = 7;
+
+/// A formation that leaves slots free beside dead drones may be larger by as many slots that lie beside obstacles. By hand.
+pub const MOST_BESIDE_OBSTACLES: usize = 64;
+
+/// What keeps slots at the goal free: drones that hang dead, and obstacles, beside which a larger formation would have slots. All places are in
+/// one frame, m.
+#[derive(Clone, Copy, Debug)]
+pub struct GoalGround<'a> {
+    /// Where drones hang dead, m.
+    pub dead: &'a [Vec2],
+    /// The obstacles.
+    pub obstacles: &'a [ConvexShape],
+    /// Least distance between two bodies, m.
+    pub safe_distance_m: f64,
+    /// Least distance of a body to an obstacle, m.
+    pub clearance_m: f64,
+}
+
+impl GoalGround<'_> {
+    /// Whether a slot at this place is at least [`SLOT_BERTH`] safe distances away from dead drones, and `dead_margin_m` more, and the
+    /// clearance away from obstacles, and `obstacle_margin_m` more.
+    #[must_use]
+    pub fn is_free(&self, place: Vec2, dead_margin_m: f64, obstacle_margin_m: f64) -> bool {
+        let keep_m = SLOT_BERTH * self.safe_distance_m + dead_margin_m;
+        let clear_m = self.clearance_m + obstacle_margin_m - ROUNDING_M;
+        self.dead.iter().all(|dead| (place - dead).norm() >= keep_m)
+            && self.obstacles.iter().all(|obstacle| obstacle.distance_m(place) >= clear_m)
+    }
+
+    /// The most slots of a formation at the goal in which `count` drones stand.
+    #[must_use]
+    pub fn most_slots(&self, count: usize) -> usize {
+        let beside = if self.dead.is_empty() || self.obstacles.is_empty() { 0 } else { MOST_BESIDE_OBSTACLES };
+        count + MOST_BLOCKED * self.dead.len() + beside
+    }
+}
+
+/// Distances that differ by less than this are equal, m.
+const ROUNDING_M: f64 = 1e-6;
 
 /// The shape of a formation. It has slots for any number of drones, except for [`Shape::Offsets`]. `spacing_m` below is the
 /// argument of [`Shape::slots`].
@@ -63,23 +103,22 @@ impl Shape {
         }
     }
 
-    /// The slots of `count` drones as in [`Self::slots`] with the front slot at `front`, where drones hang dead at the places `dead` (both
-    /// world frame, m): the first slots of the smallest formation that has enough of them at least [`SLOT_BERTH`] safe distances away
-    /// from those. [`Self::slots`] if none has.
+    /// The slots of `count` drones at the goal: the first free slots of the smallest formation that has enough of them; [`Self::slots`] if none
+    /// has, or if no drone hangs dead. `place` gives the place of a slot, in the frame of `ground`, m.
     #[must_use]
     pub fn free_slots(
         &self,
         count: usize,
         spacing_m: f64,
-        front: Vec2,
-        dead: &[Vec2],
-        safe_distance_m: f64,
+        ground: &GoalGround<'_>,
+        place: impl Fn(Vec2) -> Vec2,
     ) -> Vec<Vec2> {
-        let keep_m = SLOT_BERTH * safe_distance_m;
-        let is_free = |slot: &Vec2| dead.iter().all(|place| (slot - (place - front)).norm() >= keep_m);
+        let is_free = |slot: &Vec2| ground.is_free(place(*slot), 0.0, 0.0);
         let free = |size| self.slots(size, spacing_m).into_iter().filter(is_free).take(count).collect::<Vec<_>>();
-        let largest = count + MOST_BLOCKED * dead.len();
-        (count..=largest).map(free).find(|free| free.len() == count).unwrap_or_else(|| self.slots(count, spacing_m))
+        let mut sizes = (count..=ground.most_slots(count)).filter(|_| !ground.dead.is_empty());
+        sizes
+            .find_map(|size| Some(free(size)).filter(|free| free.len() == count))
+            .unwrap_or_else(|| self.slots(count, spacing_m))
     }
 }
 
@@ -137,17 +176,31 @@ mod tests {
         }
     }
 
+    /// The abscissas of `count` slots with the front slot at (500, 30), 20 m apart. A drone hangs dead at this place relative to that one, m.
+    fn free_xs(shape: &Shape, count: usize, dead: (f64, f64), obstacles: &[ConvexShape]) -> Vec<f64> {
+        let front = Vec2::new(500.0, 30.0);
+        let dead = [front + Vec2::new(dead.0, dead.1)];
+        let ground = GoalGround { dead: &dead, obstacles, safe_distance_m: 12.0 / SLOT_BERTH, clearance_m: 5.0 };
+        shape.free_slots(count, 20.0, &ground, |slot| front + slot).iter().map(|slot| slot.x).collect()
+    }
+
     #[test]
-    fn a_blocked_slot_is_left_free() {
-        let xs = |shape: &Shape, count, x: f64, y: f64| -> Vec<f64> {
-            let (front, dead) = (Vec2::new(500.0, 30.0), Vec2::new(500.0 + x, 30.0 + y));
-            shape.free_slots(count, 20.0, front, &[dead], 12.0 / SLOT_BERTH).iter().map(|slot| slot.x).collect()
-        };
+    fn a_slot_beside_a_dead_drone_is_left_free() {
+        let xs = |shape: &Shape, count, x: f64, y: f64| free_xs(shape, count, (x, y), &[]);
         assert_eq!(xs(&Shape::Column, 4, -20.0, 13.0), [0.0, -20.0, -40.0, -60.0]);
         assert_eq!(xs(&Shape::Column, 4, -30.0, 0.0), [0.0, -60.0, -80.0, -100.0]);
         assert_eq!(xs(&Shape::Column, 4, 0.0, 5.0), [-20.0, -40.0, -60.0, -80.0]);
         let two = Shape::Offsets(vec![[0.0, 0.0], [-20.0, 0.0]]);
         assert_eq!(xs(&two, 2, 0.0, 0.0), [0.0, -20.0], "it has no third slot");
+    }
+
+    #[test]
+    fn no_slot_is_added_beside_an_obstacle() {
+        let behind = |radius_m| ConvexShape::circle(Vec2::new(420.0, 30.0), radius_m).unwrap();
+        let xs = |dead, radius_m| free_xs(&Shape::Column, 4, dead, &[behind(radius_m)]);
+        assert_eq!(xs((-20.0, 13.0), 10.0), [0.0, -20.0, -40.0, -60.0], "nothing blocks a slot");
+        assert_eq!(xs((-20.0, 11.0), 10.0), [0.0, -40.0, -60.0, -100.0]);
+        assert_eq!(xs((-20.0, 11.0), 15.1), [0.0, -40.0, -120.0, -140.0]);
     }
 
     #[test]

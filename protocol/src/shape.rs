@@ -199,6 +199,21 @@ impl ConvexShape {
         (low - margin, high + margin)
     }
 
+    /// Distance from a point to the outline seen from above, m; 0 inside.
+    #[must_use]
+    pub fn distance_m(&self, point: Vec2) -> f64 {
+        let n = (self.count as usize).min(MAX_VERTICES);
+        let edges = || (0..n).map(|i| (self.vertex(i), self.vertex((i + 1) % n)));
+        if n >= 3 && edges().all(|(a, b)| (b - a).perp(&(point - a)) >= 0.0) {
+            return 0.0;
+        }
+        let to_edge = |(a, b): (Vec2, Vec2)| {
+            let along = (b - a).dot(&(point - a)) / (b - a).norm_squared().max(f64::MIN_POSITIVE);
+            (point - a - (b - a) * along.clamp(0.0, 1.0)).norm()
+        };
+        (edges().map(to_edge).fold(f64::INFINITY, f64::min) - self.radius_m).max(0.0)
+    }
+
     /// Centre of the axis-aligned bounding box, world frame, m.
     #[must_use]
     pub fn centre(&self) -> Vec2 {
@@ -221,6 +236,18 @@ mod tests {
         };
         assert!(ConvexShape::new(&star(1.0), 0.0).is_ok());
         assert_eq!(ConvexShape::new(&star(2.0), 0.0), Err(ShapeError::NotConvex));
+    }
+
+    #[test]
+    fn distances_to_a_rectangle_and_a_disc() {
+        let v = Vec2::new;
+        let rectangle = ConvexShape::rectangle(v(10.0, 0.0), v(2.0, 5.0), 0.0).unwrap();
+        for (point, wanted) in [(v(10.0, 1.0), 0.0), (v(0.0, 0.0), 8.0), (v(15.0, 9.0), 5.0), (v(10.0, -7.0), 2.0)] {
+            assert!((rectangle.distance_m(point) - wanted).abs() < 1e-12, "{point}");
+        }
+        let disc = ConvexShape::circle(v(0.0, 0.0), 3.0).unwrap();
+        assert!((disc.distance_m(v(3.0, 4.0)) - 2.0).abs() < 1e-12);
+        assert!(disc.distance_m(v(1.0, 1.0)).abs() < 1e-12);
     }
 
     #[test]

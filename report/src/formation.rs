@@ -3,6 +3,7 @@
 use crate::facts::{MissionEnd, RunFacts};
 use crate::tuning::{SOLVE_ALWAYS_DRONES_MAX, SOLVE_PERIOD_S};
 use skein_protocol::Vec2;
+use skein_protocol::formation::GoalGround;
 use skein_protocol::matching::least_cost;
 
 /// The error of a formation after the best translation and assignment.
@@ -43,13 +44,14 @@ pub(crate) fn slots(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Option<Vec
 }
 
 /// The slots of `count` drones relative to the front slot, axes of the world frame, m. At the goal, slots beside which drones hang dead at the places `dead`, m, stay
-/// free.
+/// free, and then no slot is added beside an obstacle.
 pub(crate) fn around_dead(facts: &RunFacts, count: usize, dead: &[Vec2]) -> Vec<Vec2> {
     let course = facts.course;
     let slots = if let MissionEnd::Goal { front_m } = facts.end {
-        let dead: Vec<Vec2> = dead.iter().map(|&place| course.from_world(place)).collect();
-        let front_m = course.from_world(front_m.into());
-        facts.shape.free_slots(count, facts.spacing_m, front_m, &dead, facts.safe_distance_m)
+        let (obstacles, safe_distance_m, clearance_m) = (&facts.obstacles, facts.safe_distance_m, facts.clearance_m);
+        let ground = GoalGround { dead, obstacles, safe_distance_m, clearance_m };
+        let place = |slot| Vec2::from(front_m) + course.to_world(slot);
+        facts.shape.free_slots(count, facts.spacing_m, &ground, place)
     } else {
         facts.shape.slots(count, facts.spacing_m)
     };

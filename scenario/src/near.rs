@@ -52,43 +52,16 @@ pub(crate) fn closest_pair(points: &[Vec2], limit_m: f64) -> Option<ClosePair> {
 pub(crate) fn closest_slot(shape: &ConvexShape, slots: &[Vec2], limit_m: f64) -> Option<CloseSlot> {
     let (low, high) = shape.bounds();
     let boxed = |p: &Vec2| (low - p).max().max((p - high).max()) < limit_m;
-    let near = slots.iter().enumerate().filter(|(_, p)| boxed(p)).map(|(slot, &p)| (slot, distance(shape, p)));
+    let near = slots.iter().enumerate().filter(|(_, p)| boxed(p)).map(|(slot, &p)| (slot, shape.distance_m(p)));
     let near: Vec<(usize, f64)> = near.filter(|&(_, d)| d < limit_m).collect();
     let &(slot, distance_m) = near.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(CloseSlot { slot, distance_m, slots: near.len() })
-}
-
-/// The distance from a point to a shape, 0 inside.
-fn distance(shape: &ConvexShape, point: Vec2) -> f64 {
-    let n = shape.count as usize;
-    let edge = |i: usize| (shape.vertex(i), shape.vertex((i + 1) % n));
-    if n >= 3 && (0..n).map(edge).all(|(a, b)| (b - a).perp(&(point - a)) >= 0.0) {
-        return 0.0;
-    }
-    let to_edge = |(a, b): (Vec2, Vec2)| {
-        let along = (b - a).dot(&(point - a)) / (b - a).norm_squared().max(f64::MIN_POSITIVE);
-        (point - a - (b - a) * along.clamp(0.0, 1.0)).norm()
-    };
-    let outline = (0..n).map(edge).map(to_edge).fold(f64::INFINITY, f64::min);
-    (outline - shape.radius_m).max(0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    #[test]
-    fn distances_to_a_rectangle_and_a_disc() {
-        let v = Vec2::new;
-        let rectangle = ConvexShape::rectangle(v(10.0, 0.0), v(2.0, 5.0), 0.0).unwrap();
-        for (point, wanted) in [(v(10.0, 1.0), 0.0), (v(0.0, 0.0), 8.0), (v(15.0, 9.0), 5.0), (v(10.0, -7.0), 2.0)] {
-            assert!((distance(&rectangle, point) - wanted).abs() < 1e-12, "{point}");
-        }
-        let disc = ConvexShape::circle(v(0.0, 0.0), 3.0).unwrap();
-        assert!((distance(&disc, v(3.0, 4.0)) - 2.0).abs() < 1e-12);
-        assert!(distance(&disc, v(1.0, 1.0)).abs() < 1e-12);
-    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]

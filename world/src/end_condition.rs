@@ -7,11 +7,13 @@ use crate::grid::Grid;
 use crate::params::{End, WorldParams};
 use crate::stages::Stages;
 use skein_protocol::Vec2;
-use skein_protocol::formation::MOST_BLOCKED;
+use skein_protocol::formation::GoalGround;
+use skein_protocol::shape::ConvexShape;
 
 /// Whether the living drones stand in their formation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EndCondition {
+    obstacles: Vec<ConvexShape>,
     /// The slots of the formation relative to its front slot, m.
     slots: Vec<Vec2>,
     /// Mean of the slots, m.
@@ -27,9 +29,21 @@ pub(crate) struct EndCondition {
     places: Vec<Vec2>,
     /// Where dead drones hang, world frame, m.
     dead: Vec<Vec2>,
+    /// The greatest size of a formation at the goal, for this number of living drones and these dead ones.
+    most: Option<(usize, Vec<Vec2>, usize)>,
 }
 
 impl EndCondition {
+    /// The end condition of a mission among these obstacles, world frame.
+    pub(crate) fn among(obstacles: &[ConvexShape]) -> Self {
+        Self { obstacles: obstacles.to_vec(), ..Self::default() }
+    }
+
+    /// What keeps slots at the goal free where these drones hang dead, world frame, m.
+    pub(crate) fn ground<'a>(&'a self, params: &WorldParams, dead: &'a [Vec2]) -> GoalGround<'a> {
+        goal_slots::ground(params, dead, &self.obstacles)
+    }
+
     /// Whether the end condition is met by each of these sets of living drones, which together are all of them. Without living
     /// drones it never is.
     pub(crate) fn is_met(
@@ -82,11 +96,26 @@ impl EndCondition {
                 anchor.x >= stop_x_m - params.arrival_error_m && self.filled(places, anchor, params.arrival_error_m)
             }
             End::Goal { front_m } => {
-                let largest = places.len() + MOST_BLOCKED * self.dead.len();
-                (places.len()..=largest).any(|size| self.fill_at_goal(params, places, front_m, size))
+                let most = self.most_at_goal(params, places.len());
+                (places.len()..=most).any(|size| self.fill_at_goal(params, places, front_m, size))
             }
             // These ends do not depend on the formation.
             End::Time { .. } | End::Pilots => false,
+        }
+    }
+
+    /// [`goal_slots::most`], found anew only if drones have died or a dead one has moved.
+    fn most_at_goal(&mut self, params: &WorldParams, drones: usize) -> usize {
+        if self.dead.is_empty() {
+            return drones;
+        }
+        match &self.most {
+            Some((of, dead, most)) if *of == drones && *dead == self.dead => *most,
+            _ => {
+                let most = goal_slots::most(params, drones, &self.ground(params, &self.dead));
+                self.most = Some((drones, self.dead.clone(), most));
+                most
+            }
         }
     }
 
@@ -116,15 +145,16 @@ impl EndCondition {
     }
 
     /// Whether the drones at these places stand in slots of a formation of this size with its front slot at the goal, and no slot before
-    /// the last one that is taken is free, except beside dead drones.
+    /// the last one that is taken is free, except beside dead drones and, once a drone has died, beside obstacles.
     fn fill_at_goal(&mut self, params: &WorldParams, places: &[Vec2], front_m: Vec2, size: usize) -> bool {
         self.form(size, params);
         if !self.filled(places, front_m, params.arrival_error_m) {
             return false;
         }
         let last = self.taken.iter().rposition(|&taken| taken).unwrap_or_default();
+        let ground = self.ground(params, &self.dead);
         let slots = self.slots.iter().zip(&self.taken).take(last);
-        slots.filter(|(_, taken)| !**taken).all(|(slot, _)| goal_slots::may_be_free(params, front_m + slot, &self.dead))
+        slots.filter(|(_, taken)| !**taken).all(|(slot, _)| goal_slots::may_be_free(params, front_m + slot, &ground))
     }
 
     /// Where the front slot is when the formation fits the drones at these places best (least squares), m.
@@ -308,6 +338,21 @@ mod tests {
         assert!(is_met(&goal, &without_fourth(0.9 * params().safe_distance_m), &open()));
         assert!(!is_met(&goal, &without_fourth(500.0), &open()), "the last drone could take its slot");
         assert!(!is_met(&hold(0.0), &without_fourth(0.0), &open()), "a formation that is held moves on");
+    }
+
+    #[test]
+    fn slots_at_the_goal_are_left_free_beside_an_obstacle_once_a_drone_has_died() {
+        let goal = WorldParams { shape: Shape::Column, end: End::Goal { front_m: Vec2::zeros() }, ..params() };
+        let standing = |slot: f64| Body::new(Vec3::new(-slot * goal.spacing_m, 0.0, 0.0), Vec3::zeros());
+        let met = |slots: &[f64], obstacles: &[ConvexShape], killed: Option<usize>| {
+            let mut all: Vec<Body> = slots.iter().map(|&slot| standing(slot)).collect();
+            killed.into_iter().for_each(|drone| all[drone].kill());
+            EndCondition::among(obstacles).is_met(&goal, &all, &open(), &living(&all))
+        };
+        let in_fourth = [ConvexShape::circle(Vec2::new(-3.0 * goal.spacing_m, 0.0), 1.0).unwrap()];
+        assert!(met(&[0.0, 1.0, 2.0, 4.0], &in_fourth, Some(1)));
+        assert!(!met(&[0.0, 1.0, 2.0, 4.0], &[], Some(1)), "the fourth slot is free");
+        assert!(!met(&[0.0, 1.0, 2.0, 4.0], &in_fourth, None), "no drone has died");
     }
 
     #[test]

@@ -3,16 +3,20 @@
 use crate::body::Body;
 use crate::params::{End, WorldParams};
 use skein_protocol::Vec2;
-use skein_protocol::formation::SLOT_BERTH;
+use skein_protocol::formation::GoalGround;
+use skein_protocol::shape::ConvexShape;
 
-/// The slots of a formation of so many drones, relative to its front slot, axes of the world frame, m. A slot at the goal is left free if one of these dead drones
-/// (world frame, m) hangs so close to it that no other drone may come there.
-pub(crate) fn slots(params: &WorldParams, drones: usize, dead: &[Vec2]) -> Vec<Vec2> {
+/// What keeps slots free where these drones hang dead (world frame, m) and these obstacles are.
+pub(crate) fn ground<'a>(params: &WorldParams, dead: &'a [Vec2], obstacles: &'a [ConvexShape]) -> GoalGround<'a> {
+    GoalGround { dead, obstacles, safe_distance_m: params.safe_distance_m, clearance_m: params.clearance_m }
+}
+
+/// The slots of a formation of so many drones, relative to its front slot, axes of the world frame, m. At the goal, slots that the ground keeps
+/// free are left out.
+pub(crate) fn slots(params: &WorldParams, drones: usize, ground: &GoalGround<'_>) -> Vec<Vec2> {
     let End::Goal { front_m } = params.end else { return all(params, drones) };
     let course = params.course;
-    let dead: Vec<Vec2> = dead.iter().map(|&place| course.from_world(place)).collect();
-    let front_m = course.from_world(front_m);
-    let free = params.shape.free_slots(drones, params.spacing_m, front_m, &dead, params.safe_distance_m);
+    let free = params.shape.free_slots(drones, params.spacing_m, ground, |slot| front_m + course.to_world(slot));
     free.into_iter().map(|slot| course.to_world(slot)).collect()
 }
 
@@ -22,10 +26,21 @@ pub(crate) fn all(params: &WorldParams, drones: usize) -> Vec<Vec2> {
     slots.into_iter().map(|slot| params.course.to_world(slot)).collect()
 }
 
-/// Whether a slot at this place may be left free: a dead drone hangs so close to it that a leader may take it for blocked. World frame, m.
-pub(crate) fn may_be_free(params: &WorldParams, slot: Vec2, dead: &[Vec2]) -> bool {
-    let keep_m = SLOT_BERTH * params.safe_distance_m + params.arrival_error_m;
-    dead.iter().any(|place| (slot - place).norm() < keep_m)
+/// Whether a slot at this place may be left free: a leader may take it for blocked. A leader knows dead drones and obstacles with errors, and may
+/// plan to keep the planning distance from obstacles. World frame, m.
+pub(crate) fn may_be_free(params: &WorldParams, slot: Vec2, ground: &GoalGround<'_>) -> bool {
+    let error_m = params.arrival_error_m;
+    let beside_m = (params.planning_distance_m - params.clearance_m).max(0.0);
+    !ground.is_free(slot, error_m, beside_m + error_m)
+}
+
+/// The most slots of a formation at the goal in which so many drones may stand.
+pub(crate) fn most(params: &WorldParams, drones: usize, ground: &GoalGround<'_>) -> usize {
+    let End::Goal { front_m } = params.end else { return drones };
+    let beside_dead = GoalGround { obstacles: &[], ..*ground }.most_slots(drones);
+    let stays = |slot: &Vec2| !may_be_free(params, front_m + slot, ground);
+    let is_enough = |&size: &usize| all(params, size).iter().filter(|slot| stays(slot)).count() >= drones;
+    (drones..=ground.most_slots(drones)).find(is_enough).unwrap_or(drones).max(beside_dead)
 }
 
 /// Where dead drones hang, world frame, m.

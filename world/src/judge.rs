@@ -11,6 +11,7 @@ use crate::tuning::STANDSTILL_S;
 use crate::unfinished::Unfinished;
 use crate::unfinished_text;
 use skein_protocol::record::{Outcome, UNFINISHED_MAX};
+use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, SimTime, UnfinishedDrone};
 
 /// What the judge looks at, at the end of a tick.
@@ -73,6 +74,11 @@ pub(crate) struct MissionJudge {
 }
 
 impl MissionJudge {
+    /// The judge of a mission among these obstacles, world frame.
+    pub(crate) fn among(obstacles: &[ConvexShape]) -> Self {
+        Self { condition: EndCondition::among(obstacles), ..Self::default() }
+    }
+
     /// The outcome; `None` while the mission goes on.
     pub(crate) fn outcome(&self) -> Option<Outcome> {
         self.end.as_ref().map(|verdict| verdict.outcome)

@@ -4,13 +4,14 @@ use crate::goal_slots;
 use crate::params::{End, WorldParams};
 use crate::tuning::FIT_MAX_DRONES;
 use skein_protocol::Vec2;
+use skein_protocol::formation::GoalGround;
 use skein_protocol::matching::least_cost;
 
 /// For each of the drones at these places, its distance from the slot that is left for it, m. A drone in a slot that no other one takes
 /// has that slot; the others share the slots that are left so that the sum of their distances is least. `None` if the goal has no
-/// slots, or too few. `dead`: where dead drones hang. World frame, m.
-pub(crate) fn slot_gaps(params: &WorldParams, places: &[Vec2], dead: &[Vec2]) -> Option<Vec<f64>> {
-    let slots = goal_slots::slots(params, places.len(), dead);
+/// slots, or too few. `ground`: what keeps slots at the goal free. World frame, m.
+pub(crate) fn slot_gaps(params: &WorldParams, places: &[Vec2], ground: &GoalGround<'_>) -> Option<Vec<f64>> {
+    let slots = goal_slots::slots(params, places.len(), ground);
     if slots.len() < places.len() || places.is_empty() {
         return None;
     }
@@ -78,7 +79,8 @@ mod tests {
     }
 
     fn rounded(end: End) -> Option<Vec<f64>> {
-        let gaps = slot_gaps(&WorldParams { end, ..params() }, &one_away(Vec2::new(500.0, 20.0)), &[]);
+        let params = WorldParams { end, ..params() };
+        let gaps = slot_gaps(&params, &one_away(Vec2::new(500.0, 20.0)), &goal_slots::ground(&params, &[], &[]));
         gaps.map(|gaps| gaps.into_iter().map(f64::round).collect())
     }
 
@@ -95,8 +97,8 @@ mod tests {
     fn two_drones_in_one_slot_do_not_both_have_it() {
         let mut places = one_away(Vec2::zeros());
         places[7] = places[0];
-        let gaps =
-            slot_gaps(&WorldParams { end: End::Goal { front_m: Vec2::zeros() }, ..params() }, &places, &[]).unwrap();
+        let params = WorldParams { end: End::Goal { front_m: Vec2::zeros() }, ..params() };
+        let gaps = slot_gaps(&params, &places, &goal_slots::ground(&params, &[], &[])).unwrap();
         assert_eq!(gaps.iter().filter(|&&gap| gap > 1.0).count(), 1, "{gaps:?}");
     }
 }

@@ -37,7 +37,7 @@ impl Unfinished<'_> {
     fn of_part(&self, part: &[usize]) -> Vec<UnfinishedDrone> {
         let places: Vec<_> = part.iter().map(|&drone| self.bodies[drone].position().xy()).collect();
         let dead: Vec<_> = goal_slots::dead(self.bodies).collect();
-        let gaps = slot_gaps(self.params, &places, &dead);
+        let gaps = slot_gaps(self.params, &places, &self.condition.ground(self.params, &dead));
         let gap = |place: usize| gaps.as_ref().map(|gaps| gaps[place]);
         let drones = part.iter().enumerate().map(|(place, &drone)| (drone, gap(place)));
         drones.filter_map(|(drone, gap_m)| Some(self.describe(drone, self.lack(drone, gap_m)?, gap_m))).collect()

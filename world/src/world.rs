@@ -85,7 +85,7 @@ impl World {
             monitor: InvariantMonitor::new(drones.bodies(), params.safe_distance_m, params.clearance_m),
             sweep: SensorSweep::new(outlines),
             decisions: DecisionLog::new(starts.len()),
-            judge: MissionJudge::default(),
+            judge: MissionJudge::among(obstacles),
             parts: Parts::default(),
             // A drone that flies from one slot to another moves.
             stillness: Stillness::new(drones.bodies(), params.spacing_m / 2.0),
