@@ -182,15 +182,17 @@ impl Presences {
             return;
         }
         let draw = self.draw(now);
-        let due = self.due(k, now, (draw % u64::from(self.drones)) as u32);
-        let chunks = due.iter().flat_map(|(kind, drones)| drones.chunks(MAX_PRESENT).map(move |chunk| (kind, chunk)));
-        let mut chunks: Vec<(&Kind, &[Due])> = chunks.collect();
+        let mut due = self.due(k, now, (draw % u64::from(self.drones)) as u32);
+        let needed = due.iter().map(|(_, drones)| drones.len().div_ceil(MAX_PRESENT)).sum::<usize>();
         // Word that has to wait at each hop is old when it comes; less of it comes sooner.
-        let change = if chunks.len() > BACKLOG { THIN } else { THICKEN };
+        let change = if needed > BACKLOG { THIN } else { THICKEN };
         self.thinning = (self.thinning * change).clamp(1.0, MAX_THINNING);
-        if chunks.len() <= frames {
+        if needed <= frames {
             self.turn = self.next_turn(now, self.turn_s);
         }
+        due.iter_mut().for_each(|(_, drones)| keep_least(drones, frames.saturating_mul(MAX_PRESENT)));
+        let chunks = due.iter().flat_map(|(kind, drones)| drones.chunks(MAX_PRESENT).map(move |chunk| (kind, chunk)));
+        let mut chunks: Vec<(&Kind, &[Due])> = chunks.collect();
         // No kind has to wait until all others are said.
         chunks.sort_unstable_by_key(|(_, chunk)| chunk.first().copied());
         for (&(obeyed, group, term), chunk) in chunks.into_iter().take(frames) {
@@ -207,9 +209,9 @@ impl Presences {
         }
     }
 
-    /// The states that are due, by what their drones have in common, the most urgent first. `first`: the drone that comes first of those
-    /// that are equally urgent. Drones close to each other begin at different ones, so that they do not all say the same at one time.
-    fn due(&self, k: &Knowledge, now: SimTime, first: u32) -> BTreeMap<Kind, Vec<Due>> {
+    /// The states that are due, by what their drones have in common, in any order. `first`: the drone that comes first of those that are equally
+    /// urgent. Drones close to each other begin at different ones, so that they do not all say the same at one time.
+    fn due(&self, k: &Knowledge, now: SimTime, first: u32) -> Vec<(Kind, Vec<Due>)> {
         let period_s = self.period_s * self.thinning;
         let (period, overdue) = (least_span(period_s), least_span(PRESENCE_OVERDUE * period_s));
         let mut found = Vec::new();
@@ -223,18 +225,33 @@ impl Presences {
                 found.push((id, now.since(told.covered())));
             }
         }
-        let mut due: BTreeMap<Kind, Vec<Due>> = BTreeMap::new();
+        let (mut due, mut places) = (Vec::<(Kind, Vec<Due>)>::new(), BTreeMap::<Kind, usize>::new());
+        let mut last = 0;
         for (id, silent_s) in found {
-            if let Some(pose) = k.peers().last_of_living(id, now) {
-                let waits = Reverse((silent_s * WAITS_PER_PERIOD / self.period_s) as u32);
-                let turn = (id.0 + self.drones - first) % self.drones;
-                let one = Due { waits, turn, drone: id };
-                due.entry((pose.obeyed(), pose.group(), pose.term())).or_default().push(one);
+            let Some(pose) = k.peers().last_of_living(id, now) else { continue };
+            let kind = (pose.obeyed(), pose.group(), pose.term());
+            // Most drones have the same in common as the one before.
+            if due.get(last).is_none_or(|(other, _)| *other != kind) {
+                last = *places.entry(kind).or_insert_with(|| {
+                    due.push((kind, Vec::new()));
+                    due.len() - 1
+                });
             }
+            let waits = Reverse((silent_s * WAITS_PER_PERIOD / self.period_s) as u32);
+            due[last].1.push(Due { waits, turn: (id.0 + self.drones - first) % self.drones, drone: id });
         }
-        due.values_mut().for_each(|drones| drones.sort_unstable());
         due
     }
+}
+
+/// Sorts these states, the most urgent first, and keeps the first `most`. If a whole swarm is new, all its states are due in each tick, and few
+/// can be said.
+fn keep_least(due: &mut Vec<Due>, most: usize) {
+    if most > 0 && due.len() > most {
+        due.select_nth_unstable(most - 1);
+        due.truncate(most);
+    }
+    due.sort_unstable();
 }
 
 /// The least difference of two times that [`SimTime::since`] says is at least so many seconds, ns.
@@ -276,6 +293,19 @@ fn present(drone: DroneId, pose: &Pose) -> Present {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_most_urgent_states_are_kept_in_order() {
+        let states: Vec<Due> =
+            (0..200).map(|i| Due { waits: Reverse(i * 37 % 5), turn: i * 61 % 200, drone: DroneId(i) }).collect();
+        for most in [1, 2, 50, 199, 200, 300] {
+            let (mut kept, mut sorted) = (states.clone(), states.clone());
+            keep_least(&mut kept, most);
+            sorted.sort();
+            sorted.truncate(most);
+            assert_eq!(kept, sorted, "{most}");
+        }
+    }
 
     #[test]
     fn a_span_is_the_least_that_counts_as_so_many_seconds() {

@@ -187,16 +187,26 @@ fn an_assignment_that_was_never_said_is_said_once_if_its_drone_falls_silent() {
 /// Other drones would take it for a sign that this drone leads that term. The term is from its last life, or it is invented.
 #[test]
 fn a_drone_passes_nothing_on_of_a_term_that_it_would_lead_but_never_claimed() {
-    let passed_on_of = |claimant: u32| {
+    let heard_of = |claimant: u32| {
         let mut middle = Middle::new();
         (0..60).for_each(|_| drop(middle.step()));
         middle.hear_of(3..DRONES, PlanStamp::default());
-        let ballot = Ballot { round: 7, incarnation: 1, claimant: DroneId(claimant) };
-        middle.hear_assignments_of(2, PlanStamp { ballot, epoch: 1 });
+        (middle, PlanStamp { ballot: Ballot { round: 7, incarnation: 1, claimant: DroneId(claimant) }, epoch: 1 })
+    };
+    let assignments_of = |claimant: u32| {
+        let (mut middle, id) = heard_of(claimant);
+        middle.hear_assignments_of(2, id);
         middle.passes_on(300).len()
     };
-    assert!(passed_on_of(5) > 0);
-    assert_eq!(passed_on_of(1), 0);
+    let plans_of = |claimant: u32| {
+        let (mut middle, id) = heard_of(claimant);
+        let stamp = middle.now();
+        middle.hear(2, Message::Plan(Plan { id, stamp, members: DRONES, ..Zeroable::zeroed() }));
+        let said = (0..300).flat_map(|_| middle.step());
+        said.filter(|message| matches!(message, Message::Plan(plan) if plan.id == id)).count()
+    };
+    assert!(assignments_of(5) > 0 && plans_of(5) > 0);
+    assert_eq!((assignments_of(1), plans_of(1)), (0, 0));
 }
 
 /// Drone 1, which heard from drone 2 that `claimant` leads the first part of a split, and then learnt that it is in that part.

@@ -353,6 +353,10 @@ mod tests {
         assert!(met(&[0.0, 1.0, 2.0, 4.0], &in_fourth, Some(1)));
         assert!(!met(&[0.0, 1.0, 2.0, 4.0], &[], Some(1)), "the fourth slot is free");
         assert!(!met(&[0.0, 1.0, 2.0, 4.0], &in_fourth, None), "no drone has died");
+        // A leader may take every slot for blocked, because all are closer to the wall than it plans paths.
+        let nine = ConvexShape::circle(Vec2::new(-7.0 * goal.spacing_m, 0.0), 4.0 * goal.spacing_m).unwrap();
+        let beside = rectangle(0.0, goal.clearance_m + 1.1, 5000.0, 1.0);
+        assert!(met(&[0.0, 1.0, 2.0, 12.0], &[nine, beside], Some(1)));
     }
 
     #[test]

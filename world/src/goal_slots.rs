@@ -34,13 +34,15 @@ pub(crate) fn may_be_free(params: &WorldParams, slot: Vec2, ground: &GoalGround<
     !ground.is_free(slot, error_m, beside_m + error_m)
 }
 
-/// The most slots of a formation at the goal in which so many drones may stand.
+/// The most slots of a formation at the goal in which so many drones may stand. That is the size that a leader needs which leaves all slots free
+/// that may be left free; the greatest size if none is large enough for that.
 pub(crate) fn most(params: &WorldParams, drones: usize, ground: &GoalGround<'_>) -> usize {
     let End::Goal { front_m } = params.end else { return drones };
     let beside_dead = GoalGround { obstacles: &[], ..*ground }.most_slots(drones);
     let stays = |slot: &Vec2| !may_be_free(params, front_m + slot, ground);
     let is_enough = |&size: &usize| all(params, size).iter().filter(|slot| stays(slot)).count() >= drones;
-    (drones..=ground.most_slots(drones)).find(is_enough).unwrap_or(drones).max(beside_dead)
+    let greatest = ground.most_slots(drones);
+    (drones..=greatest).find(is_enough).unwrap_or(greatest).max(beside_dead)
 }
 
 /// Where dead drones hang, world frame, m.

@@ -9,6 +9,8 @@ use skein_scenario::{Scenario, ScenarioSource};
 const LIMITED_RANGE_DRONES: u32 = 256;
 /// Ticks before the measurement. By then the leader's plan has put all drones into formation.
 const WARM_UP_TICKS: u64 = 60;
+/// The same with a limited range. By then word of each drone has come to all others.
+const LIMITED_WARM_UP_TICKS: u64 = 300;
 /// Ticks after the measurement.
 const COOL_DOWN_TICKS: u64 = 80;
 
@@ -34,7 +36,8 @@ impl Workload {
     pub(crate) fn new(drones: u32, quick: bool, ticks: Option<u64>) -> Result<Self, BenchError> {
         let window = (240_000 / u64::from(drones.saturating_add(16))).clamp(240, 12_000);
         let window = ticks.unwrap_or(if quick { window / 3 } else { window });
-        let until = WARM_UP_TICKS + window;
+        let from = if drones < LIMITED_RANGE_DRONES { WARM_UP_TICKS } else { LIMITED_WARM_UP_TICKS };
+        let until = from + window;
         let scenario = scenario(drones, until + COOL_DOWN_TICKS)?;
         let beacons = f64::from(drones) * scenario.time.dt_s / scenario.beacon_period_s();
         let heard =
@@ -43,7 +46,7 @@ impl Workload {
         let frame = size_of::<AirFrame>() as f64;
         Ok(Self {
             drones,
-            from: WARM_UP_TICKS,
+            from,
             until,
             down_len: size_of::<DownlinkHeader>() + drones as usize * senses + (beacons * frame) as usize,
             read_len: senses + (heard * frame) as usize,
