@@ -226,5 +226,7 @@ fn the_lines_of_a_running_swarm_have_the_documented_keys() {
             assert_eq!(written.iter().map(String::as_str).collect::<BTreeSet<_>>(), wanted, "{topic}");
         }
     }
-    flight.finish();
+    // What is left of the mission says no more.
+    support::process::signal("INT", flight.pid());
+    assert_eq!(flight.finish().code, Some(130));
 }

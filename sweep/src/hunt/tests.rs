@@ -32,7 +32,7 @@ const SCENES: &str = r#"
 
 #[test]
 fn a_hunt_finds_a_failure_and_makes_it_small() {
-    let report = hunted(12, 60, 2);
+    let report = hunted(12, 30, 2);
     let finding = report.findings.iter().find(|finding| finding.failure.kind == FailureKind::Clearance);
     let finding = finding.expect("a swarm is blown into an obstacle");
     assert!(finding.failure.value < 1.0 && finding.toml.contains("wind"), "{}", finding.toml);
