@@ -79,14 +79,13 @@ impl NeighbourTable {
         self.distant.warm(peers.changes());
     }
 
-    /// The neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
-    pub(crate) fn update(&mut self, view: &NeighbourView<'_>) -> Few<Neighbour> {
-        let senses = view.senses;
+    /// Adds the neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
+    pub(crate) fn update(&mut self, view: &NeighbourView<'_>, neighbours: &mut Few<Neighbour>) {
+        let (Self { params, distant: distant_peers }, senses) = (self, view.senses);
         if view.places.iter().any(|place| place.set != 0) {
             let ranged = senses.neighbours.iter().map(|sensed| sensed.drone);
-            ranged.chain(self.distant.kept().iter().map(|peer| peer.id)).for_each(|peer| view.peers.warm_queue(peer));
+            ranged.chain(distant_peers.kept().iter().map(|peer| peer.id)).for_each(|peer| view.peers.warm_queue(peer));
         }
-        let mut neighbours = Few::new();
         for sensed in senses.neighbours {
             neighbours.push(Neighbour {
                 id: sensed.drone,
@@ -95,28 +94,28 @@ impl NeighbourTable {
                 age_s: 0.0,
                 sensed: true,
                 least_m: 0.0,
-                share: self.share(view, sensed.drone),
+                share: params.share(view, sensed.drone),
             });
         }
-        let reach_m = BEACON_REACH * self.params.safe_distance_m;
-        let least_m = self.params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
-        self.distant.advance(senses.now, senses.position());
+        let reach_m = BEACON_REACH * params.safe_distance_m;
+        let least_m = params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
+        distant_peers.advance(senses.now, senses.position());
         let distant = |position_m: Vec2, velocity: Vec2| {
             let far = position_m.norm_squared() > reach_m * reach_m;
             far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: velocity.norm() })
         };
-        let mut peers = std::mem::take(&mut self.distant);
         let near = |index| NearPeer::new(view.peers.at(index));
         let away = |index| {
             let peer = near(index);
             distant(peer.away(senses), peer.velocity)
         };
-        peers.look(view.peers.stamps().len(), view.peers.changes(), away, near);
-        let mut ranged: Few<DroneId> = senses.neighbours.iter().map(|sensed| sensed.drone).collect();
+        distant_peers.look(view.peers.stamps().len(), view.peers.changes(), away, near);
+        let mut ranged = Few::<DroneId>::new();
+        ranged.extend(senses.neighbours.iter().map(|sensed| sensed.drone));
         ranged.sort_unstable();
         let mut ranged = ranged.iter().peekable();
         // Peers are visited in the order of their ids.
-        peers.visit(|index, peer| {
+        distant_peers.visit(|index, peer| {
             let id = peer.id;
             while ranged.next_if(|drone| **drone < id).is_some() {}
             if ranged.peek() == Some(&&id) || !view.peers.is_living_at(index, view.now) {
@@ -126,15 +125,15 @@ impl NeighbourTable {
             let far = distant(position_m, peer.velocity);
             if far.is_none() {
                 let velocity_mps = peer.velocity - senses.velocity();
-                let (age_s, share) = (senses.now.since(peer.stamp), self.share(view, id));
+                let (age_s, share) = (senses.now.since(peer.stamp), params.share(view, id));
                 neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
             }
             far
         });
-        self.distant = peers;
-        neighbours
     }
+}
 
+impl NeighbourParams {
     /// This drone's share of an evasion, 0 to 1. It is 1 if the other drone is silent, and one half between drones that do
     /// not share a queue. The rear drone of a queue takes more than half. The front one takes less, but only while a fresh
     /// beacon shows that the other obeys the same plan.
@@ -145,10 +144,10 @@ impl NeighbourTable {
             let same = |place: &QueuePlace| place.set == mine.set && place.route == mine.route;
             let Some(theirs) = pose.queue().find(same) else { continue };
             if mine.rank > theirs.rank {
-                return self.params.precedence_share;
+                return self.precedence_share;
             }
             if mine.rank < theirs.rank && is_fresh() && pose.obeyed() == view.obeyed {
-                return 1.0 - self.params.precedence_share;
+                return 1.0 - self.precedence_share;
             }
         }
         0.5
@@ -185,7 +184,8 @@ mod tests {
         places[0] = mine.map_or_else(QueuePlace::default, place);
         let mut table = NeighbourTable::new(PARAMS);
         let obeyed = PlanStamp::default();
-        let found = table.update(&NeighbourView { now, senses: &senses, peers: &peers, obeyed, places: &places });
+        let mut found = Few::new();
+        table.update(&NeighbourView { now, senses: &senses, peers: &peers, obeyed, places: &places }, &mut found);
         assert_eq!(found.len(), 1, "a neighbour that is ranged and heard counts once");
         found[0].share
     }

@@ -37,9 +37,14 @@ impl ReactionDelay {
         self.nominal_s + extra_s
     }
 
+    /// The delay, ticks.
+    pub(crate) fn ticks(&self) -> usize {
+        self.commands.ticks()
+    }
+
     /// The delay in whole ticks, s.
     pub(crate) fn delay_s(&self) -> f64 {
-        self.commands.ticks() as f64 * self.dt_s
+        self.ticks() as f64 * self.dt_s
     }
 
     /// The motions of a drone with `velocity` (m/s) up to the end of each tick whose command is pending.

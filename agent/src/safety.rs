@@ -127,6 +127,8 @@ struct Expectation {
 #[derive(Clone, Debug)]
 pub struct Safety {
     params: SafetyParams,
+    /// The reaction time, ticks.
+    lag: usize,
     program: Program,
     /// Expectations of the neighbours, the newest last. One entry per tick, kept until the commands of that tick have taken
     /// effect.
@@ -139,7 +141,8 @@ impl Safety {
     /// Creates a filter with these constants and an empty memory.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        Self { params, program: Program::default(), expected: VecDeque::new(), velocities: Vec::new() }
+        let (expected, velocities) = (VecDeque::new(), Vec::new());
+        Self { params, lag: params.lag(), program: Program::default(), expected, velocities }
     }
 
     /// Fetches what [`Self::filter`] reads into the cache: call it a short time before.
@@ -157,7 +160,10 @@ impl Safety {
 
     /// Sets the reaction time from now on, s.
     pub fn set_reaction_time(&mut self, reaction_time_s: f64) {
-        self.params.reaction_time_s = reaction_time_s;
+        if self.params.reaction_time_s != reaction_time_s {
+            self.params.reaction_time_s = reaction_time_s;
+            self.lag = self.params.lag();
+        }
     }
 
     /// Returns the safe acceleration nearest to `wanted`, world frame, m/s². `velocity`: the drone's own, world frame, m/s. If
@@ -172,12 +178,14 @@ impl Safety {
     ) -> Vec2 {
         let params = self.params;
         let reach_m = params.clearance_m + OBSTACLE_REACH_M;
-        let obstacles: Few<NearObstacle> = obstacles.filter(|obstacle| obstacle.distance_m <= reach_m).collect();
-        let planes = obstacles.iter().map(|o| params.obstacle_plane(o, velocity, &obstacles));
-        let mut planes: SmallVec<[HalfPlane; 2 * FEW]> = planes.collect();
-        let lag = (params.reaction_time_s / params.dt_s).round() as usize;
-        let neighbours = neighbours.enumerate();
-        let assessed: Few<Assessed> = neighbours.map(|(at, one)| self.assess(at, one, velocity, lag)).collect();
+        // Each list is filled where it stays: to collect one is to copy all of its room on the stack.
+        let mut near = Few::<NearObstacle>::new();
+        near.extend(obstacles.filter(|obstacle| obstacle.distance_m <= reach_m));
+        let mut planes = SmallVec::<[HalfPlane; 2 * FEW]>::new();
+        planes.extend(near.iter().map(|o| params.obstacle_plane(o, velocity, &near)));
+        let lag = self.lag;
+        let mut assessed = Few::<Assessed>::new();
+        assessed.extend(neighbours.enumerate().map(|(at, one)| self.assess(at, one, velocity, lag)));
         let full = self.expected.len() > lag;
         let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
         expectations.clear();
@@ -264,6 +272,11 @@ struct Barrier {
 }
 
 impl SafetyParams {
+    /// The reaction time, ticks.
+    fn lag(&self) -> usize {
+        (self.reaction_time_s / self.dt_s).round() as usize
+    }
+
     /// Margin on the safe distance, m.
     fn margin_m(&self) -> f64 {
         (self.safe_distance_m * self.margin).max(self.scale.length(MIN_MARGIN_M))

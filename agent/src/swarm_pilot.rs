@@ -7,6 +7,7 @@ use crate::detection::Detection;
 use crate::detour::{Detour, RouteView};
 use crate::emergency_route::EmergencyRoute;
 use crate::escape::{Course, Escape};
+use crate::few::Few;
 use crate::guidance::anchor;
 use crate::lone_flight::{self, LoneFlight};
 use crate::navigator::{Heading, Navigator};
@@ -59,6 +60,8 @@ pub struct SwarmPilot {
     queue: QueuePacer,
     safety: Safety,
     braking_filter: BrakingFilter,
+    /// The speed that is safe on sight with this lag, ticks and m/s.
+    on_sight_mps: Option<(u32, f64)>,
     altitude: Altitude,
     navigator: Navigator,
     detour: Detour,
@@ -99,6 +102,7 @@ impl SwarmPilot {
             queue: QueuePacer::default(),
             safety: Safety::new(params.safety),
             braking_filter: BrakingFilter::new(params.braking_filter()).with_errors(params.sensing),
+            on_sight_mps: None,
             altitude: Altitude::new(params.altitude_m, params.planner.routes.planning_distance_m),
             navigator: Navigator::new(
                 params.safety.clearance_m + params.sensing.obstacle_m,
@@ -413,10 +417,22 @@ impl SwarmPilot {
         if senses.broken.obstacles { sensing.remembered_obstacle_m() } else { sensing.obstacle_m }
     }
 
+    /// [`PilotParams::speed_on_sight_mps`], computed anew only if the lag has changed.
+    fn speed_on_sight_mps(&mut self, lag: u32) -> f64 {
+        match self.on_sight_mps {
+            Some((of, speed_mps)) if of == lag => speed_mps,
+            _ => {
+                let speed_mps = self.params.speed_on_sight_mps(lag);
+                self.on_sight_mps = Some((lag, speed_mps));
+                speed_mps
+            }
+        }
+    }
+
     /// The acceleration nearest to `wanted` that the safety rule allows, m/s².
     /// `now`: what is sensed; `then`: the same, predicted for the moment at which the command takes effect.
     fn keep_braking_path(&mut self, wanted: Vec2, now: &Senses<'_>, then: &Senses<'_>) -> Vec2 {
-        let lag = (self.reaction.delay_s() / self.params.dt_s).round() as u32;
+        let lag = self.reaction.ticks() as u32;
         let own = OwnMotion {
             tick: now.tick,
             now: now.now,
@@ -424,7 +440,7 @@ impl SwarmPilot {
             sensed_velocity: now.velocity(),
             position: then.position(),
             velocity: then.velocity(),
-            speed_limit_mps: self.params.speed_on_sight_mps(lag),
+            speed_limit_mps: self.speed_on_sight_mps(lag),
             lag,
         };
         let remembered = remembered(&self.leading, then).map(|(shape, near)| (shape, near.distance_m));
@@ -466,13 +482,10 @@ impl SwarmPilot {
             Some(place) => self.velocity_to_slot(&then, place, Vec2::zeros()),
             None => self.unstuck_velocity(senses.now, &then, open),
         };
-        let neighbours = self.neighbours.update(&NeighbourView {
-            now: senses.now,
-            senses: &then,
-            peers: self.leading.peers(),
-            obeyed: self.leading.stamp(),
-            places: open,
-        });
+        let peers = self.leading.peers();
+        let view = NeighbourView { now: senses.now, senses: &then, peers, obeyed: self.leading.stamp(), places: open };
+        let mut neighbours = Few::new();
+        self.neighbours.update(&view, &mut neighbours);
         self.safe_acceleration(wanted, senses, &then, &neighbours)
     }
 
