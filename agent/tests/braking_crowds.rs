@@ -96,7 +96,7 @@ fn crowds_that_do_not_allow_for_their_errors_break_distances() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
     fn no_crowd_whose_commands_are_late_breaks_a_distance(
         seed in any::<u64>(), drones in 2usize..40, density in 0.7f64..4.0, wish in 0usize..5, lag in 0u32..20,

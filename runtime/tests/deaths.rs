@@ -12,7 +12,7 @@ fn the_others_reach_the_goal(name: &str) {
     let scenario = scenario(name, &[]);
     let mut failed = Vec::new();
     for drone in 0..scenario.formation.drones {
-        for at in (40..2600).step_by(125) {
+        for at in (40..2600).step_by(100) {
             let world = fly_to_the_end(&scenario, Some((DroneId(drone), at)));
             let separation_m = world.min_separation_m();
             if world.ended() != Some(Outcome::Reached) || separation_m < scenario.drone.safe_distance_m {
