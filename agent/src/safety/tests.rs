@@ -161,3 +161,17 @@ fn one_that_is_too_far_away_to_be_ranged_needs_no_more_room_than_one_that_is_ran
         assert!((beyond_m(distance_m, least_m) - wanted_m).abs() < 1e-9, "{distance_m} m away, at least {least_m} m");
     }
 }
+
+/// What was expected of the neighbours is kept for as many ticks as the reaction time has, whenever that was set.
+#[test]
+fn expectations_are_kept_for_the_reaction_time_that_was_set_last() {
+    let mut safety = Safety::new(PARAMS);
+    for (reaction_time_s, ticks) in [(0.0, 0), (0.1, 5), (0.04, 2)] {
+        safety.set_reaction_time(reaction_time_s);
+        safety.expected.clear();
+        for _ in 0..20 {
+            safety.filter(Vec2::zeros(), Vec2::zeros(), std::iter::empty(), std::iter::empty());
+        }
+        assert_eq!(safety.expected.len(), ticks + 1, "{reaction_time_s} s");
+    }
+}
