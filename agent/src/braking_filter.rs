@@ -51,6 +51,7 @@
 //! assert!(command(30.15).x < -4.0, "each needs 10 m to stop, and 10 m must remain");
 //! ```
 
+use crate::braking_motion::SHARE;
 pub use crate::braking_motion::{BrakingFilterParams, Moving, OwnMotion};
 use crate::braking_path::BrakingPath;
 use crate::program::{HalfPlane, Program};
@@ -60,9 +61,8 @@ use crate::sights::Sights;
 use skein_leader::nearest_on_segment::{NearestOnSegment, core_distance_m};
 use skein_protocol::Vec2;
 use skein_protocol::shape::ConvexShape;
+use std::cell::LazyCell;
 
-/// The share of the room between two braking paths that each of the two drones may use in a tick.
-const SHARE: f64 = 0.5;
 /// Rounds in which half-planes are added. After them the command is moved towards full braking.
 const ROUNDS: usize = 8;
 /// Number of halvings of the interval between full braking and the command that was found.
@@ -149,25 +149,32 @@ impl BrakingFilter {
         own: &OwnMotion,
         wanted: Vec2,
         obstacles: impl Iterator<Item = (&'a ConvexShape, f64)> + Clone,
-        neighbours: impl Iterator<Item = Moving>,
+        neighbours: impl Iterator<Item = Moving> + Clone,
         lines: impl Iterator<Item = (&'a SeparatingLine, Side)>,
     ) -> Vec2 {
         self.samples.clear();
         self.ends.clear();
-        if own.lag == 0 {
-            self.compare(own, neighbours);
-        } else if self.remember(own, neighbours) {
-            return self.params.law().braking(own.velocity);
-        }
-        self.keep_to(own, lines);
+        self.planes.clear();
         // With a reaction time the drone looks from elsewhere.
         let aside_m = if self.errors.partial_outlines { (own.position - own.sensed_position).norm() } else { 0.0 };
         let reach_m = self.params.reach_m(own.velocity.norm_squared(), 1).max(aside_m) + self.clear_m();
         let near = obstacles.filter(move |(_, distance_m)| *distance_m <= reach_m).map(|(shape, _)| shape);
         let limit = self.params.acceleration_max_mps2;
         let wanted = if wanted.norm() > limit { wanted * (limit / wanted.norm()) } else { wanted };
+        let mut lines = lines.peekable();
+        if own.lag == 0 && lines.peek().is_none() && self.is_far_from_all(own, wanted, neighbours.clone()) {
+            let is_clear = near.clone().next().is_none() && self.too_fast(own, wanted).is_none();
+            if is_clear || self.is_met(own, wanted, near.clone()) {
+                return wanted;
+            }
+        }
         let mut candidate = self.candidate(own, wanted);
-        self.planes.clear();
+        if own.lag == 0 {
+            self.compare(own, neighbours);
+        } else if self.remember(own, neighbours) {
+            return self.params.law().braking(own.velocity);
+        }
+        self.keep_to(own, lines);
         for _ in 0..ROUNDS {
             let before = self.planes.len();
             self.cut(own, &candidate, near.clone());
@@ -192,28 +199,45 @@ impl BrakingFilter {
         Candidate { acceleration, path: BrakingPath::new(start, velocity, self.params.law()) }
     }
 
+    /// Whether this command is allowed with each neighbour, by a bound that needs no look at braking paths.
+    fn is_far_from_all(
+        &self,
+        own: &OwnMotion,
+        acceleration: Vec2,
+        mut neighbours: impl Iterator<Item = Moving>,
+    ) -> bool {
+        let params = self.params;
+        let change_mps = (acceleration - params.law().braking(own.velocity)).norm() * params.dt_s;
+        let gap = params.gap_while_braking(own);
+        neighbours.all(|other| gap(&other).is_none_or(|gap| gap.leaves_room(change_mps)))
+    }
+
+    /// Whether a command meets all conditions apart from those of the samples, of which there are none.
+    fn is_met<'a>(&mut self, own: &OwnMotion, wanted: Vec2, near: impl Iterator<Item = &'a ConvexShape>) -> bool {
+        self.cut(own, &self.candidate(own, wanted), near);
+        let is_met = self.planes.is_empty();
+        self.planes.clear();
+        is_met
+    }
+
+    /// The velocity after a command's tick and the speed limit, m/s, if the velocity exceeds the limit.
+    fn too_fast(&self, own: &OwnMotion, acceleration: Vec2) -> Option<(Vec2, f64)> {
+        let (velocity, limit_mps) = (own.velocity + acceleration * self.params.dt_s, self.params.speed_limit_mps(own));
+        (velocity.norm() > limit_mps + MET_M).then_some((velocity, limit_mps))
+    }
+
     /// Samples the braking paths of this drone and of each neighbour that some command could bring too close.
     fn compare(&mut self, own: &OwnMotion, neighbours: impl Iterator<Item = Moving>) {
         let params = self.params;
-        let keep_m = params.keep_m();
-        let (own_speed2, limit) = (own.velocity.norm_squared(), params.acceleration_max_mps2);
-        let own_reach_m = params.reach_m(own_speed2, 1);
-        let path = BrakingPath::new(Vec2::zeros(), own.velocity, params.law());
+        let change_mps = 2.0 * params.acceleration_max_mps2 * params.dt_s;
+        let path = LazyCell::new(|| BrakingPath::new(Vec2::zeros(), own.velocity, params.law()));
+        let gap = params.gap_while_braking(own);
         for other in neighbours {
-            let (distance2, speed2) = (other.position_m.norm_squared(), other.velocity_mps.norm_squared());
-            let apart_m = keep_m + own_reach_m + params.reach_m(speed2, 1);
-            if distance2 > apart_m * apart_m {
-                continue;
-            }
-            // Full braking is a projection, and projections do not increase distances. So the distance of two braking
-            // paths changes by at most the relative speed times the time until both drones are at rest.
-            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
-            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own.velocity).norm() * stop_s;
-            if SHARE * room_m >= 2.0 * limit * params.dt_s * stop_s {
+            if gap(&other).is_none_or(|gap| gap.leaves_room(change_mps)) {
                 continue;
             }
             let other_path = BrakingPath::new(other.position_m, other.velocity_mps, params.law());
-            self.sample(own, &path, &other_path, keep_m);
+            self.sample(own, &path, &other_path, params.keep_m());
         }
     }
 
@@ -259,7 +283,8 @@ impl BrakingFilter {
     fn keep_to<'a>(&mut self, own: &OwnMotion, lines: impl Iterator<Item = (&'a SeparatingLine, Side)>) {
         let half_m = self.params.keep_m() / 2.0 + self.errors.position_m;
         let reach_m = self.params.reach_m(own.velocity.norm_squared(), 1);
-        let path = BrakingPath::new(Vec2::zeros(), own.velocity, self.params.law());
+        let law = self.params.law();
+        let path = LazyCell::new(|| BrakingPath::new(Vec2::zeros(), own.velocity, law));
         let clock_s = self.errors.clock_s;
         let dt_s = self.params.dt_s;
         for (line, side) in lines {
@@ -325,12 +350,10 @@ impl BrakingFilter {
                 plane(hit.normal, candidate.path.pull_back_at(hit.share, hit.normal), hit.missing_m);
             }
         }
-        let speed_limit_mps = self.params.speed_limit_mps(own);
-        let velocity = own.velocity + candidate.acceleration * dt_s;
-        let speed = velocity.norm();
-        if speed > speed_limit_mps + MET_M {
-            let normal = -velocity / speed;
-            let bound = (normal.dot(&candidate.acceleration) * dt_s + (speed - speed_limit_mps)) / dt_s;
+        if let Some((velocity, limit_mps)) = self.too_fast(own, candidate.acceleration) {
+            let speed_mps = velocity.norm();
+            let normal = -velocity / speed_mps;
+            let bound = (normal.dot(&candidate.acceleration) * dt_s + (speed_mps - limit_mps)) / dt_s;
             self.planes.push(HalfPlane { normal, bound });
         }
     }

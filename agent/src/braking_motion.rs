@@ -3,6 +3,8 @@
 use crate::braking_path::BrakingLaw;
 use skein_protocol::{DroneId, SimTime, Vec2};
 
+/// The share of the room between two braking paths that each of the two drones may use in a tick.
+pub(crate) const SHARE: f64 = 0.5;
 /// Margin for the loss of distance between the compared ticks, as a share of the safe distance.
 const MARGIN_SHARE: f64 = 0.01;
 /// Added to the clearance, m, so that rounding errors do not break it.
@@ -55,6 +57,23 @@ pub struct OwnMotion {
     pub speed_limit_mps: f64,
     /// Delay from a command to its effect, ticks.
     pub lag: u32,
+}
+
+/// A bound on how two drones come together while both brake.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gap {
+    /// At least by so much they stay farther apart than they have to, m.
+    room_m: f64,
+    /// Both rest after this time, s.
+    stop_s: f64,
+}
+
+impl Gap {
+    /// Whether a command leaves room enough if it makes the velocity differ from that of full braking by so much after its tick, m/s. Full
+    /// braking from then on does not make two velocities differ more.
+    pub(crate) fn leaves_room(&self, change_mps: f64) -> bool {
+        SHARE * self.room_m >= change_mps * self.stop_s
+    }
 }
 
 impl BrakingFilterParams {
@@ -112,6 +131,25 @@ impl BrakingFilterParams {
         let span_s = f64::from(ticks) * self.dt_s;
         let speed_mps = speed_squared.sqrt() + self.acceleration_max_mps2 * span_s;
         speed_mps * speed_mps / (2.0 * self.braking_mps2) + speed_mps * span_s
+    }
+
+    /// The gap to a neighbour; `None` if the two cannot reach each other.
+    pub(crate) fn gap_while_braking(&self, own: &OwnMotion) -> impl Fn(&Moving) -> Option<Gap> + use<> {
+        let (params, own_velocity, keep_m) = (*self, own.velocity, self.keep_m());
+        let own_speed2 = own_velocity.norm_squared();
+        let own_reach_m = self.reach_m(own_speed2, 1);
+        move |other| {
+            let (distance2, speed2) = (other.position_m.norm_squared(), other.velocity_mps.norm_squared());
+            let apart_m = keep_m + own_reach_m + params.reach_m(speed2, 1);
+            if distance2 > apart_m * apart_m {
+                return None;
+            }
+            // Full braking is a projection, and projections do not increase distances. So the distance of two braking
+            // paths changes by at most the relative speed times the time until both drones are at rest.
+            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
+            let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own_velocity).norm() * stop_s;
+            Some(Gap { room_m, stop_s })
+        }
     }
 
     /// The same for a drone at `speed_mps` that obeys the speed limit of `own`, m.

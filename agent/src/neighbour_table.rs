@@ -6,9 +6,16 @@ use crate::safety::Neighbour;
 use crate::tuning::{BEACON_REACH, FRESH_BEACON_S};
 use skein_leader::beacons::Beacon;
 use skein_leader::peers::Peers;
-use skein_protocol::downlink::Senses;
+use skein_protocol::downlink::{SensedNeighbour, Senses};
 use skein_protocol::payload::QueuePlace;
 use skein_protocol::{DroneId, PlanStamp, SimTime, Vec2};
+
+/// A drone's share of an evasion, if neither has precedence.
+const EVEN_SHARE: f64 = 0.5;
+
+/// Peers are looked at in each tick up to this distance, in reaches. So one at the reach, as in a formation whose spacing divides it, does not
+/// leave and come back in each tick. Chosen by hand.
+const KEPT_REACH: f64 = 1.02;
 
 /// Constants of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,10 +89,13 @@ impl NeighbourTable {
     /// Adds the neighbours: first those that are ranged, then those known by beacon alone. Call once per tick.
     pub(crate) fn update(&mut self, view: &NeighbourView<'_>, neighbours: &mut Few<Neighbour>) {
         let (Self { params, distant: distant_peers }, senses) = (self, view.senses);
-        if view.places.iter().any(|place| place.set != 0) {
+        let queues = view.places.iter().any(|place| place.set != 0);
+        if queues {
             let ranged = senses.neighbours.iter().map(|sensed| sensed.drone);
             ranged.chain(distant_peers.kept().iter().map(|peer| peer.id)).for_each(|peer| view.peers.warm_queue(peer));
         }
+        let even = !queues && view.peers.are_all_living(view.now);
+        let share = |other| if even { EVEN_SHARE } else { params.share(view, other) };
         for sensed in senses.neighbours {
             neighbours.push(Neighbour {
                 id: sensed.drone,
@@ -94,15 +104,16 @@ impl NeighbourTable {
                 age_s: 0.0,
                 sensed: true,
                 least_m: 0.0,
-                share: params.share(view, sensed.drone),
+                share: share(sensed.drone),
             });
         }
         let reach_m = BEACON_REACH * params.safe_distance_m;
+        let kept_m = KEPT_REACH * reach_m;
         let least_m = params.ranging_m.filter(|_| !senses.broken.ranging).unwrap_or(0.0);
         distant_peers.advance(senses.now, senses.position());
         let distant = |position_m: Vec2, velocity: Vec2| {
-            let far = position_m.norm_squared() > reach_m * reach_m;
-            far.then(|| Distant { beyond_m: position_m.norm() - reach_m, speed_mps: velocity.norm() })
+            let far = position_m.norm_squared() > kept_m * kept_m;
+            far.then(|| Distant { beyond_m: position_m.norm() - kept_m, speed_mps: velocity.norm() })
         };
         let near = |index| NearPeer::new(view.peers.at(index));
         let away = |index| {
@@ -110,22 +121,27 @@ impl NeighbourTable {
             distant(peer.away(senses), peer.velocity)
         };
         distant_peers.look(view.peers.stamps().len(), view.peers.changes(), away, near);
-        let mut ranged = Few::<DroneId>::new();
-        ranged.extend(senses.neighbours.iter().map(|sensed| sensed.drone));
-        ranged.sort_unstable();
-        let mut ranged = ranged.iter().peekable();
+        // The world lists them by id, but another one need not.
+        let mut sorted = Few::<SensedNeighbour>::new();
+        let mut ranged = senses.neighbours;
+        if !ranged.is_sorted_by_key(|sensed| sensed.drone) {
+            sorted.extend_from_slice(ranged);
+            sorted.sort_unstable_by_key(|sensed| sensed.drone);
+            ranged = &sorted;
+        }
+        let mut ranged = ranged.iter().map(|sensed| sensed.drone).peekable();
         // Peers are visited in the order of their ids.
         distant_peers.visit(|index, peer| {
             let id = peer.id;
-            while ranged.next_if(|drone| **drone < id).is_some() {}
-            if ranged.peek() == Some(&&id) || !view.peers.is_living_at(index, view.now) {
+            while ranged.next_if(|drone| *drone < id).is_some() {}
+            if ranged.peek() == Some(&id) || !view.peers.is_living_at(index, view.now) {
                 return None;
             }
             let position_m = peer.away(senses);
             let far = distant(position_m, peer.velocity);
-            if far.is_none() {
+            if position_m.norm_squared() <= reach_m * reach_m {
                 let velocity_mps = peer.velocity - senses.velocity();
-                let (age_s, share) = (senses.now.since(peer.stamp), params.share(view, id));
+                let (age_s, share) = (senses.now.since(peer.stamp), share(id));
                 neighbours.push(Neighbour { id, position_m, velocity_mps, age_s, sensed: false, least_m, share });
             }
             far
@@ -150,7 +166,7 @@ impl NeighbourParams {
                 return 1.0 - self.precedence_share;
             }
         }
-        0.5
+        EVEN_SHARE
     }
 }
 
@@ -158,7 +174,6 @@ impl NeighbourParams {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
-    use skein_protocol::downlink::SensedNeighbour;
     use skein_protocol::payload::{MAX_PLACES, Pose};
 
     const PARAMS: NeighbourParams =

@@ -8,6 +8,8 @@ use skein_protocol::Vec2;
 #[derive(Clone, Debug)]
 pub(crate) struct ReactionDelay {
     nominal_s: f64,
+    /// Added to the nominal reaction time, s.
+    extra_s: f64,
     dt_s: f64,
     /// Commands, m/s².
     commands: CommandDelay<Vec2>,
@@ -27,13 +29,16 @@ impl ReactionDelay {
     pub(crate) fn new(reaction_time_s: f64, dt_s: f64) -> Self {
         let mut commands = CommandDelay::default();
         commands.set_ticks(ticks(reaction_time_s, dt_s));
-        Self { nominal_s: reaction_time_s, dt_s, commands }
+        Self { nominal_s: reaction_time_s, extra_s: 0.0, dt_s, commands }
     }
 
     /// Adds `extra_s` to the nominal reaction time and returns the sum, s. When the delay grows, the last command is
     /// repeated; when it shrinks, the oldest commands are skipped.
     pub(crate) fn set_extra(&mut self, extra_s: f64) -> f64 {
-        self.commands.set_ticks(ticks(self.nominal_s + extra_s, self.dt_s));
+        if extra_s != self.extra_s {
+            self.extra_s = extra_s;
+            self.commands.set_ticks(ticks(self.nominal_s + extra_s, self.dt_s));
+        }
         self.nominal_s + extra_s
     }
 

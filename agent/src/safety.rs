@@ -113,10 +113,12 @@ pub struct Neighbour {
     pub share: f64,
 }
 
-/// The behaviour that was expected of a neighbour in an earlier tick.
+/// A neighbour in an earlier tick, and what was expected of it.
 #[derive(Clone, Copy, Debug)]
 struct Expectation {
     id: DroneId,
+    /// Its velocity, world frame, m/s.
+    velocity: Vec2,
     /// Unit vector from it to this drone.
     normal: Vec2,
     /// The share of the acceleration away from this drone that was due from it, m/s².
@@ -133,23 +135,20 @@ pub struct Safety {
     /// Expectations of the neighbours, the newest last. One entry per tick, kept until the commands of that tick have taken
     /// effect.
     expected: VecDeque<Vec<Expectation>>,
-    /// The velocities of the neighbours in the last tick, world frame, m/s.
-    velocities: Vec<(DroneId, Vec2)>,
 }
 
 impl Safety {
     /// Creates a filter with these constants and an empty memory.
     #[must_use]
     pub fn new(params: SafetyParams) -> Self {
-        let (expected, velocities) = (VecDeque::new(), Vec::new());
-        Self { params, lag: params.lag(), program: Program::default(), expected, velocities }
+        Self { params, lag: params.lag(), program: Program::default(), expected: VecDeque::new() }
     }
 
     /// Fetches what [`Self::filter`] reads into the cache: call it a short time before.
     pub(crate) fn warm(&self) {
-        prefetch(self.velocities.as_slice());
         // The oldest one is due, and then written anew.
-        self.expected.front().into_iter().for_each(|expected| prefetch(expected.as_slice()));
+        let read = [self.expected.front(), self.expected.back()];
+        read.into_iter().flatten().for_each(|expected| prefetch(expected.as_slice()));
     }
 
     /// The present constants of the filter.
@@ -183,51 +182,48 @@ impl Safety {
         near.extend(obstacles.filter(|obstacle| obstacle.distance_m <= reach_m));
         let mut planes = SmallVec::<[HalfPlane; 2 * FEW]>::new();
         planes.extend(near.iter().map(|o| params.obstacle_plane(o, velocity, &near)));
-        let lag = self.lag;
-        let mut assessed = Few::<Assessed>::new();
-        assessed.extend(neighbours.enumerate().map(|(at, one)| self.assess(at, one, velocity, lag)));
-        let full = self.expected.len() > lag;
-        let mut expectations = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
-        expectations.clear();
-        let mut tiers = [planes.len(); 2];
-        self.velocities.clear();
-        let in_order = assessed.iter().filter(|c| c.first).chain(assessed.iter().filter(|c| !c.first));
-        for Assessed { neighbour, barrier, braking, missing, first } in in_order {
-            planes.extend(params.following_plane(neighbour, barrier, velocity, *braking));
-            planes.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
-            if *first {
-                tiers[1] = planes.len();
+        let before_neighbours = planes.len();
+        let mut others = SmallVec::<[HalfPlane; 2 * FEW]>::new();
+        let mut expectations = Few::<Expectation>::new();
+        let memory = self.memory();
+        for (at, neighbour) in neighbours.enumerate() {
+            let Assessed { barrier, braking, missing, first } = params.assess(&neighbour, velocity, memory, at);
+            let tier = if first { &mut planes } else { &mut others };
+            if let Some(plane) = params.following_plane(&neighbour, &barrier, velocity, braking) {
+                tier.push(plane);
             }
-            self.velocities.push((neighbour.id, velocity + neighbour.velocity_mps));
-            let due = (barrier.share - 1.0) * barrier.slack;
-            expectations.push(Expectation { id: neighbour.id, normal: barrier.normal, due });
+            tier.push(HalfPlane { normal: barrier.normal, bound: missing - barrier.share * barrier.slack });
+            expectations.push(Expectation {
+                id: neighbour.id,
+                velocity: velocity + neighbour.velocity_mps,
+                normal: barrier.normal,
+                due: (barrier.share - 1.0) * barrier.slack,
+            });
         }
-        self.expected.push_back(expectations);
-        self.program.solve(&planes, tiers, params.acceleration_max_mps2, wanted)
+        self.expect(&expectations);
+        let tiers = [before_neighbours, planes.len()];
+        let all = if planes.is_empty() {
+            &others
+        } else {
+            planes.extend_from_slice(&others);
+            &planes
+        };
+        self.program.solve(all, tiers, params.acceleration_max_mps2, wanted)
     }
 
-    /// Assesses a neighbour. Three kinds have priority over the others: a neighbour that cannot evade, one that has
-    /// precedence in a queue and is non-cooperative, and one that has come deep into the margin. A silent neighbour that
-    /// closes in faster than this drone does is not a hovering body and has to brake itself. It has no priority, so that a
-    /// drone chased from behind does not fly into what is ahead. `at`: its index among the neighbours.
-    fn assess(&self, at: usize, neighbour: Neighbour, velocity: Vec2, lag: usize) -> Assessed {
-        let params = &self.params;
-        let other_velocity = velocity + neighbour.velocity_mps;
-        let (mut braking, mut missing) = (Vec2::zeros(), 0.0);
-        if neighbour.sensed {
-            let before = find(&self.velocities, at, |(id, _)| *id == neighbour.id);
-            braking = before.map_or_else(Vec2::zeros, |(_, before)| (other_velocity - before) / params.dt_s);
-            let due = self.expected.len().checked_sub(lag + 1).and_then(|i| self.expected.get(i));
-            let due = due.and_then(|due| find(due, at, |expected| expected.id == neighbour.id));
-            missing = due.map_or(0.0, |expected| expected.missing(braking));
-        }
-        let barrier = params.neighbour_barrier(&neighbour);
-        let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
-        let intruded_m = params.keep_m(0.0) - INTRUSION * params.margin_m();
-        let first = (neighbour.share >= 1.0 && !chased)
-            || (neighbour.share > 0.5 && missing > params.scale.length(NON_COOPERATIVE_MPS2))
-            || (neighbour.sensed && neighbour.position_m.norm() < intruded_m);
-        Assessed { neighbour, barrier, braking, missing, first }
+    /// What it remembers of the neighbours.
+    fn memory(&self) -> Memory<'_> {
+        let due = self.expected.len().checked_sub(self.lag + 1).and_then(|i| self.expected.get(i));
+        Memory { last: self.expected.back().map_or(&[], Vec::as_slice), due: due.map_or(&[], Vec::as_slice) }
+    }
+
+    /// Remembers what is expected of the neighbours in this tick.
+    fn expect(&mut self, expectations: &[Expectation]) {
+        let full = self.expected.len() > self.lag;
+        let mut oldest = if full { self.expected.pop_front().unwrap_or_default() } else { Vec::new() };
+        oldest.clear();
+        oldest.extend_from_slice(expectations);
+        self.expected.push_back(oldest);
     }
 }
 
@@ -236,10 +232,18 @@ fn find<T>(list: &[T], guess: usize, is_it: impl Fn(&T) -> bool) -> Option<&T> {
     list.get(guess).filter(|one| is_it(one)).or_else(|| list.iter().find(|one| is_it(one)))
 }
 
-/// A neighbour and its assessment.
+/// What is remembered of the neighbours.
+#[derive(Clone, Copy)]
+struct Memory<'a> {
+    /// As they were in the last tick.
+    last: &'a [Expectation],
+    /// What was expected of them in the tick whose commands take effect now.
+    due: &'a [Expectation],
+}
+
+/// The assessment of a neighbour.
 #[derive(Clone, Copy, Debug)]
 struct Assessed {
-    neighbour: Neighbour,
     barrier: Barrier,
     /// Its acceleration as sensed, m/s².
     braking: Vec2,
@@ -314,6 +318,28 @@ impl SafetyParams {
         least_m - keep_m
     }
 
+    /// Assesses a neighbour. Three kinds have priority over the others: a neighbour that cannot evade, one that has
+    /// precedence in a queue and is non-cooperative, and one that has come deep into the margin. A silent neighbour that
+    /// closes in faster than this drone does is not a hovering body and has to brake itself. It has no priority, so that a
+    /// drone chased from behind does not fly into what is ahead. `at`: its index among the neighbours.
+    fn assess(&self, neighbour: &Neighbour, velocity: Vec2, memory: Memory<'_>, at: usize) -> Assessed {
+        let other_velocity = velocity + neighbour.velocity_mps;
+        let (mut braking, mut missing) = (Vec2::zeros(), 0.0);
+        if neighbour.sensed {
+            let is_it = |expected: &Expectation| expected.id == neighbour.id;
+            let before = find(memory.last, at, is_it);
+            braking = before.map_or_else(Vec2::zeros, |before| (other_velocity - before.velocity) / self.dt_s);
+            missing = find(memory.due, at, is_it).map_or(0.0, |expected| expected.missing(braking));
+        }
+        let barrier = self.neighbour_barrier(neighbour);
+        let chased = barrier.normal.dot(&(velocity + other_velocity)) > 0.0;
+        let intruded_m = self.keep_m(0.0) - INTRUSION * self.margin_m();
+        let first = (neighbour.share >= 1.0 && !chased)
+            || (neighbour.share > 0.5 && missing > self.scale.length(NON_COOPERATIVE_MPS2))
+            || (neighbour.sensed && neighbour.position_m.norm() < intruded_m);
+        Assessed { barrier, braking, missing, first }
+    }
+
     fn neighbour_barrier(&self, neighbour: &Neighbour) -> Barrier {
         let distance = neighbour.position_m.norm().max(1e-6);
         let normal = -neighbour.position_m / distance;
@@ -354,8 +380,8 @@ impl SafetyParams {
     /// √(2 α x), m/s, and its slope, 1/s. Below `TANGENT_M` the root is continued by its tangent.
     fn root(&self, alpha: f64, x: f64) -> (f64, f64) {
         let tangent_m = self.scale.length(TANGENT_M);
-        let least = (2.0 * alpha * tangent_m).sqrt();
         if x < tangent_m {
+            let least = (2.0 * alpha * tangent_m).sqrt();
             let slope = alpha / least;
             return (least + slope * (x - tangent_m), slope);
         }

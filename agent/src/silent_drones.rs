@@ -50,6 +50,10 @@ impl SilentDrones {
     /// Finds the silent drones. A ranged one is where it is ranged, whether it was ever heard or not. Another one is where it has come to
     /// rest since its last beacon.
     pub(crate) fn update(&mut self, senses: &Senses<'_>, peers: &Peers) {
+        if self.hanging.is_empty() && peers.are_all_living(senses.now) {
+            self.all.clear();
+            return;
+        }
         for ranged in senses.neighbours {
             let place = senses.position() + ranged.position();
             let still = (senses.velocity() + ranged.velocity()).norm() < self.params.still_mps;

@@ -461,32 +461,36 @@ impl SwarmPilot {
         let wanted = if hovers { self.braking_filter.params().law().braking(then.velocity()) } else { wanted };
         let error_m = self.obstacle_error_m(now);
         self.braking_filter.set_obstacle_error_m(error_m);
-        let lines = separations.into_iter().flat_map(|separations| separations.lines());
-        self.braking_filter.filter(&own, wanted, obstacles, neighbours, lines)
+        match separations {
+            Some(separations) => self.braking_filter.filter(&own, wanted, obstacles, neighbours, separations.lines()),
+            None => self.braking_filter.filter(&own, wanted, obstacles, neighbours, iter::empty()),
+        }
     }
 
     /// The acceleration to command now, m/s², computed for the moment at which it takes effect.
     fn steer(&mut self, senses: &Senses<'_>, open: &[QueuePlace; MAX_PLACES]) -> Vec2 {
         let mut predictor = StatePredictor::default();
         let delay_s = self.reaction.delay_s();
-        let then = if delay_s > 0.0 {
-            predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity()));
-            predictor.predicted(senses)
-        } else {
-            *senses
-        };
+        let (predicted, mut present);
         // Whether others are heard depends on the present time.
-        let mut seen = then;
-        seen.now = senses.now;
-        let wanted = match self.lost_place(&seen) {
-            Some(place) => self.velocity_to_slot(&then, place, Vec2::zeros()),
-            None => self.unstuck_velocity(senses.now, &then, open),
+        let (then, seen) = if delay_s > 0.0 {
+            predictor.predict(senses, delay_s, self.reaction.pending_motion(senses.velocity()));
+            predicted = predictor.predicted(senses);
+            present = predicted;
+            present.now = senses.now;
+            (&predicted, &present)
+        } else {
+            (senses, senses)
+        };
+        let wanted = match self.lost_place(seen) {
+            Some(place) => self.velocity_to_slot(then, place, Vec2::zeros()),
+            None => self.unstuck_velocity(senses.now, then, open),
         };
         let peers = self.leading.peers();
-        let view = NeighbourView { now: senses.now, senses: &then, peers, obeyed: self.leading.stamp(), places: open };
+        let view = NeighbourView { now: senses.now, senses: then, peers, obeyed: self.leading.stamp(), places: open };
         let mut neighbours = Few::new();
         self.neighbours.update(&view, &mut neighbours);
-        self.safe_acceleration(wanted, senses, &then, &neighbours)
+        self.safe_acceleration(wanted, senses, then, &neighbours)
     }
 
     /// Where the drone looks for another one that it has lost, world frame, m.
@@ -624,8 +628,10 @@ impl SwarmPilot {
             self.leading.hear(senses.now, source, message, say);
             self.straggler.hear(self.params.drones, message);
         }
-        self.neighbours.warm(self.leading.peers());
-        self.safety.warm();
+        if self.leading.peers().is_large() {
+            self.neighbours.warm(self.leading.peers());
+            self.safety.warm();
+        }
         self.leading.set_impaired(senses.broken.any());
         self.sense(senses);
         let safety = self.params.safety;

@@ -86,6 +86,9 @@ pub enum Input {
     },
 }
 
+/// The share of the longest silence after which a pre-vote is asked for at the earliest.
+const PRE_VOTE_SHARE: f64 = 0.5;
+
 /// A sign that the leader of a term lives.
 #[derive(Clone, Copy, Debug)]
 struct Sign {
@@ -203,7 +206,9 @@ impl Election {
     /// Whether it leads, or the leader it obeys has not been silent for too long.
     #[must_use]
     pub fn has_leader(&self, now: SimTime) -> bool {
-        self.leads || (self.obeyed.is_some() && now.since(self.heard) <= self.silence_s())
+        let silence_s = now.since(self.heard);
+        // The longest silence is never shorter than the time-out, and it is computed only if that matters.
+        self.leads || (self.obeyed.is_some() && (silence_s <= self.leader_timeout_s || silence_s <= self.silence_s()))
     }
 
     /// Whether it has no leader, or has asked for a pre-vote.
@@ -222,7 +227,8 @@ impl Election {
             _ if self.leads => self.next_heartbeat,
             Some(asked) => asked.after(answer_s + self.wait_s.max(delay_s) * closer),
             None if self.obeyed.is_some() => {
-                self.heard.after((self.silence_s() - answer_s).max(0.5 * self.silence_s()))
+                let silence_s = self.silence_s();
+                self.heard.after((silence_s - answer_s).max(PRE_VOTE_SHARE * silence_s))
             }
             None => self.heard.after(self.newcomer_s() + self.wait_s * (closer + 1.0)),
         }
@@ -351,6 +357,11 @@ impl Election {
     }
 
     fn tick(&mut self, now: SimTime, epoch: u32, closer: usize, delay_s: f64) -> Option<Leadership> {
+        let hears = !self.leads && self.obeyed.is_some() && self.pre_voted.is_none();
+        // A bound that holds however rarely the leader is heard comes first: it costs less.
+        if hears && now < self.heard.after(PRE_VOTE_SHARE * self.leader_timeout_s) {
+            return None;
+        }
         if now < self.next_deadline(closer, delay_s) {
             return None;
         }

@@ -237,7 +237,7 @@ impl Knowledge {
 
     /// Hears a beacon. Returns whether it shows a plan of this leader's term that this leader never made.
     pub(crate) fn hear_pose(&mut self, now: SimTime, source: DroneId, pose: &Pose) -> bool {
-        self.peers.hear(now, source, *pose);
+        self.peers.hear(now, source, pose);
         self.ledger.hear_place(source, pose);
         let (ballot, scope) = (self.election.obeyed(), self.election.scope());
         if pose.leads() && pose.term == ballot && ballot.claimant == source && scope.contains(pose.group) {
@@ -247,9 +247,9 @@ impl Knowledge {
     }
 
     /// Hears a beacon of `drone` that another drone passed on. Returns the same as [`Self::hear_pose`].
-    pub(crate) fn hear_of(&mut self, now: SimTime, drone: DroneId, pose: Pose) -> bool {
+    pub(crate) fn hear_of(&mut self, now: SimTime, drone: DroneId, pose: &Pose) -> bool {
         self.peers.hear_of(now, drone, pose);
-        self.is_plan_conflict(drone, &pose)
+        self.is_plan_conflict(drone, pose)
     }
 
     /// Whether a beacon of `drone` shows a plan of this leader's term that this leader never made: one that came later, or the same one with

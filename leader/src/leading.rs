@@ -27,9 +27,6 @@ use skein_protocol::payload::{Assignment, Leadership, MAX_PLACES, Presence, Queu
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{Ballot, DroneId, GroupId, Message, MessageRef, ObstacleId, PlanStamp, SimTime, Vec2};
 
-/// From this number of drones on, what a drone knows of the others may not be in the cache. Chosen by hand.
-const LARGE: u32 = 64;
-
 /// The state machine of one drone. Its memory is bounded, whatever it hears.
 ///
 /// In each tick, call [`Self::hear`] for each message, [`Self::sense`] for each sensed obstacle, [`Self::elect`], then if
@@ -199,10 +196,10 @@ impl Leading {
     /// Fetches what these messages will be compared with into the cache: a large swarm does not fit into it, and reads that are begun together
     /// take as long as one. Without any other effect. Call before [`Self::hear`].
     pub fn expect<'m>(&self, heard: impl Iterator<Item = (DroneId, MessageRef<'m>)> + Clone) {
-        if self.drones < LARGE {
+        let peers = self.peers();
+        if !peers.is_large() {
             return;
         }
-        let peers = self.peers();
         let stamp_of = peers.stamp_finder();
         for (source, message) in heard.clone() {
             peers.warm(source);
@@ -244,6 +241,9 @@ impl Leading {
             return;
         }
         let message = message.into();
+        let is_fact = !matches!(message, MessageRef::Leadership(_) | MessageRef::Pose(_) | MessageRef::Presence(_));
+        let passes_on = is_fact && self.relays.is_wide();
+        let near = passes_on && self.relays.is_near(&self.knowledge, source);
         match message {
             MessageRef::Pose(pose) => {
                 if self.knowledge.is_back(now, source, pose) {
@@ -257,7 +257,7 @@ impl Leading {
             }
             MessageRef::Obstacle(o) => {
                 self.knowledge.learn(now, o.id, o.shape, o.witness);
-                if !self.relays.is_wide() || self.relays.is_near(&self.knowledge, source) {
+                if !passes_on || near {
                     let exceeded = self.knowledge.obstacles().exceed(o.id, &o.shape);
                     self.broadcaster.hear_obstacle(now, o.id, exceeded);
                 }
@@ -272,8 +272,8 @@ impl Leading {
             MessageRef::AssignmentList(list) => {
                 for part in list.assignments() {
                     self.hear_assignment(now, source, &part);
-                    if self.relays.is_wide() {
-                        self.relays.hear(&self.knowledge, now, source, MessageRef::Assignment(&part));
+                    if passes_on {
+                        self.relays.hear(&self.knowledge, now, source, near, MessageRef::Assignment(&part));
                     }
                 }
             }
@@ -283,9 +283,8 @@ impl Leading {
             // Neither lines between drones nor a message of the pilot's own say anything about leading.
             MessageRef::Separation(_) | MessageRef::User(_) => {}
         }
-        let is_fact = !matches!(message, MessageRef::Leadership(_) | MessageRef::Pose(_) | MessageRef::Presence(_));
-        if is_fact && self.relays.is_wide() {
-            self.relays.hear(&self.knowledge, now, source, message);
+        if passes_on {
+            self.relays.hear(&self.knowledge, now, source, near, message);
         }
     }
 
@@ -319,10 +318,10 @@ impl Leading {
             }
             let pose = presence.pose(present);
             let before = self.news_of(drone);
-            if self.knowledge.hear_of(now, drone, pose) {
+            if self.knowledge.hear_of(now, drone, &pose) {
                 self.roles.note_plan_conflict();
             }
-            self.relays.hear_state(&self.knowledge, now, drone, before, Some((source, &pose)));
+            self.relays.hear_state(&self.knowledge, now, drone, before, near.then_some(&pose));
         }
     }
 

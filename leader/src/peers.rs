@@ -8,6 +8,7 @@ use crate::tuning::{DELAY_WEIGHT, DIRECT_S};
 use skein_protocol::digest::Digest;
 use skein_protocol::payload::Pose;
 use skein_protocol::{Ballot, DroneId, GroupId, PlanStamp, SimTime};
+use std::borrow::Borrow;
 
 /// A beacon that took longer to arrive does not count, s.
 const MAX_DELAY_S: f64 = 60.0;
@@ -17,6 +18,9 @@ const LOOK_TIMEOUTS: f64 = 0.25;
 
 /// Of so many peers the age is told at a time. By hand.
 const AGES: usize = 64;
+
+/// From this number of drones on, what a drone knows of the others may not be in the cache. Chosen by hand.
+const LARGE: u32 = 64;
 
 /// The last beacon heard of each peer.
 #[derive(Clone, Debug)]
@@ -72,18 +76,18 @@ impl Peers {
 
     /// Takes a beacon. A beacon is ignored if it is older than the last one, from the future, or of no drone of the swarm.
     /// Age is by simulated time alone, which goes on when a process is restarted.
-    pub fn hear(&mut self, now: SimTime, source: DroneId, pose: Pose) {
-        self.take(now, source, pose, true);
+    pub fn hear(&mut self, now: SimTime, source: DroneId, pose: impl Borrow<Pose>) {
+        self.take(now, source, pose.borrow(), true);
     }
 
     /// Takes a beacon that another drone passed on. It is ignored if the peer itself is heard.
-    pub fn hear_of(&mut self, now: SimTime, peer: DroneId, pose: Pose) {
+    pub fn hear_of(&mut self, now: SimTime, peer: DroneId, pose: impl Borrow<Pose>) {
         if !self.is_heard_now(peer, now) {
-            self.take(now, peer, pose, false);
+            self.take(now, peer, pose.borrow(), false);
         }
     }
 
-    fn take(&mut self, now: SimTime, source: DroneId, pose: Pose, direct: bool) {
+    fn take(&mut self, now: SimTime, source: DroneId, pose: &Pose, direct: bool) {
         let delay_s = now.since(pose.stamp);
         if source.0 >= self.drones || !(0.0..=MAX_DELAY_S).contains(&delay_s) {
             return;
@@ -102,11 +106,11 @@ impl Peers {
                 self.ids.insert(place, source);
                 self.quiet.insert(place, heard.lives_until(self.base), self.ids.len());
                 self.all_but = None;
-                self.beacons.insert(place, &pose, heard, !direct);
+                self.beacons.insert(place, pose, heard, !direct);
                 self.changes.note_moved(self.ids.len());
             }
             Ok(place) if pose.stamp > self.beacons.stamps()[place] => {
-                let heard = self.beacons.replace(place, &pose, !direct);
+                let heard = self.beacons.replace(place, pose, !direct);
                 heard.again(now, direct, self.base);
                 let until = heard.lives_until(self.base);
                 self.changes.note(place);
@@ -196,8 +200,17 @@ impl Peers {
         }
     }
 
+    /// Whether the swarm is so large that what a drone knows of it does not stay in the cache.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        self.drones >= LARGE
+    }
+
     /// Fetches all about the peers that may count as heard without a relay into the cache.
     pub(crate) fn warm_near(&self) {
+        if !self.is_large() {
+            return;
+        }
         self.near.iter().for_each(|peer| self.warm(*peer));
         self.beacons.warm_few();
     }
@@ -323,6 +336,12 @@ impl Peers {
         living.map(|(_, peer)| peer)
     }
 
+    /// Whether certainly every other drone of the swarm was heard and is not silent for too long. This needs no look at each peer.
+    #[must_use]
+    pub fn are_all_living(&self, now: SimTime) -> bool {
+        self.ids.len() + 1 >= self.drones as usize && self.quiet.are_quiet(now)
+    }
+
     /// Peers that were heard once and are silent now, by id. They may still hover somewhere.
     pub fn silent(&self, now: SimTime) -> impl Iterator<Item = (DroneId, Beacon<'_>)> {
         let suspects = self.quiet.suspects(now, self.ids.len());
@@ -373,6 +392,10 @@ impl Peers {
     /// on, modulo the number of peers.
     pub fn ages_s(&self, now: SimTime, first: u64, ages: &mut Vec<f64>) {
         let count = self.ids.len();
+        if count <= AGES && self.quiet.are_quiet(now) {
+            ages.extend(self.stamps().iter().map(|stamp| now.since(*stamp)));
+            return;
+        }
         let first = if count > AGES { (first % count as u64) as usize } else { 0 };
         let places = (first..count).chain(0..first).take(AGES);
         let living = places.filter(|&place| self.is_living_at(place, now));
@@ -485,6 +508,7 @@ mod tests {
     fn what_is_known_of_all_at_once_agrees_with_a_look_at_each() {
         let mut peers = Peers::new(10, 1.0).relayed_less(2.0);
         let mut was_silent = std::collections::BTreeSet::new();
+        let (mut living, mut certain) = (0, 0);
         for tick in 0..600u32 {
             let now = SimTime::from_secs(0.1 * f64::from(tick));
             // Some are far away for a while, and for some of that time no word of them comes.
@@ -503,6 +527,10 @@ mod tests {
             let heard = (0..9).filter(|&id| peers.last(DroneId(id)).is_some());
             let lives = |id: &u32| peers.get(DroneId(*id)).is_some_and(|heard| heard.lives(now, peers.base));
             assert_eq!(silent, heard.filter(|id| !lives(id)).collect::<Vec<_>>(), "tick {tick}");
+            let all_living = (0..9).all(|id| lives(&id));
+            assert!(all_living || !peers.are_all_living(now), "tick {tick}");
+            certain += u32::from(peers.are_all_living(now));
+            living += u32::from(all_living);
             was_silent.extend(silent.iter().copied());
             let ages: Vec<f64> = peers.living(now).map(|(_, beacon)| now.since(beacon.stamp())).collect();
             let mut found = Vec::new();
@@ -516,6 +544,7 @@ mod tests {
             assert_eq!(peers.living(now).count() + silent.len(), peers.stamps().len());
         }
         assert!(was_silent.len() > 1 && was_silent.len() < 9, "{was_silent:?}");
+        assert!(2 * certain > living && certain < 300, "{certain} of {living}");
         assert!(!peers.is_living(DroneId(5), SimTime::from_secs(60.0)));
         peers.forget(DroneId(5));
         assert!(peers.last(DroneId(5)).is_none() && peers.last(DroneId(6)).is_some());

@@ -190,16 +190,16 @@ impl Relays {
         self.beat_pace.set_drones(drones);
     }
 
-    /// Notes that a drone's state was heard: from itself, or in a message of `relay`. `before`: what was known of it.
+    /// Notes that a drone's state was heard: from itself, or passed on. `before`: what was known of it. `near`: what a drone close to this one
+    /// passed on.
     pub(crate) fn hear_state(
         &mut self,
         k: &Knowledge,
         now: SimTime,
         drone: DroneId,
         before: Option<News>,
-        relay: Option<(DroneId, &Pose)>,
+        near: Option<&Pose>,
     ) {
-        let near = relay.filter(|(relay, _)| self.is_near(k, *relay)).map(|(_, pose)| pose);
         let has_news = self.wide && k.peers().last(drone).map(News::of_last) != before;
         self.presences.hear(k, now, drone, has_news, near);
         if has_news {
@@ -264,12 +264,11 @@ impl Relays {
         self.beats.hear(now, message, near, self.crowded)
     }
 
-    /// Notes a message of `source` that may have to be passed on.
-    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, source: DroneId, message: MessageRef<'_>) {
+    /// Notes a message of `source` that may have to be passed on. `near`: whether [`Self::is_near`] holds for the source.
+    pub(crate) fn hear(&mut self, k: &Knowledge, now: SimTime, source: DroneId, near: bool, message: MessageRef<'_>) {
         if self.is_of_no_own_term(k, message) {
             return;
         }
-        let near = self.is_near(k, source);
         self.facts.hear(now, source, message, near);
     }
 

@@ -10,6 +10,7 @@ use crate::relays::Relays;
 use crate::tuning::{ARRIVED_S, BEHIND_S, LEFT_OUT_S};
 use skein_protocol::payload::Plan;
 use skein_protocol::{Ballot, DroneId, GroupId, Phase, PlanStamp, SimTime, Vec2};
+use std::cell::LazyCell;
 
 /// What this drone's role in its group depends on, and since when.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,7 +61,7 @@ impl Roles {
     /// by themselves.
     fn claimable(&mut self, k: &Knowledge, relays: &Relays, now: SimTime, own: &OwnState) -> Option<GroupId> {
         let (scope, group) = (k.election().scope(), k.election().group());
-        let me = k.myself(own);
+        let me = LazyCell::new(|| k.myself(own));
         let part = scope != group && scope.contains(group) && part_has_ahead(k, now, &me);
         let whole =
             scope != GroupId::ALL && k.election().leads() && !any_has_ahead(k, now, &me) && !goes_on(k, now, &me);

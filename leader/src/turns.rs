@@ -1,8 +1,10 @@
 //! What is to be looked at, in the order of its turns.
 
-use crate::growth::make_room;
 use skein_protocol::SimTime;
 use std::collections::BTreeMap;
+
+/// A turn that is full gets room for so many more subjects. By hand: most turns get several, and each list is short-lived.
+const MORE: usize = 4;
 
 /// Subjects by their turns. Most subjects share a turn with others, so they are kept in one block of memory per turn. The first turn is kept
 /// apart, so that a look in vain touches little memory.
@@ -25,7 +27,9 @@ impl<S: Ord + Copy> Turns<S> {
         self.first = self.first.min(turn);
         let subjects = self.turns.entry(turn).or_default();
         if let Err(place) = place(subjects, &subject) {
-            make_room(subjects);
+            if subjects.len() == subjects.capacity() {
+                subjects.reserve_exact(MORE);
+            }
             subjects.insert(place, subject);
         }
     }

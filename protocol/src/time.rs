@@ -21,7 +21,7 @@ impl SimTime {
     /// The time `seconds` after the start of the mission, rounded to the nearest nanosecond.
     #[must_use]
     pub fn from_secs(seconds: f64) -> Self {
-        Self((seconds * 1e9).round() as i64)
+        Self(nanos(seconds))
     }
 
     /// Seconds since the start of the mission.
@@ -39,8 +39,17 @@ impl SimTime {
     /// The time `seconds` after `self`, rounded to the nearest nanosecond. The addition saturates.
     #[must_use]
     pub fn after(self, seconds: f64) -> Self {
-        Self(self.0.saturating_add((seconds * 1e9).round() as i64))
+        Self(self.0.saturating_add(nanos(seconds)))
     }
+}
+
+/// The nearest whole number of nanoseconds; halves are rounded away from zero. It is computed without a call of a function, because each
+/// drone does it several times per tick.
+fn nanos(seconds: f64) -> i64 {
+    let nanos = seconds * 1e9;
+    let whole = nanos as i64;
+    let rest = nanos - whole as f64;
+    whole.saturating_add(i64::from(rest >= 0.5) - i64::from(rest <= -0.5))
 }
 
 impl Add<i64> for SimTime {
@@ -54,5 +63,27 @@ impl Sub for SimTime {
     type Output = i64;
     fn sub(self, other: Self) -> i64 {
         self.0.saturating_sub(other.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn numbers_that_no_time_can_hold_are_rounded_to_the_nearest_time() {
+        let seconds =
+            [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e30, -1e30, 0.5e-9, -0.5e-9, 4.999_999_999_999_999e-10];
+        let expected = [0, i64::MAX, i64::MIN, i64::MAX, i64::MIN, 1, -1, 0];
+        assert_eq!(seconds.map(|seconds| SimTime::from_secs(seconds).0), expected);
+    }
+
+    proptest! {
+        #[test]
+        fn times_are_rounded_to_the_nearest_nanosecond(seconds in prop_oneof![-1e-6..1e-6, -1e4..1e4, -1e10..1e10, any::<f64>()]) {
+            prop_assert_eq!(SimTime::from_secs(seconds).0, (seconds * 1e9).round() as i64);
+            prop_assert_eq!(SimTime(7).after(seconds).0, ((seconds * 1e9).round() as i64).saturating_add(7));
+        }
     }
 }

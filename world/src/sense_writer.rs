@@ -8,6 +8,7 @@ use crate::sweep::{Contact, SensorSweep};
 use skein_protocol::downlink::{Downlink, SensedNeighbour, SensedObstacle, SensedShape, SensesHeader};
 use skein_protocol::shape::ConvexShape;
 use skein_protocol::{DroneId, ObstacleId, SimTime, Vec2, Vec3, raised};
+use std::borrow::Borrow;
 
 /// Marks a shape that the downlink does not hold yet.
 const NOT_WRITTEN: u32 = u32::MAX;
@@ -28,10 +29,10 @@ impl SenseWriter {
 
     /// Writes everything but the frames and the head. `drones` gives the incarnation and the sensor fault of each drone,
     /// by id.
-    pub(crate) fn write(
+    pub(crate) fn write<F: Borrow<SensorFault>>(
         &mut self,
         sensed: &Sensed<'_>,
-        drones: impl Iterator<Item = (u32, SensorFault)>,
+        drones: impl Iterator<Item = (u32, F)>,
         down: &mut Downlink,
     ) {
         down.drones.clear();
@@ -41,10 +42,11 @@ impl SenseWriter {
         self.places.fill(NOT_WRITTEN);
         let mut contacts = sensed.sweep.contacts().iter().peekable();
         for ((drone, body), (incarnation, sensor_fault)) in sensed.bodies.iter().enumerate().zip(drones) {
+            let sensor_fault = sensor_fault.borrow();
             let (obstacle_first, neighbour_first) = (down.obstacles.len() as u32, down.neighbours.len() as u32);
             while let Some(contact) = contacts.next_if(|contact| contact.drone as usize == drone) {
                 if body.is_alive() {
-                    self.write_contact(contact, sensed, &sensor_fault, down);
+                    self.write_contact(contact, sensed, sensor_fault, down);
                 }
             }
             if body.is_alive() && !sensor_fault.no_ranging {
@@ -52,7 +54,7 @@ impl SenseWriter {
             }
             let fault_m = sensor_fault.position_error_m + sensor_fault.gnss_error_m;
             let position_error_m = fault_m + sensed.model.position_m(drone);
-            let clock_fault_ns = (sensor_fault.clock_error_s * 1e9).round() as i64;
+            let SimTime(clock_fault_ns) = SimTime::from_secs(sensor_fault.clock_error_s);
             down.drones.push(SensesHeader {
                 position_m: shifted(body.position(), position_error_m),
                 velocity_mps: shifted(body.velocity(), sensor_fault.velocity_error_mps),

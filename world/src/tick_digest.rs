@@ -29,7 +29,7 @@ impl TickDigest {
     /// Folds one tick: its number, every drone's state and what it received, and the frames that were sent.
     pub(crate) fn fold(&mut self, tick: Tick, drones: &DroneTable, frames: &[AirFrame]) {
         self.words.clear();
-        word(&mut self.words, tick);
+        write(&mut self.words, [tick]);
         for (body, process) in drones.bodies().iter().zip(drones.processes()) {
             Self::write_drone(&mut self.words, body, process);
         }
@@ -47,22 +47,20 @@ impl TickDigest {
     /// The words of one drone: its state and what it received.
     pub(crate) fn write_drone(words: &mut Vec<u8>, body: &Body, process: &Process) {
         let (position, velocity) = (body.position(), body.velocity());
-        for value in [position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, body.energy_j()] {
-            word(words, value.to_bits());
-        }
-        word(words, u64::from(body.is_alive()));
+        let state = [position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, body.energy_j()];
+        write(words, state.map(f64::to_bits));
+        write(words, [u64::from(body.is_alive())]);
         if !body.is_alive() {
             return;
         }
         let slot = process.slot();
-        word(words, u64::from(slot.heard));
-        for &count in &slot.dropped[..ALWAYS_FOLDED] {
-            word(words, u64::from(count));
-        }
-        word(words, slot.heard_hash);
+        let dropped: [u64; ALWAYS_FOLDED] = std::array::from_fn(|reason| slot.dropped[reason].into());
+        write(words, [u64::from(slot.heard)]);
+        write(words, dropped);
+        write(words, [slot.heard_hash]);
         let later = std::iter::once(&slot.duplicates).chain(&slot.dropped[ALWAYS_FOLDED..]);
         for (&count, which) in later.zip(1u64..).filter(|(count, _)| **count > 0) {
-            word(words, which << 32 | u64::from(count));
+            write(words, [which << 32 | u64::from(count)]);
         }
     }
 
@@ -76,6 +74,6 @@ impl TickDigest {
     }
 }
 
-fn word(words: &mut Vec<u8>, value: u64) {
-    words.extend_from_slice(&value.to_le_bytes());
+fn write<const COUNT: usize>(words: &mut Vec<u8>, values: [u64; COUNT]) {
+    words.extend_from_slice(values.map(u64::to_le_bytes).as_flattened());
 }

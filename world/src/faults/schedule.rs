@@ -7,6 +7,7 @@ use super::view::FaultView;
 use crate::fault_plan::{Fault, FaultEffect, FaultPlan, FaultTargets, FaultTime};
 use crate::sensor_fault::SensorFault;
 use skein_protocol::{DroneId, SimTime, Tick, Vec2};
+use std::borrow::Cow;
 
 /// A fault in force.
 #[derive(Clone, Debug)]
@@ -119,18 +120,19 @@ impl FaultSchedule {
     }
 
     /// How a drone's senses differ from the truth in a tick that begins now.
-    pub(crate) fn sensor_fault(&self, drone: DroneId, (tick, now): (Tick, SimTime)) -> SensorFault {
-        let mut sensor_fault = self.standing[drone.index()];
+    pub(crate) fn sensor_fault(&self, drone: DroneId, (tick, now): (Tick, SimTime)) -> Cow<'_, SensorFault> {
+        let mut sensor_fault = Cow::Borrowed(&self.standing[drone.index()]);
         for active in self.active.iter().filter(|active| active.has(drone)) {
             let lasted_s = now.since(active.since);
             match &self.plan.faults[active.fault].effect {
                 FaultEffect::Noise(noise) => {
                     let mut rng = self.rng(active.fault, u64::from(drone.0), tick);
+                    let sensor_fault = sensor_fault.to_mut();
                     sensor_fault.position_error_m += noise.position_bias_m + rng.vector(noise.position_std_m);
                     sensor_fault.velocity_error_mps += noise.velocity_bias_mps + rng.vector(noise.velocity_std_mps);
                 }
-                FaultEffect::Gnss(drift) => sensor_fault.gnss_error_m += drift.after_m(lasted_s),
-                FaultEffect::Clock(drift) => sensor_fault.clock_error_s += drift.after_s(lasted_s),
+                FaultEffect::Gnss(drift) => sensor_fault.to_mut().gnss_error_m += drift.after_m(lasted_s),
+                FaultEffect::Clock(drift) => sensor_fault.to_mut().clock_error_s += drift.after_s(lasted_s),
                 _ => {}
             }
         }
