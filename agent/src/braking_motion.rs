@@ -64,7 +64,7 @@ pub struct OwnMotion {
 pub(crate) struct Gap {
     /// At least by so much they stay farther apart than they have to, m.
     room_m: f64,
-    /// Both rest after this time, s.
+    /// Both rest after this time, also if one of them first carries out a command for a tick, s.
     stop_s: f64,
 }
 
@@ -138,6 +138,8 @@ impl BrakingFilterParams {
         let (params, own_velocity, keep_m) = (*self, own.velocity, self.keep_m());
         let own_speed2 = own_velocity.norm_squared();
         let own_reach_m = self.reach_m(own_speed2, 1);
+        // The tick of a command, the time in which the speed falls by what it rose in that tick, and the last tick of braking.
+        let command_s = (2.0 + self.acceleration_max_mps2 / self.braking_mps2) * self.dt_s;
         move |other| {
             let (distance2, speed2) = (other.position_m.norm_squared(), other.velocity_mps.norm_squared());
             let apart_m = keep_m + own_reach_m + params.reach_m(speed2, 1);
@@ -146,7 +148,7 @@ impl BrakingFilterParams {
             }
             // Full braking is a projection, and projections do not increase distances. So the distance of two braking
             // paths changes by at most the relative speed times the time until both drones are at rest.
-            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + 2.0 * params.dt_s;
+            let stop_s = own_speed2.max(speed2).sqrt() / params.braking_mps2 + command_s;
             let room_m = distance2.sqrt() - keep_m - (other.velocity_mps - own_velocity).norm() * stop_s;
             Some(Gap { room_m, stop_s })
         }
