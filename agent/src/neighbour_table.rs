@@ -221,4 +221,40 @@ mod tests {
     fn the_front_drone_takes_less_only_while_the_beacon_is_fresh() {
         assert_eq!(share(Some(1), Some((2, 0.5))), 0.5);
     }
+
+    /// The drones that are neighbours, and whether they are sensed, if these are ranged, in this order, and drones 1 to 4 are known by beacons
+    /// that say that they are this far away, m.
+    fn found(ranged: &[u32], away_m: f64) -> Vec<(u32, bool)> {
+        let stamp = SimTime::from_secs(10.0);
+        let mut peers = Peers::new(5, 2.0);
+        for id in 1..5 {
+            peers.hear(stamp, DroneId(id), Pose { stamp, position_m: [away_m, 0.0, 0.0], ..Pose::zeroed() });
+        }
+        let ranged = ranged.iter().map(|id| SensedNeighbour {
+            position_m: [40.0, 0.0, 0.0],
+            velocity_mps: [0.0; 3],
+            drone: DroneId(*id),
+            reserved: 0,
+        });
+        let ranged: Vec<SensedNeighbour> = ranged.collect();
+        let senses = Senses::new((500, stamp), ([0.0; 3], [0.0; 3]), &[], &ranged, &[]);
+        let places = [QueuePlace::default(); MAX_PLACES];
+        let view =
+            NeighbourView { now: stamp, senses: &senses, peers: &peers, obeyed: PlanStamp::default(), places: &places };
+        let mut found = Few::new();
+        NeighbourTable::new(PARAMS).update(&view, &mut found);
+        found.iter().map(|neighbour| (neighbour.id.0, neighbour.sensed)).collect()
+    }
+
+    #[test]
+    fn a_peer_known_by_beacon_is_a_neighbour_up_to_the_reach_and_no_farther() {
+        let reach_m = BEACON_REACH * PARAMS.safe_distance_m;
+        assert_eq!(found(&[2, 3, 4], 0.999 * reach_m), [(2, true), (3, true), (4, true), (1, false)]);
+        assert_eq!(found(&[2, 3, 4], 1.001 * reach_m), [(2, true), (3, true), (4, true)]);
+    }
+
+    #[test]
+    fn a_neighbour_that_is_ranged_counts_once_in_whatever_order_they_are_ranged() {
+        assert_eq!(found(&[4, 1, 3], 50.0), [(4, true), (1, true), (3, true), (2, false)]);
+    }
 }

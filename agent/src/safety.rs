@@ -146,7 +146,7 @@ impl Safety {
 
     /// Fetches what [`Self::filter`] reads into the cache: call it a short time before.
     pub(crate) fn warm(&self) {
-        // The oldest one is due, and then written anew.
+        // The newest one tells how fast the neighbours flew. The oldest one is due, and then written anew.
         let read = [self.expected.front(), self.expected.back()];
         read.into_iter().flatten().for_each(|expected| prefetch(expected.as_slice()));
     }

@@ -89,3 +89,23 @@ fn what_is_far_from_all_at_a_glance_is_allowed_by_a_look_at_each_braking_path() 
     // The bound is of use: it holds for many of the commands that are allowed.
     assert!(far.get() > 800 && near.get() > 100, "{} and {}", far.get(), near.get());
 }
+
+/// Such a drone needs longer to lose the speed that it gains in the tick of a command than to gain it.
+#[test]
+fn a_drone_that_brakes_less_than_it_accelerates_is_far_only_if_braking_after_a_command_leaves_room() {
+    let params = BrakingFilterParams { braking_mps2: 1.0, ..PARAMS };
+    let (own, wanted) = (at_origin(Vec2::zeros()), Vec2::new(params.acceleration_max_mps2, 0.0));
+    let mut far = 0;
+    for room_mm in 0..50 {
+        let position_m = Vec2::new(params.keep_m() + 1e-3 * f64::from(room_mm), 0.0);
+        let neighbour = std::iter::once(Moving { id: DroneId(1), position_m, velocity_mps: Vec2::zeros() });
+        let mut filter = BrakingFilter::new(params);
+        filter.compare(&own, neighbour.clone());
+        filter.cut(&own, &filter.candidate(&own, wanted), std::iter::empty());
+        if filter.is_far_from_all(&own, wanted, neighbour) {
+            assert!(filter.planes.is_empty(), "{room_mm} mm");
+            far += 1;
+        }
+    }
+    assert!(far > 0);
+}
