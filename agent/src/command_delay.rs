@@ -41,8 +41,13 @@ impl<T: Copy> CommandDelay<T> {
 
     /// Accepts a command and returns the one that takes effect now.
     pub fn push(&mut self, command: T) -> T {
-        self.pending.push_back(command);
-        self.last = self.pending.pop_front().unwrap_or(command);
+        self.last = match self.pending.pop_front() {
+            Some(oldest) => {
+                self.pending.push_back(command);
+                oldest
+            }
+            None => command,
+        };
         self.last
     }
 }

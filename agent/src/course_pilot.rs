@@ -97,6 +97,12 @@ impl Pilot for CoursePilot {
         }
     }
 
+    fn begin_step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) {
+        if self.course == Course::East {
+            self.pilot.begin_step(senses, inbox, out);
+        }
+    }
+
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         self.pilot.pose_ages_s(now, ages);
     }

@@ -95,7 +95,8 @@ impl Escape {
         if self.until.is_some_and(|until| now.since(until) > FREE_S) {
             *self = Self::default();
         }
-        if wanted.norm() <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
+        let wanted_mps = wanted.norm();
+        if wanted_mps <= EAGER_MPS.min(EAGER_SHARE * speed_mps) {
             self.stays = Default::default();
             self.pushed = None;
             return wanted;
@@ -110,12 +111,13 @@ impl Escape {
             *stay = stay.filter(is_here).or_else(|| (!steps).then_some(Stay { since: now, position }));
             is_stuck |= !steps && stay.is_some_and(|stay| now.since(stay.since) >= window_s);
         }
-        is_stuck |= !by_words && self.is_pushed_back(course, PUSHED_WINDOW * patience_s, still_mps);
+        let forward = wanted / wanted_mps;
+        is_stuck |= !by_words && self.is_pushed_back(course, forward, PUSHED_WINDOW * patience_s, still_mps);
         if !is_stuck {
             return wanted;
         }
         let turn = nalgebra::Rotation2::new(TURNS[self.attempts % TURNS.len()]);
-        self.direction = turn * wanted.normalize();
+        self.direction = turn * forward;
         self.until = Some(now.after((FIRST_S + LONGER_S * self.attempts as f64).min(LONGEST_S)));
         self.attempts += 1;
         self.stays = Default::default();
@@ -124,10 +126,11 @@ impl Escape {
     }
 
     /// Whether the drone has been pushed back for so long, farther than a still drone moves in that time, and has never made up for it.
-    fn is_pushed_back(&mut self, course: &Course, window_s: f64, still_mps: f64) -> bool {
-        let Course { now, position, wanted, .. } = *course;
+    /// `forward`: the direction that it wants, a unit vector.
+    fn is_pushed_back(&mut self, course: &Course, forward: Vec2, window_s: f64, still_mps: f64) -> bool {
+        let Course { now, position, .. } = *course;
         let before = self.pushed.unwrap_or(Pushed { since: now, position, gained_m: 0.0 });
-        let gained_m = before.gained_m + (position - before.position).dot(&wanted.normalize());
+        let gained_m = before.gained_m + (position - before.position).dot(&forward);
         let since = if gained_m < 0.0 { before.since } else { now };
         self.pushed = Some(Pushed { since, position, gained_m: gained_m.min(0.0) });
         now.since(since) >= window_s && gained_m <= -still_mps * window_s

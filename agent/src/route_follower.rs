@@ -140,15 +140,17 @@ impl RouteFollower {
         }
         let moved = have_moved(&self.bodies, bodies);
         let key = self.drawing_key(ledger, position);
-        if self.drawn_for.is_none_or(|drawn| drawn.stamp != key.stamp) {
+        let drawn = self.drawn_for == Some(key);
+        let same_plan = drawn || self.drawn_for.is_some_and(|drawn| drawn.stamp == key.stamp);
+        if !same_plan {
             self.detours.clear();
             if !self.is_passing() {
                 self.own_y_m = position.y;
             }
         }
-        let grown = self.drawn_for.is_some_and(|drawn| drawn.stamp == key.stamp && drawn.redrawn != key.redrawn);
+        let grown = !drawn && same_plan && self.drawn_for.is_some_and(|drawn| drawn.redrawn != key.redrawn);
         let detoured = self.find_detours(ledger, position, bodies, grown);
-        if self.drawn_for != Some(key) || moved || detoured {
+        if !drawn || moved || detoured {
             self.bodies.clear();
             self.bodies.extend_from_slice(bodies);
             self.draw(ledger, position);

@@ -68,6 +68,7 @@ pub struct SwarmPilot {
     /// Where the route first turns, if a drone that detours flies there. World frame, m.
     turn: Option<Vec2>,
     reaction: ReactionDelay,
+    begun: Option<BegunStep>,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
     /// If its first step is in this tick or later, its failsafe has braked it before.
@@ -111,6 +112,7 @@ impl SwarmPilot {
             detour: Detour::default(),
             turn: None,
             reaction: ReactionDelay::new(params.braking.reaction_time_s, params.dt_s),
+            begun: None,
             stepped: None,
             late_from: u64::from(params.incarnation == 1),
             escape: Escape::default(),
@@ -405,10 +407,14 @@ impl SwarmPilot {
     /// Whether the drone senses no obstacles, and no other one may report them: it hears none whose sensors work. What it remembers of an
     /// outline may also be a part of it.
     fn flies_blind(&self, senses: &Senses<'_>) -> bool {
+        senses.broken.obstacles && (self.params.sensing.partial_outlines || !self.is_guided(senses.now))
+    }
+
+    /// Whether it hears a drone whose sensors work.
+    fn is_guided(&self, now: SimTime) -> bool {
         let peers = self.leading.peers();
-        let oldest = senses.now.after(-GUIDE_S - peers.delay_s());
-        let guides = || peers.living(senses.now).any(|(_, pose)| !pose.is_impaired() && pose.stamp() >= oldest);
-        senses.broken.obstacles && (self.params.sensing.partial_outlines || !guides())
+        let oldest = now.after(-GUIDE_S - peers.delay_s());
+        peers.living(now).any(|(_, pose)| !pose.is_impaired() && pose.stamp() >= oldest)
     }
 
     /// How far the outlines that the drone keeps clear of may be displaced, m.
@@ -602,19 +608,22 @@ impl SwarmPilot {
         })
     }
 
-    /// Steps one tick on senses that hold no obstacles but those in the way.
-    fn step_level(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
-        let say = out.messages_mut();
+    fn begin(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, say: &mut Vec<Message>) -> BegunStep {
+        let levelled = self.altitude.look(senses);
+        if levelled {
+            let altitude = self.altitude.clone();
+            self.begin_level(&altitude.level(senses), inbox, say);
+        } else {
+            self.begin_level(senses, inbox, say);
+        }
+        BegunStep { tick: senses.tick, levelled }
+    }
+
+    /// Begins a step on senses that hold no obstacles but those in the way: hears, leads, and looks where it is on its route.
+    fn begin_level(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, say: &mut Vec<Message>) {
         self.params.braking.reaction_time_s = self.reaction.set_extra(senses.extra_reaction_s);
         self.safety.set_reaction_time(self.reaction.delay_s());
         self.brake_after_a_gap(senses);
-        let own = OwnState {
-            tick: senses.tick,
-            position: senses.position(),
-            velocity: senses.velocity(),
-            altitude_m: senses.position_m[2],
-            climb_mps: senses.velocity_mps[2],
-        };
         self.open_words(senses, inbox);
         let path = self.separations.as_ref().map(|_| self.own_path(senses));
         self.leading.expect(inbox.heard().iter().map(|heard| (heard.source, heard.message)));
@@ -636,20 +645,44 @@ impl SwarmPilot {
         self.sense(senses);
         let safety = self.params.safety;
         self.silent.update(senses, self.leading.peers());
-        self.lead(senses, &own, say);
+        self.lead(senses, &own_state(senses), say);
         self.emergency_avoidance(senses);
         let bodies = self.silent.bodies(SILENT_DRONE_RADIUS * safety.safe_distance_m);
         self.route.update(self.leading.ledger(), senses.position(), &bodies);
         self.leading.note_passed(senses.position());
+        self.speak_separation(senses, path.as_ref(), say);
+    }
+
+    /// Ends a step on the same senses: steers, and says where it is.
+    fn end_level(&mut self, senses: &Senses<'_>, say: &mut Vec<Message>) -> Command {
         let places = self.route.places(senses.position());
         let open = self.route.open_places(places);
-        self.speak_separation(senses, path.as_ref(), say);
         let safe = self.steer(senses, &open);
         let acceleration = self.reaction.push(safe);
-        let climb_mps2 = self.altitude.climb_mps2(senses, acceleration, safety.acceleration_max_mps2);
+        let limit_mps2 = self.params.safety.acceleration_max_mps2;
+        let climb_mps2 = self.altitude.climb_mps2(senses, acceleration, limit_mps2);
         let command = self.command(raised(acceleration, climb_mps2), &open);
-        self.leading.speak(senses.now, &own, &places, say);
+        self.leading.speak(senses.now, &own_state(senses), &places, say);
         command
+    }
+}
+
+/// What the first half of a step leaves to the second one.
+#[derive(Clone, Copy, Debug)]
+struct BegunStep {
+    tick: u64,
+    /// Whether obstacles above and below were left out, or flattened.
+    levelled: bool,
+}
+
+/// What a drone knows of itself.
+fn own_state(senses: &Senses<'_>) -> OwnState {
+    OwnState {
+        tick: senses.tick,
+        position: senses.position(),
+        velocity: senses.velocity(),
+        altitude_m: senses.position_m[2],
+        climb_mps: senses.velocity_mps[2],
     }
 }
 
@@ -665,12 +698,19 @@ fn remembered<'a>(
 }
 
 impl Pilot for SwarmPilot {
+    fn begin_step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) {
+        self.begun = Some(self.begin(senses, inbox, out.messages_mut()));
+    }
+
     fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
-        if !self.altitude.look(senses) {
-            return self.step_level(senses, inbox, out);
+        let say = out.messages_mut();
+        let begun = self.begun.take().filter(|begun| begun.tick == senses.tick);
+        let begun = begun.unwrap_or_else(|| self.begin(senses, inbox, say));
+        if begun.levelled {
+            let altitude = self.altitude.clone();
+            return self.end_level(&altitude.level(senses), say);
         }
-        let altitude = self.altitude.clone();
-        self.step_level(&altitude.level(senses), inbox, out)
+        self.end_level(senses, say)
     }
 
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {

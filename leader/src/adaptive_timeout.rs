@@ -51,20 +51,27 @@ impl AdaptiveTimeout {
             (self.mean_s, self.deviation_s) = (gap_s, gap_s * INITIAL_DEVIATION);
         }
         self.gaps = self.gaps.saturating_add(1);
-        let weight = GAP_WEIGHT.max(1.0 / f64::from(self.gaps));
+        let gaps = f64::from(self.gaps);
         // The assumed deviation counts as one more gap.
-        let deviation_weight = GAP_WEIGHT.max(1.0 / (f64::from(self.gaps) + 1.0));
-        self.deviation_s += deviation_weight * ((gap_s - self.mean_s).abs() - self.deviation_s);
-        self.mean_s += weight * (gap_s - self.mean_s);
+        self.deviation_s += weight(gaps + 1.0) * ((gap_s - self.mean_s).abs() - self.deviation_s);
+        self.mean_s += weight(gaps) * (gap_s - self.mean_s);
     }
 
     /// The longest silence that is not yet significant, s: `base_s`, or more if gaps are long or vary.
     pub(crate) fn timeout_s(&self, base_s: f64) -> f64 {
+        let silence_s = self.mean_s + TIMEOUT_DEVIATIONS * self.deviation_s;
+        if silence_s <= base_s {
+            return base_s;
+        }
         // Of fewer gaps, a single long one could make the mean longer than the base.
         let mean_s = if f64::from(self.gaps) >= MAX_TIMEOUTS { self.mean_s } else { 0.0 };
-        let longest_s = MAX_TIMEOUTS * base_s.max(mean_s);
-        (self.mean_s + TIMEOUT_DEVIATIONS * self.deviation_s).clamp(base_s, longest_s)
+        silence_s.min(MAX_TIMEOUTS * base_s.max(mean_s))
     }
+}
+
+/// Weight of the newest of so many gaps in their running means: the means of the first ones count all alike.
+fn weight(gaps: f64) -> f64 {
+    if gaps * GAP_WEIGHT >= 1.0 { GAP_WEIGHT } else { 1.0 / gaps }
 }
 
 #[cfg(test)]
@@ -111,6 +118,13 @@ mod tests {
         assert!(long(400) <= MAX_TIMEOUTS * 0.06 + 1e-9, "{}", long(400));
         // A source that is always heard rarely is given longer.
         assert!(after(std::iter::repeat_n(0.5, 400)).timeout_s(0.06) > 0.49);
+    }
+
+    #[test]
+    fn the_first_gaps_count_alike_and_later_ones_by_a_fixed_weight() {
+        for gaps in (1..300).map(f64::from) {
+            assert_eq!(weight(gaps), GAP_WEIGHT.max(1.0 / gaps), "{gaps}");
+        }
     }
 
     #[test]

@@ -50,7 +50,10 @@ impl Heard {
     /// Notes that it is heard again. `direct`: without a relay.
     #[inline]
     pub(crate) fn again(&mut self, now: SimTime, direct: bool, base: Timeouts) {
-        let longest_s = self.absence_s(base);
+        let shortest_s = if self.is_relayed() { RELAYED_TIMEOUTS * base.relayed_s } else { base.direct_s };
+        // No absence is shorter than that. So a gap up to it is none, and the longest gap need not be computed.
+        let is_short = now.since(self.timeout.last()) <= shortest_s;
+        let longest_s = if is_short { shortest_s } else { self.absence_s(base) };
         if direct {
             self.direct = now;
         } else if !self.is_relayed() {
@@ -108,5 +111,37 @@ impl Heard {
     #[inline]
     pub(crate) fn lives_until(&self, base: Timeouts) -> SimTime {
         self.timeout.last() + ((self.absence_s(base) - ROUNDING_S) * 1e9) as i64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// So a gap up to it is none, and what is left out for such a gap has no effect.
+        #[test]
+        fn no_absence_is_shorter_than_the_time_out(
+            gaps in prop::collection::vec((0.0..5.0f64, any::<bool>()), 0..40),
+            direct_s in 0.05..3.0f64,
+            factor in 1.0..9.0f64,
+        ) {
+            let base = Timeouts { direct_s, relayed_s: factor * direct_s };
+            let (mut now, mut heard) = (SimTime::ZERO, Heard::first(SimTime::ZERO, true, base));
+            for (gap_s, direct) in gaps {
+                let mut exact = heard;
+                now = now.after(gap_s);
+                let longest_s = exact.absence_s(base);
+                let shortest_s = if heard.is_relayed() { RELAYED_TIMEOUTS * base.relayed_s } else { direct_s };
+                prop_assert!(longest_s >= shortest_s, "{longest_s} s of {shortest_s}");
+                heard.again(now, direct, base);
+                if !direct && !exact.is_relayed() {
+                    exact.timeout = base.prior(now, false);
+                }
+                exact.timeout.hear(now, 0.0, longest_s);
+                prop_assert_eq!({ heard.timeout }, { exact.timeout });
+            }
+        }
     }
 }

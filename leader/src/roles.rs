@@ -63,6 +63,10 @@ impl Roles {
         let (scope, group) = (k.election().scope(), k.election().group());
         let me = LazyCell::new(|| k.myself(own));
         let part = scope != group && scope.contains(group) && part_has_ahead(k, now, &me);
+        if !part && !k.election().leads() {
+            (self.part, self.whole, self.torn) = (None, None, None);
+            return None;
+        }
         let whole =
             scope != GroupId::ALL && k.election().leads() && !any_has_ahead(k, now, &me) && !goes_on(k, now, &me);
         let rank = match (part, whole) {
@@ -83,9 +87,9 @@ impl Roles {
     /// than its radio's range, word of the drones that obey a term may come before that term's own messages: then it may be a claim of the
     /// whole swarm that is under way to this leader.
     fn claims_torn(&mut self, k: &Knowledge, relays: &Relays, now: SimTime) -> bool {
-        let (election, forms) =
-            (k.election(), k.ledger().obeyed().is_some_and(|bundle| is_formation_of_all(&bundle.plan)));
-        let torn = election.leads() && election.scope() == GroupId::ALL && forms && {
+        let election = k.election();
+        let forms = || k.ledger().obeyed().is_some_and(|bundle| is_formation_of_all(&bundle.plan));
+        let torn = election.leads() && election.scope() == GroupId::ALL && forms() && {
             let is_of_part = |term| !relays.is_wide() || relays.is_of_part(now, term);
             let gone = k.living_peers(now).map(|m| (k.term_of(m.id), m)).filter(|(term, _)| *term > election.obeyed());
             let gone = gone.filter(|(term, _)| is_of_part(*term)).map(|(_, m)| m);

@@ -7,8 +7,9 @@ use crate::error::RuntimeError;
 use crate::in_pilots::Place;
 use crate::mission;
 use crate::pacer::Pacer;
-use crate::pilot_host::{PilotHost, StepScratch};
+use crate::pilot_host::{PilotHost, PilotScratch};
 use crate::pilot_registry::PilotRegistry;
+use crate::radio_receiver::Arrived;
 use crate::run_end::RunEnd;
 use skein_bus::LargePages;
 use skein_protocol::downlink::DownlinkView;
@@ -124,7 +125,9 @@ struct InlineSwarm<'s> {
 /// What a thread has for the drones that it steps.
 #[derive(Default)]
 struct Worker {
-    scratch: StepScratch,
+    arrived: Arrived,
+    /// One for each drone that it takes at a time.
+    scratch: [PilotScratch; CHUNK],
     /// What their radio receivers have counted. It is here and not with each drone, so that it stays in the cache.
     stats: LinkStats,
     /// Says which pilot the thread is in.
@@ -181,29 +184,52 @@ impl<'s> InlineSwarm<'s> {
 fn step_all(drones: &mut [InlineDrone], down: &DownlinkView<'_>, workers: &mut [Worker]) {
     let Some((own, others)) = workers.split_first_mut() else { return };
     let large = drones.len() >= LARGE_SWARM;
-    let chunks = Mutex::new(drones.chunks_mut(CHUNK));
+    let chunks = drones.chunks_mut(CHUNK);
+    if others.is_empty() {
+        return chunks.for_each(|chunk| step_chunk(chunk, down, own, large));
+    }
+    let chunks = Mutex::new(chunks);
     let next = || chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
     let work = |worker: &mut Worker| {
         while let Some(chunk) = next() {
-            for place in 0..chunk.len() {
-                // While one drone is stepped, the memory of the next ones is fetched.
-                if large {
-                    chunk.get(place + 1).iter().for_each(|next| next.prefetch());
-                    chunk.get(place + 2).into_iter().for_each(prefetch);
-                }
-                chunk[place].step(down, worker);
-            }
+            step_chunk(chunk, down, worker, large);
         }
     };
-    if others.is_empty() {
-        return work(own);
-    }
     std::thread::scope(|scope| {
         // The threads that there are take all chunks.
         let begun = |worker| std::thread::Builder::new().spawn_scoped(scope, || work(worker)).is_ok();
         let _all = others.iter_mut().all(begun);
         work(own);
     });
+}
+
+/// Steps some drones, at most [`CHUNK`]. All begin their step before the first one ends it: so the processor has the code of one half
+/// of a step in its cache, and not too much of both.
+fn step_chunk(chunk: &mut [InlineDrone], down: &DownlinkView<'_>, worker: &mut Worker, large: bool) {
+    let mut begun = [const { None }; CHUNK];
+    let mut rest = chunk;
+    for (begun, scratch) in begun.iter_mut().zip(&mut worker.scratch) {
+        let Some((drone, next)) = rest.split_first_mut() else { break };
+        // While one drone is stepped, the memory of the next ones is fetched.
+        if large {
+            next.first().iter().for_each(|next| next.prefetch());
+            next.get(1).into_iter().for_each(prefetch);
+        }
+        rest = next;
+        let Some(pilot_host) = drone.pilot_host.as_mut().filter(|_| !drone.frozen) else { continue };
+        drone.frames.clear();
+        let _in_pilot = worker.place.enter(pilot_host.drone().0);
+        let step = pilot_host.begin_step(down, &mut worker.arrived, scratch, &mut drone.slot, &mut worker.stats);
+        *begun = step.map(|step| (step, &mut drone.frames));
+    }
+    for (begun, scratch) in begun.iter_mut().zip(&mut worker.scratch) {
+        let Some((step, frames)) = begun else { continue };
+        let _in_pilot = worker.place.enter(step.drone().0);
+        step.end(down, scratch, &mut worker.stats);
+        // Few ticks have many frames, and their memory is given back.
+        frames.shrink_to(FEW_FRAMES);
+        frames.extend(scratch.said().frames());
+    }
 }
 
 /// Does to a pilot what the supervisor does to a process.
@@ -253,15 +279,71 @@ impl InlineDrone {
     fn flies(&self) -> bool {
         self.pilot_host.is_some() && !self.frozen
     }
+}
 
-    fn step(&mut self, down: &DownlinkView<'_>, Worker { scratch, stats, place }: &mut Worker) {
-        let Some(pilot_host) = self.pilot_host.as_mut().filter(|_| !self.frozen) else { return };
-        let in_pilot = place.enter(pilot_host.drone().0);
-        let said = pilot_host.step(down, scratch, &mut self.slot, stats);
-        drop(in_pilot);
-        self.frames.clear();
-        // Few ticks have many frames, and their memory is given back.
-        self.frames.shrink_to(FEW_FRAMES);
-        self.frames.extend(said.frames());
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_agent::CoursePilot;
+    use skein_pilot::{Command, Inbox, Out, Pilot, Senses};
+    use skein_scenario::ScenarioSource;
+
+    /// The paper's pilot in one that steps it as a whole, as a pilot of a user may do.
+    struct AtOnce(CoursePilot);
+
+    impl Pilot for AtOnce {
+        fn step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) -> Command {
+            self.0.step(senses, inbox, out)
+        }
+    }
+
+    fn digest(scenario: &Scenario, pilots: &PilotRegistry, threads: usize) -> u64 {
+        let mut swarm = InlineSwarm::new(NonZero::new(threads).unwrap(), scenario, pilots).unwrap();
+        while swarm.world.ended().is_none() {
+            swarm.tick();
+        }
+        swarm.world.digest()
+    }
+
+    #[test]
+    fn a_pilot_that_is_stepped_at_once_flies_as_one_that_begins_first() {
+        let scene = "
+            [formation]
+            shape = \"v\"
+            drones = 11
+            [mission]
+            end = \"time\"
+            duration_s = 30
+            [[obstacle]]
+            shape = \"circle\"
+            centre_m = [250, 5]
+            radius_m = 40
+            [[obstacle]]
+            shape = \"circle\"
+            centre_m = [200, -90]
+            radius_m = 20
+            top_m = 20
+            [[fault]]
+            at_s = 6
+            kind = \"restart\"
+            for_s = 3
+            drone = 4
+            [[fault]]
+            at_s = 5
+            kind = \"freeze\"
+            for_s = 2
+            drone = 9
+        ";
+        let scenario = Scenario::parse(scene, ScenarioSource { name: "halves", stem: "halves" }, &[]).unwrap();
+        let halves = PilotRegistry::built_in().unwrap();
+        let mut whole = PilotRegistry::built_in().unwrap();
+        let known = scenario.clone();
+        whole.register("paper", move |birth| {
+            let (id, start) = (DroneId(birth.drone), SimTime::from_secs(birth.start_s));
+            let params = mission::pilot_params(&known, id, birth.incarnation, start);
+            Ok(Box::new(AtOnce(CoursePilot::new(known.course(), params))))
+        });
+        let expected = digest(&scenario, &whole, 1);
+        assert_eq!([1, 2].map(|threads| digest(&scenario, &halves, threads)), [expected; 2]);
     }
 }

@@ -18,10 +18,23 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct StepScratch {
     arrived: Arrived,
-    /// The messages of these frames; empty between ticks.
+    step: PilotScratch,
+}
+
+/// Memory for what a pilot hears and says in one tick.
+#[derive(Default)]
+pub(crate) struct PilotScratch {
+    /// Empty between ticks.
     heard: Vec<Heard<'static>>,
     out: Out,
     ages_s: Vec<f64>,
+}
+
+impl PilotScratch {
+    /// What the pilot has said.
+    pub(crate) fn said(&self) -> Said<'_> {
+        Said::of(&self.out)
+    }
 }
 
 /// What a drone's host knows besides its pilot and its radio.
@@ -37,8 +50,13 @@ pub struct HostParams {
 
 /// One drone: its pilot, its radio receiver and its counters.
 pub struct PilotHost {
-    params: HostParams,
     radio_receiver: RadioReceiver,
+    seat: PilotSeat,
+}
+
+/// A pilot and its counters.
+struct PilotSeat {
+    params: HostParams,
     pilot: Box<dyn Pilot>,
     frames_total: u64,
     failed: bool,
@@ -50,24 +68,25 @@ impl PilotHost {
     #[must_use]
     pub fn new(params: HostParams, radio: impl Into<Arc<Radio>>, pilot: Box<dyn Pilot>) -> Self {
         let radio_receiver = RadioReceiver::new(params.me, (params.dt_s * 1e9).round() as i64, radio.into());
-        Self { params, radio_receiver, pilot, frames_total: 0, failed: false, guard: None }
+        Self { radio_receiver, seat: PilotSeat { params, pilot, frames_total: 0, failed: false, guard: None } }
     }
 
     /// Ends a process that the pilot forks and that comes back from the pilot's step: it must not answer for the drone, too.
     #[must_use]
-    pub fn guarded(self, guard: ForkGuard) -> Self {
-        Self { guard: Some(guard), ..self }
+    pub fn guarded(mut self, guard: ForkGuard) -> Self {
+        self.seat.guard = Some(guard);
+        self
     }
 
     /// Fetches the pilot into the cache: call it a short time before [`Self::step`].
     pub(crate) fn prefetch(&self) {
-        prefetch(&*self.pilot);
+        prefetch(&*self.seat.pilot);
     }
 
     /// The drone.
     #[inline]
     pub(crate) fn drone(&self) -> DroneId {
-        self.params.me
+        self.seat.params.me
     }
 
     /// Receives the frames of a downlink that came too late to be answered. The pilot hears them in its next step.
@@ -84,45 +103,115 @@ impl PilotHost {
         slot: &mut Slot,
         stats: &mut LinkStats,
     ) -> Said<'s> {
-        scratch.arrived.begin();
+        let StepScratch { arrived, step } = scratch;
+        if let Some(mut begun) = self.begin_step(down, arrived, step, slot, stats) {
+            begun.end(down, step, stats);
+        }
+        step.said()
+    }
+
+    /// The first half of [`Self::step`]: receives, and begins the pilot's step. Returns the rest of the step, which needs the same
+    /// `scratch`; `None` if the downlink has nothing for this drone.
+    pub(crate) fn begin_step<'a>(
+        &'a mut self,
+        down: &DownlinkView<'a>,
+        arrived: &mut Arrived,
+        scratch: &mut PilotScratch,
+        slot: &'a mut Slot,
+        stats: &mut LinkStats,
+    ) -> Option<BegunStep<'a>> {
+        arrived.begin();
         scratch.out.clear();
         scratch.ages_s.clear();
-        let Some(senses) = down.senses(self.params.me) else { return Said::of(&scratch.out) };
-        self.radio_receiver.receive(down, senses.now, &mut scratch.arrived, stats);
+        let Self { radio_receiver, seat } = self;
+        let senses = down.senses(seat.params.me)?;
+        radio_receiver.receive(down, senses.now, arrived, stats);
         let mut heard = emptied(std::mem::take(&mut scratch.heard));
-        self.radio_receiver.deliver(&senses, down.frames, &mut scratch.arrived, &mut heard, stats);
-        let gain_per_s = self.params.velocity_gain_per_s;
-        let stepped = step_pilot(&mut *self.pilot, gain_per_s, &senses, &Inbox::new(&heard), scratch);
-        if let Some(guard) = self.guard {
-            guard.end_copy(|| copy_came_back(self.params.me.0));
-        }
-        scratch.heard = emptied(heard);
-        if let Err(reason) = &stepped {
-            self.fail(reason.clone(), &mut scratch.out);
-        }
-        self.frames_total += Said::of(&scratch.out).len() as u64;
-        self.count_ages(scratch, stats);
-        let tally = self.radio_receiver.tally();
+        let tally = radio_receiver.deliver(&senses, down.frames, arrived, &mut heard, stats);
         *slot = Slot {
             heard: tally.heard,
             duplicates: tally.duplicates,
             heard_hash: tally.hash,
             dropped: tally.dropped,
-            frames_total: self.frames_total,
             ..Slot::default()
         };
-        if let Ok(Answer { acceleration_mps2, status }) = stepped {
-            slot.acceleration_mps2 = acceleration_mps2;
-            status.fill(slot);
-        }
-        slot.flags |= flag(scratch.out.is_done(), SLOT_DONE) | flag(self.failed, SLOT_FAILED);
-        Said::of(&scratch.out)
+        let pilot = &mut seat.pilot;
+        let failure = catch(|| pilot.begin_step(&senses, &Inbox::new(&heard), &mut scratch.out)).err();
+        Some(BegunStep { seat, slot, heard, failure })
     }
 
     /// Whether its pilot has failed. It must not be stepped any more: the world kills the drone when the next tick opens.
     #[must_use]
     pub fn has_failed(&self) -> bool {
-        self.failed
+        self.seat.failed
+    }
+}
+
+/// The step of a drone whose pilot has begun its own.
+pub(crate) struct BegunStep<'a> {
+    seat: &'a mut PilotSeat,
+    slot: &'a mut Slot,
+    heard: Vec<Heard<'a>>,
+    /// Why the pilot has failed already.
+    failure: Option<String>,
+}
+
+impl BegunStep<'_> {
+    /// The drone.
+    #[inline]
+    pub(crate) fn drone(&self) -> DroneId {
+        self.seat.params.me
+    }
+
+    /// The second half of [`PilotHost::step`], on the same downlink and with what the pilot has begun to say in `scratch`.
+    pub(crate) fn end(&mut self, down: &DownlinkView<'_>, scratch: &mut PilotScratch, stats: &mut LinkStats) {
+        let Self { seat, slot, heard, failure } = self;
+        let Some(senses) = down.senses(seat.params.me) else { return };
+        let stepped = match failure.take() {
+            None => seat.step_pilot(&senses, &Inbox::new(heard), scratch),
+            Some(reason) => Err(reason),
+        };
+        if let Some(guard) = seat.guard {
+            guard.end_copy(|| copy_came_back(seat.params.me.0));
+        }
+        scratch.heard = emptied(std::mem::take(heard));
+        match stepped {
+            Ok(Answer { acceleration_mps2, status }) => {
+                slot.acceleration_mps2 = acceleration_mps2;
+                status.fill(slot);
+            }
+            Err(reason) => seat.fail(reason, &mut scratch.out),
+        }
+        seat.frames_total += scratch.said().len() as u64;
+        slot.frames_total = seat.frames_total;
+        slot.flags |= flag(scratch.out.is_done(), SLOT_DONE) | flag(seat.failed, SLOT_FAILED);
+        count_ages(seat.params.dt_s, &scratch.ages_s, stats);
+    }
+}
+
+impl PilotSeat {
+    /// Steps the pilot, and checks what it commands and says. An error says why the pilot has failed.
+    fn step_pilot(
+        &mut self,
+        senses: &Senses<'_>,
+        inbox: &Inbox<'_>,
+        scratch: &mut PilotScratch,
+    ) -> Result<Answer, String> {
+        let (pilot, PilotScratch { out, ages_s, .. }) = (&mut self.pilot, scratch);
+        let command = catch(|| {
+            let command = pilot.step(senses, inbox, out);
+            ages_s.clear();
+            if out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
+                pilot.pose_ages_s(senses.now, ages_s);
+            }
+            command
+        })?;
+        let acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, self.params.velocity_gain_per_s);
+        if !acceleration_mps2.iter().all(|mps2| mps2.is_finite()) {
+            return Err(format!("it commanded {:?}, which is not finite", command.motion()));
+        }
+        check_said(out)?;
+        Ok(Answer { acceleration_mps2, status: *command.status() })
     }
 
     /// The pilot has failed: what it said in this tick is forgotten, and the reason is reported instead.
@@ -131,14 +220,13 @@ impl PilotHost {
         self.failed = true;
         out.report_failure(reason);
     }
+}
 
-    /// Counts how old the newest pose of each peer is, as the pilot has told whenever it sends a pose.
-    fn count_ages(&self, scratch: &mut StepScratch, stats: &mut LinkStats) {
+/// Counts how old the newest pose of each peer is, as the pilot has told whenever it sends a pose.
+fn count_ages(dt_s: f64, ages_s: &[f64], stats: &mut LinkStats) {
+    for age_s in ages_s {
         // Rounded by hand: a thousand calls of a function for that take a while.
-        let ticks = |age_s: &f64| (age_s / self.params.dt_s + 0.5) as u64;
-        for age_s in &scratch.ages_s {
-            stats.age(ticks(age_s));
-        }
+        stats.age((age_s / dt_s + 0.5) as u64);
     }
 }
 
@@ -146,31 +234,6 @@ impl PilotHost {
 struct Answer {
     acceleration_mps2: [f64; 3],
     status: Status,
-}
-
-/// Steps the pilot, and checks what it commands and says. An error says why the pilot has failed.
-fn step_pilot(
-    pilot: &mut dyn Pilot,
-    velocity_gain_per_s: f64,
-    senses: &Senses<'_>,
-    inbox: &Inbox<'_>,
-    scratch: &mut StepScratch,
-) -> Result<Answer, String> {
-    let StepScratch { out, ages_s, .. } = scratch;
-    let command = catch(|| {
-        let command = pilot.step(senses, inbox, out);
-        ages_s.clear();
-        if out.messages().iter().any(|message| matches!(message, Message::Pose(_))) {
-            pilot.pose_ages_s(senses.now, ages_s);
-        }
-        command
-    })?;
-    let acceleration_mps2 = command.acceleration_mps2(senses.velocity_mps, velocity_gain_per_s);
-    if !acceleration_mps2.iter().all(|mps2| mps2.is_finite()) {
-        return Err(format!("it commanded {:?}, which is not finite", command.motion()));
-    }
-    check_said(out)?;
-    Ok(Answer { acceleration_mps2, status: *command.status() })
 }
 
 /// Whether the radio and the record can take what a pilot has said; otherwise why not.
@@ -199,4 +262,66 @@ fn check_said(out: &Out) -> Result<(), String> {
 fn emptied<'b>(mut heard: Vec<Heard<'_>>) -> Vec<Heard<'b>> {
     heard.clear();
     heard.into_iter().map_while(|_| None).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skein_pilot::Command;
+    use skein_protocol::UserMessage;
+    use skein_protocol::downlink::{Downlink, SensesHeader};
+    use skein_protocol::telemetry::Telemetry;
+
+    /// Speaks in both halves of a step, and panics in the given one.
+    struct Speaker(Option<&'static str>);
+
+    impl Pilot for Speaker {
+        fn begin_step(&mut self, _: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) {
+            out.say("half", b"first");
+            assert_ne!(self.0, Some("first"), "the first half fails");
+        }
+
+        fn step(&mut self, _: &Senses<'_>, _: &Inbox<'_>, out: &mut Out) -> Command {
+            out.say("half", b"second");
+            assert_ne!(self.0, Some("second"), "the second half fails");
+            Command::acceleration([1.0, 2.0, 3.0])
+        }
+    }
+
+    /// Steps such a pilot once, and calls `look` with its host, its slot and what it said.
+    fn step(fails: Option<&'static str>, look: impl FnOnce(&PilotHost, &Slot, &[Message], &[Telemetry])) {
+        let mut down =
+            Downlink { drones: vec![SensesHeader { alive: 1, ..Default::default() }], ..Downlink::default() };
+        down.seal(0, SimTime::ZERO);
+        let params = HostParams { me: DroneId(0), dt_s: 0.02, velocity_gain_per_s: 1.0 };
+        let mut host = PilotHost::new(params, Radio::default(), Box::new(Speaker(fails)));
+        let (mut scratch, mut slot, mut stats) = (StepScratch::default(), Slot::default(), LinkStats::default());
+        host.step(&down.view(), &mut scratch, &mut slot, &mut stats);
+        look(&host, &slot, scratch.step.out.messages(), scratch.step.out.telemetry());
+    }
+
+    #[test]
+    fn what_a_pilot_says_in_both_halves_is_sent() {
+        step(None, |host, slot, said, _| {
+            let bytes = |message: &Message| match message {
+                Message::User(message) => UserMessage::bytes(message).to_vec(),
+                other => panic!("{other:?}"),
+            };
+            assert_eq!(said.iter().map(bytes).collect::<Vec<_>>(), [b"first".to_vec(), b"second".to_vec()]);
+            assert_eq!((slot.frames_total, slot.acceleration_mps2), (2, [1.0, 2.0, 3.0]));
+            assert!(!host.has_failed() && slot.flags & SLOT_FAILED == 0);
+        });
+    }
+
+    #[test]
+    fn a_pilot_that_fails_in_either_half_says_why_and_nothing_else() {
+        for half in ["first", "second"] {
+            step(Some(half), |host, slot, said, telemetry| {
+                assert!(host.has_failed() && slot.flags & SLOT_FAILED != 0 && said.is_empty(), "{half}");
+                assert_eq!((slot.frames_total, slot.acceleration_mps2), (1, [0.0; 3]));
+                let [Telemetry::Failure { reason }] = telemetry else { panic!("{telemetry:?}") };
+                assert!(reason.contains(&format!("the {half} half fails")), "{reason}");
+            });
+        }
+    }
 }

@@ -103,7 +103,7 @@ pub(crate) struct RadioReceiver {
     kept: Vec<KeptFrame>,
     /// Indices of `kept` that are free.
     free: Vec<u32>,
-    /// Counts since the last [`RadioReceiver::tally`].
+    /// Counts since the last [`RadioReceiver::deliver`].
     tally: Tally,
 }
 
@@ -134,11 +134,6 @@ impl RadioReceiver {
             free: Vec::new(),
             tally: Tally::default(),
         }
-    }
-
-    /// Returns what was counted since the last call.
-    pub(crate) fn tally(&mut self) -> Tally {
-        std::mem::take(&mut self.tally)
     }
 
     /// Decides for each frame of a downlink whether and when this drone receives it. Frames that are due by `now` go to
@@ -227,7 +222,7 @@ impl RadioReceiver {
     }
 
     /// Delivers what is due at the time of the downlink to `heard`, in the order (due, source, sequence), a second copy after
-    /// the first. The given [`Arrived`] holds what the downlink itself brought.
+    /// the first. The given [`Arrived`] holds what the downlink itself brought. Returns what was counted since the call before.
     pub(crate) fn deliver<'a>(
         &'a mut self,
         senses: &Senses<'_>,
@@ -235,7 +230,7 @@ impl RadioReceiver {
         Arrived { pending, checked }: &mut Arrived,
         heard: &mut Vec<Heard<'a>>,
         stats: &mut LinkStats,
-    ) {
+    ) -> Tally {
         while self.pending.peek().is_some_and(|Reverse(next)| next.due <= senses.now) {
             pending.extend(self.pending.pop().map(|Reverse(pending)| pending));
         }
@@ -273,6 +268,7 @@ impl RadioReceiver {
                 }
             }
         }
+        std::mem::take(tally)
     }
 
     fn drop_frames(&mut self, reason: DropReason, count: u32, stats: &mut LinkStats) {

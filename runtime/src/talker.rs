@@ -28,6 +28,10 @@ impl Pilot for TalkerPilot {
         command
     }
 
+    fn begin_step(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, out: &mut Out) {
+        self.pilot.begin_step(senses, inbox, out);
+    }
+
     fn pose_ages_s(&self, now: SimTime, ages: &mut Vec<f64>) {
         self.pilot.pose_ages_s(now, ages);
     }

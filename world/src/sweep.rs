@@ -49,7 +49,7 @@ impl SensorSweep {
         }
     }
 
-    /// The flying bodies near a flying body, ids ascending.
+    /// The flying bodies near a flying body, and perhaps some that are a little farther away; ids ascending.
     pub(crate) fn neighbours_of(&self, drone: usize) -> &[u32] {
         self.neighbours.of(drone)
     }
