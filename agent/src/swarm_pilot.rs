@@ -68,6 +68,7 @@ pub struct SwarmPilot {
     /// Where the route first turns, if a drone that detours flies there. World frame, m.
     turn: Option<Vec2>,
     reaction: ReactionDelay,
+    /// The step that it has begun and not ended.
     begun: Option<BegunStep>,
     /// The tick in which the drone was stepped last.
     stepped: Option<u64>,
@@ -608,6 +609,7 @@ impl SwarmPilot {
         })
     }
 
+    /// Begins a step, on the senses at the altitude that it keeps.
     fn begin(&mut self, senses: &Senses<'_>, inbox: &Inbox<'_>, say: &mut Vec<Message>) -> BegunStep {
         let levelled = self.altitude.look(senses);
         if levelled {
